@@ -1,0 +1,40 @@
+# make train   install what is missing, train on synthetic records, write models and report to out/
+# make test    install what is missing, lint, check types, run every test
+# make bench   speed and size, as ratios within one run
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/installed
+OUT    ?= out
+NS     := build/ns
+SOURCES := simulate features models classify tests
+
+.PHONY: train test lint bench clean
+.DELETE_ON_ERROR:
+
+train: $(STAMP)
+	$(BIN)/bladewing train --out $(OUT)
+	$(BIN)/bladewing report --quick --models $(OUT) --out $(OUT)
+
+test: $(STAMP) lint
+	$(BIN)/python -m pytest
+
+# Types are checked through a link, because a type checker sees nothing of an editable install.
+lint: $(STAMP)
+	$(BIN)/ruff check $(SOURCES)
+	$(BIN)/ruff format --check $(SOURCES)
+	@mkdir -p $(NS) && ln -sfn ../.. $(NS)/bladewing
+	MYPYPATH=$(NS) $(BIN)/mypy -p bladewing.simulate -p bladewing.features -p bladewing.models -p bladewing.classify
+
+bench: $(STAMP)
+	$(BIN)/python -m pytest tests/benchmarks -o addopts="--import-mode=importlib" -q
+
+# Made again only when the pins or the project's own description change.
+$(STAMP): pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt setuptools wheel
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -c constraints.txt -e '.[train,dev]'
+	touch $@
+
+clean:
+	rm -rf build out
