@@ -1,0 +1,224 @@
+"""Birds: two-part flapping wings, glides, accelerating bodies, small flocks."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .laws import Draws
+from .motion import TWO_PI, range_phasor, straight_path
+from .radar import Radar
+from .target import Target
+
+#: No bird beats faster than this [Hz]: the product's definition of a bird, and the paper's.
+MAX_WINGBEAT_HZ = 18.0
+
+#: Most birds that a flock brings into one range cell.
+MAX_FLOCK = 5
+
+_GRAVITY_MPS2 = 9.81
+_AIR_KG_M3 = 1.225
+
+
+def wingbeat_hz(mass_kg: ArrayLike, span_m: ArrayLike, area_m2: ArrayLike) -> NDArray[np.float64]:
+    """Wingbeat frequency of steady flapping flight, m^(3/8) g^(1/2) b^(-23/24) S^(-1/3) rho^(-3/8).
+
+    Parameters
+    ----------
+    mass_kg, span_m, area_m2 : array_like
+        Body mass [kg], wing span [m] and wing area [m^2], all > 0.
+
+    Returns
+    -------
+    ndarray
+        Wingbeat [Hz].
+
+    References
+    ----------
+    Pennycuick, "Wingbeat frequency of birds in steady cruising flight", J. Exp. Biol. 199 (1996) 1613-1618.
+    """
+    mass, span, area = (np.asarray(x, np.float64) for x in (mass_kg, span_m, area_m2))
+    return mass ** (3 / 8) * _GRAVITY_MPS2**0.5 * span ** (-23 / 24) * area ** (-1 / 3) * _AIR_KG_M3 ** (-3 / 8)
+
+
+def wing_size(mass_kg: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Typical span [m] and wing area [m^2] of a bird of that mass, 1.17 m^0.39 and 0.16 m^0.72.
+
+    References
+    ----------
+    Rayner, "Form and function in avian flight" (1988), allometry over all birds.
+    """
+    mass = np.asarray(mass_kg, np.float64)
+    return 1.17 * mass**0.39, 0.16 * mass**0.72
+
+
+def stroke_angles_rad(
+    cycle_rad: NDArray[np.float64], stroke_scale: ArrayLike = 1.0
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Angles of a two-part wing over the wingbeat cycle.
+
+    Parameters
+    ----------
+    cycle_rad : ndarray, shape (..., pulses)
+        Phase of the wingbeat [rad]; the wing is highest at 0.
+    stroke_scale : array_like, shape (...)
+        Scale of the amplitudes, 1 for the published ones; 0 is a glide.
+
+    Returns
+    -------
+    inner, outer, sweep : ndarray, shape (..., pulses)
+        Elevation of the inner and of the outer part, and fore-aft sweep of the outer part [rad].
+
+    References
+    ----------
+    Stroke 40 cos + 15, 30 cos + 40, 20 sin + 40 degrees: Journal of Electromagnetic Engineering and Science (2021).
+    """
+    scale = np.asarray(stroke_scale, np.float64)[..., None]
+    cosine, sine = scale * np.cos(cycle_rad), scale * np.sin(cycle_rad)
+    return np.deg2rad(40 * cosine + 15), np.deg2rad(30 * cosine + 40), np.deg2rad(20 * sine + 40)
+
+
+def wing_echo(
+    cycle_rad: NDArray[np.float64],
+    *,
+    wavelength_m: float,
+    half_span_m: ArrayLike,
+    sight: NDArray[np.float64],
+    stroke_scale: ArrayLike = 1.0,
+    down_stroke: ArrayLike = 0.0,
+    feather_weight: ArrayLike = 0.3,
+) -> NDArray[np.complex64]:
+    """Slow-time echo of both wings about the body.
+
+    Each part is a uniform line in closed form, with a discrete scatterer at wrist and tip.
+
+    Parameters
+    ----------
+    cycle_rad : ndarray, shape (..., pulses)
+        Phase of the wingbeat [rad].
+    wavelength_m : float
+        Wavelength [m].
+    half_span_m : array_like, shape (...)
+        Length of one wing [m], half of it in each part.
+    sight : ndarray, shape (..., 3)
+        Unit vector from the bird to the radar: forward, to the right wing, up.
+    stroke_scale : array_like
+        Scale of the stroke, 0 for a glide.
+    down_stroke : array_like
+        How much stronger the down-stroke echoes, 0..1.
+    feather_weight : array_like
+        Amplitude of the wrist and tip scatterers against the whole line.
+
+    Returns
+    -------
+    ndarray of complex64, shape (..., pulses)
+    """
+    inner, outer, sweep = stroke_angles_rad(cycle_rad, stroke_scale)
+    part = np.asarray(half_span_m, np.float64)[..., None] / 2
+    k = TWO_PI / wavelength_m
+    forward, right, up = (sight[..., axis, None] for axis in range(3))
+    feather = np.asarray(feather_weight, np.float32)[..., None]
+    stroke = 1 + np.asarray(down_stroke, np.float64)[..., None] * np.sin(cycle_rad)
+    out = np.zeros(np.broadcast_shapes(cycle_rad.shape, part.shape), np.complex64)
+    for side in (1.0, -1.0):
+        along_inner = part * (side * right * np.cos(inner) + up * np.sin(inner))
+        along_outer = part * (
+            forward * np.sin(sweep) + np.cos(sweep) * (side * right * np.cos(outer) + up * np.sin(outer))
+        )
+        wrist, tip = along_inner, along_inner + along_outer
+        # A displacement towards the radar advances the phase by 2 k per metre.
+        out += np.sinc(k * along_inner / np.pi) * _cis(k * along_inner)
+        out += np.sinc(k * along_outer / np.pi) * _cis(k * (2 * wrist + along_outer))
+        out += feather * (_cis(2 * k * wrist) + _cis(2 * k * tip))
+    return out * stroke.astype(np.float32)
+
+
+def _cis(phase_rad: NDArray[np.float64]) -> NDArray[np.complex64]:
+    """exp(j phase) for phases of at most some thousand radians, which a wing's span bounds."""
+    phase = phase_rad.astype(np.float32)
+    out = np.empty(phase.shape, np.complex64)
+    np.cos(phase, out=out.real)
+    np.sin(phase, out=out.imag)
+    return out
+
+
+def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
+    """Draw and render a batch of birds of one kind.
+
+    Parameters
+    ----------
+    draws : Draws
+        The records' uniform numbers.
+    radar : Radar
+        The radar that looks.
+    kind : {"flapping_bird", "gliding_bird", "flock"}
+        Steady flapping; flap and glide (the pause may fall into the dwell, wholly or in part); 2 to 5 birds.
+
+    Returns
+    -------
+    Target
+        `micro` holds the wings, `body` the bodies.
+    """
+    records = len(draws)
+    mass = draws.value("bird_mass_kg")
+    span, area = wing_size(mass)
+    beat = np.minimum(wingbeat_hz(mass, span, area) * draws.value("wingbeat_scatter"), MAX_WINGBEAT_HZ)
+    heading, elevation = draws.value("phase_rad"), np.deg2rad(-10 + 60 * draws.uniform())
+    sight = np.stack(
+        [np.cos(heading) * np.cos(elevation), np.sin(heading) * np.cos(elevation), -np.sin(elevation)], axis=-1
+    )
+    # The radar sees the bird's speed along the line of sight; flying at it (forward > 0) closes the range.
+    velocity = -draws.value("bird_speed_mps") * sight[:, 0]
+    acceleration = draws.value("bird_acceleration_mps2")
+    scale = draws.value("stroke_scale")
+    down, feather = draws.value("down_stroke"), draws.value("feather_weight")
+    extra = 1 + np.floor((MAX_FLOCK - 1) * draws.uniform()).astype(int)
+    members = 1 + extra if kind == "flock" else np.ones(records, int)
+    bob = 0.02 * span * draws.uniform()
+
+    # One column a member, drawn for all records alike: what a record draws must not depend on its batch.
+    spread = draws.value("flock_velocity_mps", MAX_FLOCK)
+    rate = beat[:, None] * (1 + 0.1 * (draws.uniform(MAX_FLOCK) - 0.5))
+    phase = draws.value("phase_rad", MAX_FLOCK)
+    level = np.exp(0.4 * draws.normal(MAX_FLOCK) + 1j * draws.value("phase_rad", MAX_FLOCK)).astype(np.complex64)
+    pause, still = draws.uniform(), draws.chance(0.4)
+    body_db = draws.value("bird_body_db")
+
+    micro = np.zeros((records, radar.pulses), np.complex64)
+    body = np.zeros_like(micro)
+    for member in range(int(members.max())):
+        rows = np.flatnonzero(members > member)
+        cycle = TWO_PI * rate[rows, member, None] * radar.times_s + phase[rows, member, None]
+        flap = np.ones(len(rows))
+        if kind == "gliding_bird":
+            cycle = _pause(cycle, pause[rows], radar.dwell_s * rate[rows, member])
+            flap = np.where(still[rows], 0.05, 1.0)  # a glide through the whole dwell hardly moves the wings
+        wings = wing_echo(
+            cycle,
+            wavelength_m=radar.wavelength_m,
+            half_span_m=span[rows] / 2,
+            sight=sight[rows],
+            stroke_scale=scale[rows] * flap,
+            down_stroke=down[rows],
+            feather_weight=feather[rows],
+        )
+        # the body rises and sinks against the wings, at the wingbeat
+        heave = (bob * sight[:, 2])[rows, None] * np.cos(cycle)
+        own = velocity[rows] + (spread[rows, member] if member else 0.0)
+        path = straight_path(radar.times_s, own, acceleration[rows]) + heave
+        moved = level[rows, member, None] * range_phasor(path, radar.wavelength_m)
+        micro[rows] += moved * wings
+        body[rows] += moved
+    truth = {
+        "wingbeat_hz": beat,
+        "mass_kg": mass,
+        "span_m": span,
+        "members": members.astype(float),
+        "velocity_mps": velocity,
+        "acceleration_mps2": acceleration,
+    }
+    return Target(micro, body, body_db, truth=truth)
+
+
+def _pause(cycle: NDArray[np.float64], when: NDArray[np.float64], beats: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Hold the wings still from one moment on: the flapping ends inside the dwell, or before or after it."""
+    stop = cycle[:, :1] + TWO_PI * beats[:, None] * (1.5 * when[:, None] - 0.25)
+    return np.minimum(cycle, np.maximum(stop, cycle[:, :1]))

@@ -1,0 +1,179 @@
+"""Clutter as a random process: wind-blown ground, rain, sea, and plain noise.
+
+Each is a Gaussian process with a given Doppler spectrum, made by shaping white noise in the frequency domain; the sea
+carries a slow gamma texture on top (K distribution).
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import fft
+
+from .laws import Draws
+from .motion import TWO_PI
+from .radar import Radar
+from .target import Normals, Target
+
+
+def billingsley(wind_mph: ArrayLike, carrier_hz: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Billingsley's spectrum of wind-blown ground: P(v) = a/(a+1) delta(v) + 1/(a+1) (b/2) exp(-b |v|).
+
+    Parameters
+    ----------
+    wind_mph : array_like
+        Wind speed [mph], > 0.
+    carrier_hz : float
+        Carrier [Hz].
+
+    Returns
+    -------
+    dc_ratio : ndarray
+        a, power at rest over moving power [1].
+    shape_s_per_m : ndarray
+        b, decay of the moving part [s/m].
+
+    References
+    ----------
+    Billingsley, "Low-Angle Radar Land Clutter" (2002): a = 489.8 w^-1.55 f^-1.21, 1/b = 0.1048 (log10 w + 0.4147).
+    """
+    wind = np.asarray(wind_mph, np.float64)
+    a = 489.8 * wind**-1.55 * (carrier_hz / 1e9) ** -1.21
+    return a, 1 / (0.1048 * (np.log10(wind) + 0.4147))
+
+
+def shaped_noise(
+    normals: Normals, radar: Radar, velocity_psd: NDArray[np.float64], velocities_mps: NDArray[np.float64]
+) -> NDArray[np.complex64]:
+    """Complex Gaussian process of unit power with a given velocity spectrum.
+
+    Parameters
+    ----------
+    normals : callable
+        Source of standard normal numbers, one row a record.
+    radar : Radar
+        The radar that looks; speeds beyond its unambiguous one alias, as they do in the field.
+    velocity_psd : ndarray, shape (records, lines)
+        Power at each velocity, any scale; the lines are those of `process_velocities`.
+    velocities_mps : ndarray, shape (lines,)
+        Those velocities, FFT order.
+
+    Returns
+    -------
+    ndarray of complex64, shape (records, pulses)
+    """
+    lines = len(velocities_mps)
+    total = velocity_psd.sum(axis=-1, keepdims=True)
+    amplitude = np.sqrt(velocity_psd / np.where(total > 0, total, 1) / 2).astype(np.float32)
+    white = normals(2 * lines)
+    spectrum = np.empty((len(white), lines), np.complex64)
+    spectrum.real = white[:, :lines] * amplitude
+    spectrum.imag = white[:, lines:] * amplitude
+    out = np.empty((len(white), radar.pulses), np.complex64)
+    for row in range(len(white)):  # row by row: the bits of a record must not depend on its batch
+        out[row] = fft.ifft(spectrum[row], norm="forward")[: radar.pulses]
+    return out
+
+
+def process_velocities(radar: Radar) -> NDArray[np.float64]:
+    """Velocities of the process's lines [m/s], FFT order; twice the dwell at least, so that its ends do not meet."""
+    lines = fft.next_fast_len(2 * radar.pulses)
+    return -fft.fftfreq(lines, 1 / radar.prf_hz) * radar.wavelength_m / 2
+
+
+def ground_psd(radar: Radar, wind_mph: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+    """Moving part of wind-blown ground, shape (records, lines), and the share of power at rest, shape (records,)."""
+    a, b = billingsley(wind_mph, radar.carrier_hz)
+    v = process_velocities(radar)
+    b = np.asarray(b)[:, None]
+    # Integral of exp(-b|v|) over each line's width: right also where the width of a line exceeds 1/b.
+    width = np.abs(v[1]) if len(v) > 1 else 1.0
+    edge = np.abs(v)[None, :]
+    psd = np.where(
+        edge == 0, 2 * (1 - np.exp(-b * width / 2)), np.exp(-b * edge) * 2 * np.sinh(np.minimum(b * width / 2, 300))
+    )
+    return psd, a / (a + 1)
+
+
+def draw_ground(
+    normals: Normals, radar: Radar, wind_mph: NDArray[np.float64], phase_rad: NDArray
+) -> NDArray[np.complex64]:
+    """Wind-blown ground of unit mean power, shape (records, pulses)."""
+    psd, rest = ground_psd(radar, wind_mph)
+    moving = shaped_noise(normals, radar, psd, process_velocities(radar))
+    still = (np.sqrt(rest) * np.exp(1j * phase_rad)).astype(np.complex64)
+    return still[:, None] + np.sqrt(1 - rest).astype(np.float32)[:, None] * moving
+
+
+def draw_clutter(draws: Draws, radar: Radar, kind: str, normals: Normals) -> Target:
+    """Draw and render a batch of one kind of distributed clutter.
+
+    Parameters
+    ----------
+    draws : Draws
+        The records' uniform numbers.
+    radar : Radar
+        The radar that looks.
+    kind : {"ground", "rain", "sea", "noise"}
+        The clutter; "noise" is an empty cell.
+    normals : callable
+        Source of standard normal numbers, one row a record.
+
+    Returns
+    -------
+    Target
+        `micro` is the whole process; for "noise" it is zero and its SNR has no meaning.
+    """
+    if kind == "noise":
+        return Target(np.zeros((len(draws), radar.pulses), np.complex64), snr_law="clutter_snr_db")
+    v = process_velocities(radar)
+    if kind == "ground":
+        wind = draws.value("wind_mph")
+        iq = draw_ground(normals, radar, wind, draws.value("phase_rad"))
+        return Target(iq, snr_law="clutter_snr_db", truth={"wind_mph": wind})
+    if kind == "rain":
+        mean, width = draws.value("rain_velocity_mps"), draws.value("rain_width_mps")
+        iq = shaped_noise(normals, radar, _gaussian(v, mean, width, radar), v)
+        return Target(iq, snr_law="clutter_snr_db", truth={"velocity_mps": mean, "width_mps": width})
+    mean, width = draws.value("sea_velocity_mps"), draws.value("sea_width_mps")
+    psd = _gaussian(v, mean, width, radar)
+    # The Bragg lines of receding and advancing ripples, and a burst of fast scatterers from a breaking wave.
+    bragg = math.sqrt(_BRAGG_M_PER_S2 * radar.wavelength_m)
+    for speed in (bragg, -bragg):
+        psd = psd + 0.3 * draws.uniform()[:, None] * _gaussian(v, np.full(len(draws), speed), 0.1 + 0 * width, radar)
+    breaking = np.where(draws.chance(0.35), draws.uniform(), 0.0)
+    psd = psd + breaking[:, None] * _gaussian(v, mean * (1 + 2 * draws.uniform()), 2 * width, radar)
+    shape = draws.value("texture_shape")
+    iq = shaped_noise(normals, radar, psd, v) * _texture(draws, radar, shape)
+    return Target(
+        iq, snr_law="clutter_snr_db", truth={"velocity_mps": mean, "width_mps": width, "texture_shape": shape}
+    )
+
+
+#: Phase speed of the Bragg-resonant ripple, sqrt(g wavelength / (4 pi)) for deep water.
+_BRAGG_M_PER_S2 = 9.81 / (4 * np.pi)
+
+
+def _gaussian(
+    v: NDArray[np.float64], mean_mps: NDArray[np.float64], width_mps: NDArray[np.float64], radar: Radar
+) -> NDArray[np.float64]:
+    """Gaussian velocity spectrum wrapped onto the unambiguous span, shape (records, lines), unit sum."""
+    span = 2 * radar.unambiguous_mps
+    away = v[None, :] - mean_mps[:, None]
+    away -= span * np.rint(away / span)
+    step = np.abs(v[1]) if len(v) > 1 else span
+    width = np.maximum(width_mps, step / 2)[:, None]  # never thinner than a line
+    psd = np.exp(-0.5 * (away / width) ** 2)
+    return psd / psd.sum(axis=-1, keepdims=True)
+
+
+def _texture(draws: Draws, radar: Radar, shape: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Slow modulation of the sea's amplitude: the log of the power swings with the spread of a gamma texture.
+
+    The decorrelation time is 0.1 to 1 s, so within a dwell the texture is a slope or a swell rather than noise.
+    """
+    swing = np.minimum(np.sqrt(np.log1p(1 / shape)), 2.0)  # log-normal with the gamma's variance
+    rate = 0.3 + 2.0 * draws.uniform()
+    phase = draws.value("phase_rad")
+    log_power = swing[:, None] * np.sin(TWO_PI * rate[:, None] * radar.times_s + phase[:, None])
+    return np.exp(0.5 * log_power).astype(np.float32)

@@ -1,0 +1,161 @@
+"""What the training records are drawn from: one table of laws, and the cursor that draws by it.
+
+Every record owns one row of uniform numbers; each parameter maps one of them through its law. The bounds are physical,
+the sources stand beside them ("P": the paper; "facts" are computed or cited in the README's references).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Uniform numbers a record owns; the widest target (an octocopter) uses about two thirds of them.
+WIDTH = 192
+
+
+@dataclass(frozen=True)
+class Law:
+    """One parameter's distribution.
+
+    Parameters
+    ----------
+    kind : {"uniform", "log"}
+        Uniform in the value, or in its logarithm.
+    low, high : float
+        Range, in `unit`.
+    unit : str
+        Unit of the range.
+    source : str
+        Where the range comes from.
+    """
+
+    kind: str
+    low: float
+    high: float
+    unit: str
+    source: str
+
+    def __call__(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Map uniform numbers in [0, 1) to values."""
+        if self.kind == "log":
+            return self.low * (self.high / self.low) ** u
+        return self.low + (self.high - self.low) * u
+
+
+LAWS: dict[str, Law] = {
+    # radars
+    "carrier_hz": Law("log", 2e9, 100e9, "Hz", "envelope"),
+    "dwell_s": Law("log", 5e-3, 0.32, "s", "envelope; dwells of 2.7-89 ms in Gong 2022"),
+    "unambiguous_mps": Law("log", 10.0, 260.0, "m/s", "from slow-body radars to tips of 200 m/s and a margin"),
+    # every scene
+    "snr_db": Law("uniform", -20.0, 32.0, "dB", "micro-motion power over noise, a sample"),
+    "clutter_snr_db": Law("uniform", -20.0, 50.0, "dB", "whole clutter return over noise, a sample"),
+    "phase_rad": Law("uniform", -np.pi, np.pi, "rad", "no phase is special"),
+    "background_db": Law(
+        "uniform", -10.0, 65.0, "dB", "static return over noise; measured drone: 35-54 dB over blades"
+    ),
+    "wind_mph": Law("log", 2.0, 35.0, "mph", "Billingsley"),
+    # rotors
+    "blade_length_m": Law("log", 0.06, 0.45, "m", "0.075-0.41 m (P) and a margin"),
+    "tip_mps": Law("log", 22.0, 190.0, "m/s", "idling 33 m/s (measured) to fast racing props, below Mach 0.6"),
+    "main_length_m": Law("log", 0.25, 1.0, "m", "RC helicopters, 0.407 m (P)"),
+    "gear_ratio": Law("uniform", 3.8, 6.2, "1", "tail over main, 4.73 (P), 4-6 in general"),
+    "tail_ratio": Law("uniform", 0.12, 0.25, "1", "tail over main blade length"),
+    "hover_spread": Law("log", 5e-4, 0.03, "1", "3395-3500 rpm is 3 % (P)"),
+    "manoeuvre_spread": Law("log", 0.03, 0.18, "1", "mixing of thrust in manoeuvres"),
+    "drift_per_s": Law("log", 1e-3, 0.3, "1/s", "relative change of a rate"),
+    "wander": Law("log", 1e-4, 2e-2, "1", "lines decorrelate in tens to hundreds of ms (IET RSN 2022)"),
+    "wander_rate_hz": Law("log", 0.5, 20.0, "Hz", "governor and gusts"),
+    "uav_beta_rad": Law("uniform", 0.0, np.deg2rad(80.0), "rad", "0-90 degrees (P), the last 10 show no blade"),
+    "root_fraction": Law("uniform", 0.0, 0.6, "1", "hub and cuff reflect little"),
+    "edge_asymmetry": Law("uniform", -0.9, 0.9, "1", "advancing and receding edges unlike"),
+    "blade_inequality": Law("log", 0.01, 1.0, "1", "spread of blade amplitudes, natural log"),
+    "uav_body_db": Law("uniform", -10.0, 35.0, "dB", "body over blade power; blade lines 10-45 dB under body (P)"),
+    "uav_velocity_mps": Law("uniform", -30.0, 30.0, "m/s", "small UAVs"),
+    "uav_acceleration_mps2": Law("uniform", -4.0, 4.0, "m/s^2", "small UAVs"),
+    "vibration_rad": Law("log", 1e-3, 0.6, "rad", "airframe shaken at the rotor rate"),
+    # birds
+    "bird_mass_kg": Law("log", 0.008, 10.0, "kg", "goldcrest to swan"),
+    "wingbeat_scatter": Law("log", 0.75, 1.33, "1", "about Pennycuick 1996"),
+    "bird_speed_mps": Law("uniform", 0.0, 22.0, "m/s", "migrants 8-17 m/s; 0 is hovering or crossing"),
+    "bird_acceleration_mps2": Law("uniform", -5.0, 5.0, "m/s^2", "the paper's bird: about 4"),
+    "stroke_scale": Law("uniform", 0.6, 1.25, "1", "about the stroke of JEES 2021"),
+    "bird_body_db": Law("uniform", -12.0, 15.0, "dB", "body over wing power"),
+    "down_stroke": Law("uniform", 0.0, 0.7, "1", "down-stroke stronger than up-stroke"),
+    "feather_weight": Law("log", 0.05, 2.0, "1", "wrist and tip scatterers against the wing's line"),
+    "flock_velocity_mps": Law("uniform", -2.5, 2.5, "m/s", "spread of a flock about its mean"),
+    # clutter
+    "rain_velocity_mps": Law("uniform", -12.0, 12.0, "m/s", "wind and fall along the line of sight"),
+    "rain_width_mps": Law("log", 0.4, 2.5, "m/s", "1-4 m/s wide overall"),
+    "sea_velocity_mps": Law("uniform", -4.5, 4.5, "m/s", "Bragg and wind-driven lines"),
+    "sea_width_mps": Law("log", 0.15, 1.5, "m/s", "measured sea spectra"),
+    "texture_shape": Law("log", 0.1, 10.0, "1", "K distribution, nu 0.1-10"),
+    "person_mps": Law("uniform", -2.5, 2.5, "m/s", "walking to running"),
+    "gait_hz": Law("uniform", 0.8, 2.2, "Hz", "1-2 Hz"),
+    "vehicle_mps": Law("log", 1.0, 40.0, "m/s", "roads; sign drawn apart"),
+    "vehicle_acceleration_mps2": Law("uniform", -10.0, 10.0, "m/s^2", "with the change of aspect close to the road"),
+    "wheel_radius_m": Law("log", 0.2, 0.55, "m", "motorcycle to lorry"),
+    "wheel_db": Law("uniform", -35.0, -5.0, "dB", "wheels under the body"),
+    "turbine_length_m": Law("log", 15.0, 60.0, "m", "small to large wind turbines"),
+    "turbine_tip_mps": Law("uniform", 40.0, 90.0, "m/s", "tips 60-90 m/s at rated wind, less below"),
+    "cell_m": Law("log", 3.0, 60.0, "m", "part of a blade inside the range cell"),
+    # receivers
+    "gain_db": Law("uniform", -80.0, 80.0, "dB", "no gain is special"),
+    "phase_noise_rad": Law(
+        "log", 1e-4, 0.1, "rad", "rms over the dwell, from good synthesisers to free-running CW modules"
+    ),
+    "flicker_db": Law("uniform", -20.0, 30.0, "dB", "1/f noise at 1 % of the PRF over the thermal floor"),
+    "mains_db": Law("uniform", -25.0, 15.0, "dB", "mains lines together over noise"),
+    "tilt_db": Law("uniform", -25.0, 0.0, "dB", "receiver band edges under its middle"),
+    "full_scale_db": Law("uniform", -3.0, 20.0, "dB", "full scale over the largest sample; below 0 it clips"),
+    "adc_bits": Law("uniform", 6.0, 16.0, "bit", "converters"),
+    "image_db": Law("uniform", -50.0, -15.0, "dB", "I/Q imbalance image"),
+}
+
+
+class Draws:
+    """A cursor over the uniform numbers of a batch of records.
+
+    Parameters
+    ----------
+    uniforms : ndarray of float64, shape (records, WIDTH)
+        Uniform in [0, 1); row i belongs to record i alone.
+    """
+
+    def __init__(self, uniforms: NDArray[np.float64]) -> None:
+        self._u = uniforms
+        self._at = 0
+
+    def __len__(self) -> int:
+        return len(self._u)
+
+    @property
+    def taken(self) -> int:
+        """Numbers taken so far, a record."""
+        return self._at
+
+    def uniform(self, columns: int | None = None) -> NDArray[np.float64]:
+        """Take the next uniform numbers: shape (records,), or (records, columns)."""
+        width = 1 if columns is None else columns
+        if self._at + width > self._u.shape[1]:
+            raise RuntimeError(f"a target draws more than {self._u.shape[1]} numbers: widen laws.WIDTH")
+        taken = self._u[:, self._at : self._at + width]
+        self._at += width
+        return taken[:, 0] if columns is None else taken
+
+    def value(self, law: str, columns: int | None = None) -> NDArray[np.float64]:
+        """Draw by the law of that name: shape (records,), or (records, columns)."""
+        return LAWS[law](self.uniform(columns))
+
+    def chance(self, probability: float) -> NDArray[np.bool_]:
+        """Draw True with that probability: shape (records,)."""
+        return self.uniform() < probability
+
+    def sign(self, columns: int | None = None) -> NDArray[np.float64]:
+        """Draw -1 or +1: shape (records,), or (records, columns)."""
+        return np.where(self.uniform(columns) < 0.5, -1.0, 1.0)
+
+    def normal(self, columns: int | None = None) -> NDArray[np.float64]:
+        """Draw standard normal numbers by Box and Muller: shape (records,), or (records, columns)."""
+        radius, turn = self.uniform(columns), self.uniform(columns)
+        return np.sqrt(-2 * np.log1p(-radius)) * np.cos(2 * np.pi * turn)

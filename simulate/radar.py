@@ -1,0 +1,62 @@
+"""The radar as the slow-time sees it: carrier, pulse repetition and number of pulses."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Speed of light [m/s], exact. (The paper's tables used 3e8.)
+SPEED_OF_LIGHT_MPS = 299_792_458.0
+
+
+@dataclass(frozen=True)
+class Radar:
+    """A pulsed radar looking at one range cell, one complex sample a pulse.
+
+    Parameters
+    ----------
+    carrier_hz : float
+        Carrier frequency [Hz], > 0.
+    prf_hz : float
+        Pulse repetition frequency [Hz], > 0.
+    pulses : int
+        Pulses in one coherent processing interval, >= 1.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite or outside its range.
+    """
+
+    carrier_hz: float
+    prf_hz: float
+    pulses: int
+
+    def __post_init__(self) -> None:
+        for name in ("carrier_hz", "prf_hz"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
+        if int(self.pulses) != self.pulses or self.pulses < 1:
+            raise ValueError(f"pulses is {self.pulses!r}: it must be a whole number of at least 1")
+
+    @property
+    def wavelength_m(self) -> float:
+        """Wavelength [m]."""
+        return SPEED_OF_LIGHT_MPS / self.carrier_hz
+
+    @property
+    def dwell_s(self) -> float:
+        """Coherent processing interval [s], pulses / PRF."""
+        return self.pulses / self.prf_hz
+
+    @property
+    def unambiguous_mps(self) -> float:
+        """Largest radial speed without aliasing [m/s], one side: wavelength x PRF / 4."""
+        return self.wavelength_m * self.prf_hz / 4
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """Slow-time instants [s], shape (pulses,), from 0."""
+        return np.arange(self.pulses) / self.prf_hz

@@ -1,0 +1,165 @@
+"""The receiver: thermal noise, and the faults that real recordings have.
+
+Faults fall on every class alike, so that none of them gives a label away.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from .clutter import process_velocities, shaped_noise
+from .laws import Draws
+from .motion import TWO_PI
+from .radar import Radar
+from .target import Normals
+
+#: How often each fault is present.
+FAULT_CHANCE = {
+    "flicker": 0.25,
+    "phase_noise": 0.25,
+    "mains": 0.25,
+    "tilt": 0.2,
+    "image": 0.3,
+    "real_only": 0.03,
+    "analytic": 0.1,
+    "converter": 0.4,
+}
+
+
+class Receiver:
+    """One receiver a record, drawn before the target so that it is the same whatever the target is.
+
+    Parameters
+    ----------
+    draws : Draws
+        The records' uniform numbers.
+    """
+
+    def __init__(self, draws: Draws) -> None:
+        self.on = {name: draws.chance(chance) for name, chance in FAULT_CHANCE.items()}
+        self.flicker_db = draws.value("flicker_db")
+        self.phase_noise_rad = draws.value("phase_noise_rad")
+        self.mains_hz = np.where(draws.chance(0.5), 50.0, 60.0)
+        self.mains_db = draws.value("mains_db")
+        self.mains_slope = 1 + 2 * draws.uniform()
+        self.mains_phase = draws.value("phase_rad", 12)
+        self.tilt_db = draws.value("tilt_db")
+        self.image_db = draws.value("image_db")
+        self.conjugate = draws.chance(0.5)
+        self.full_scale_db = draws.value("full_scale_db")
+        self.bits = np.rint(draws.value("adc_bits"))
+        self.gain_db = draws.value("gain_db")
+
+    def receive(
+        self, signal: NDArray[np.complex64], noise: NDArray[np.complex64], radar: Radar, normals_of: "NormalsOf"
+    ) -> NDArray[np.complex64]:
+        """Pass the signals through their receivers.
+
+        Parameters
+        ----------
+        signal : ndarray of complex64, shape (records, pulses)
+            What reaches the antenna, in units in which the thermal noise has unit power.
+        noise : ndarray of complex64, shape (records, pulses)
+            Thermal noise of unit power.
+        radar : Radar
+            The radar that looks.
+        normals_of : callable
+            Gives the source of normal numbers of the rows asked for.
+
+        Returns
+        -------
+        ndarray of complex64, shape (records, pulses)
+        """
+        v = process_velocities(radar)
+        colour = 1 / np.maximum(np.abs(v), np.abs(v[1])) if len(v) > 1 else np.ones(1)
+        iq = signal
+        rows = np.flatnonzero(self.on["phase_noise"])
+        if len(rows):
+            # an oscillator's close-in noise falls as 1/f^2; small angles, so a real process of that spectrum will do
+            psd = np.broadcast_to(colour**2 * (v != 0), (len(rows), len(v)))
+            wander = shaped_noise(normals_of(rows), radar, psd, v).real * np.float32(np.sqrt(2))
+            angle = self.phase_noise_rad[rows].astype(np.float32)[:, None] * wander
+            iq[rows] *= np.cos(angle) + 1j * np.sin(angle)
+        iq = iq + noise
+        rows = np.flatnonzero(self.on["flicker"])
+        if len(rows):
+            psd = np.broadcast_to(colour, (len(rows), len(v)))
+            # the law sets the density at 1 % of the PRF; the process has unit power, so scale by the sum of the lines
+            corner = 0.02 * radar.unambiguous_mps
+            power = 10 ** (self.flicker_db[rows] / 10) * corner * colour.sum() / len(v)
+            iq[rows] += np.sqrt(power).astype(np.float32)[:, None] * shaped_noise(normals_of(rows), radar, psd, v)
+        rows = np.flatnonzero(self.on["mains"])
+        if len(rows):
+            iq[rows] += self._mains(radar, rows)
+        self._shape(iq, np.flatnonzero(self.on["tilt"]), radar)
+        rows = np.flatnonzero(self.on["image"])
+        iq[rows] += (10 ** (self.image_db[rows] / 20)).astype(np.float32)[:, None] * iq[rows].conj()
+        rows = np.flatnonzero(self.on["real_only"])
+        iq[rows] = iq[rows].real
+        self._one_sided(iq, np.flatnonzero(self.on["analytic"]))
+        self._convert(iq, np.flatnonzero(self.on["converter"]))
+        return iq * (10 ** (self.gain_db / 20)).astype(np.float32)[:, None]
+
+    def _mains(self, radar: Radar, rows: NDArray[np.intp]) -> NDArray[np.float32]:
+        """Harmonics of the mains, real and so on both sides of the spectrum alike."""
+        order = np.arange(1, self.mains_phase.shape[1] + 1)
+        amplitude = order ** -self.mains_slope[rows, None]
+        amplitude *= np.sqrt(2 * 10 ** (self.mains_db[rows, None] / 10) / (amplitude**2).sum(axis=1, keepdims=True))
+        out = np.zeros((len(rows), radar.pulses), np.float32)
+        for n in order:
+            turns = n * self.mains_hz[rows, None] * radar.times_s + self.mains_phase[rows, n - 1, None] / TWO_PI
+            tone = np.cos((TWO_PI * (turns - np.rint(turns))).astype(np.float32))
+            out += amplitude[:, n - 1, None].astype(np.float32) * tone
+        return out
+
+    def _shape(self, iq: NDArray[np.complex64], rows: NDArray[np.intp], radar: Radar) -> None:
+        """Let the receiver's band fall towards its edges."""
+        edge = np.abs(fft.fftfreq(radar.pulses)) * 2
+        for row in rows:
+            response = 10 ** (self.tilt_db[row] * edge**2 / 20)
+            iq[row] = fft.ifft(fft.fft(iq[row]) * response.astype(np.float32))
+
+    def _one_sided(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:
+        """A real recording made analytic afterwards: both sides fold onto one, the other is empty."""
+        pulses = iq.shape[-1]
+        keep = np.zeros(pulses, np.float32)
+        keep[1 : (pulses + 1) // 2] = 2
+        keep[0] = 1
+        if pulses % 2 == 0:
+            keep[pulses // 2] = 1
+        for row in rows:
+            folded = fft.ifft(fft.fft(iq[row].real.astype(np.complex64)) * keep)
+            iq[row] = folded.conj() if self.conjugate[row] else folded
+
+    def _convert(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:
+        """Clip and quantise as a converter does whose full scale was set for the record."""
+        for row in rows:
+            largest = max(np.abs(iq[row].real).max(), np.abs(iq[row].imag).max())
+            scale = np.float32(largest * 10 ** (self.full_scale_db[row] / 20))
+            step = scale / np.float32(2 ** (self.bits[row] - 1))
+            for part in (iq[row].real, iq[row].imag):
+                part[:] = np.rint(np.clip(part, -scale, scale) / step) * step
+
+
+class NormalsOf:
+    """Hands out normal numbers from each record's own generator.
+
+    Parameters
+    ----------
+    generators : list of numpy.random.Generator
+        One a record.
+    """
+
+    def __init__(self, generators: list[np.random.Generator]) -> None:
+        self._generators = generators
+
+    def __call__(self, rows: NDArray[np.intp]) -> Normals:
+        """Give the source for these rows: it returns shape (len(rows), count)."""
+
+        def normals(count: int) -> NDArray[np.float32]:
+            out = np.empty((len(rows), count), np.float32)
+            for line, row in zip(out, rows, strict=True):
+                self._generators[row].standard_normal(dtype=np.float32, out=line)
+            return out
+
+        return normals

@@ -1,0 +1,40 @@
+"""What every target hands to the receiver: its parts before their powers are set, and the truth about it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Draws that many standard normal numbers from each record's own generator: (count) -> (records, count) float32.
+Normals = Callable[[int], NDArray[np.float32]]
+
+
+@dataclass
+class Target:
+    """A batch of targets of one kind.
+
+    Parameters
+    ----------
+    micro : ndarray of complex64, shape (records, pulses)
+        The part whose power the SNR counts: blades, wings, limbs, or a clutter process as a whole.
+    body : ndarray of complex64 or None, shape (records, pulses)
+        The rest of the target, if it has one.
+    body_db : ndarray or None, shape (records,)
+        Power of the body over that of the micro-motion [dB].
+    snr_law : str
+        The law of the micro-motion's SNR.
+    truth : dict of str to ndarray, each of shape (records,)
+        What is true of each record; names carry their units.
+    """
+
+    micro: NDArray[np.complex64]
+    body: NDArray[np.complex64] | None = None
+    body_db: NDArray[np.float64] | None = None
+    snr_law: str = "snr_db"
+    truth: dict[str, NDArray] = field(default_factory=dict)
+
+
+def mean_power(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """Mean of |iq|^2 over the pulses, shape (records,)."""
+    return np.mean(iq.real**2 + iq.imag**2, axis=-1)

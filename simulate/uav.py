@@ -1,0 +1,137 @@
+"""Small UAVs: fixed wing, multirotors, and the helicopter with its geared tail rotor."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .laws import LAWS, Draws
+from .motion import TWO_PI, phasor, range_phasor, straight_path
+from .radar import Radar
+from .rotor import RotorMotion, rotor_echo
+from .target import Target
+
+#: Lifting rotors of each kind.
+ROTORS = {"fixed_wing": 1, "quadcopter": 4, "hexacopter": 6, "octocopter": 8, "helicopter": 1}
+
+#: Blades a rotor may have.
+BLADES = (2, 3, 4)
+
+
+def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
+    """Draw and render a batch of UAVs of one kind.
+
+    Parameters
+    ----------
+    draws : Draws
+        The records' uniform numbers.
+    radar : Radar
+        The radar that looks.
+    kind : {"fixed_wing", "quadcopter", "hexacopter", "octocopter", "helicopter"}
+        Airframe.
+
+    Returns
+    -------
+    Target
+        `micro` holds the blades of all rotors about the body, moved with the body.
+    """
+    rotors = ROTORS[kind]
+    beta = draws.value("uav_beta_rad")
+    velocity = np.where(draws.chance(0.3), 0.0, draws.value("uav_velocity_mps"))
+    acceleration = np.where(draws.chance(0.5), 0.0, draws.value("uav_acceleration_mps2"))
+    length = draws.value("main_length_m" if kind == "helicopter" else "blade_length_m")
+    rotation = draws.value("tip_mps") / (TWO_PI * length)
+    blades = np.where(draws.chance(0.65), 2, np.where(draws.chance(0.75), 3, 4))
+    amplitudes = _blade_amplitudes(draws)
+    root = length * draws.value("root_fraction")
+    asymmetry = draws.value("edge_asymmetry")
+
+    manoeuvre = draws.chance(0.3)
+    spread = np.where(manoeuvre, draws.value("manoeuvre_spread"), draws.value("hover_spread"))
+    offsets = draws.uniform(rotors) - 0.5 if rotors > 1 else np.zeros((len(draws), 1))
+    rates = rotation[:, None] * (1 + spread[:, None] * offsets)
+    level = np.exp(0.4 * draws.normal(rotors))
+    micro = np.zeros((len(draws), radar.pulses), np.complex64)
+    for r in range(rotors):
+        angle = _motion(draws, rates[:, r]).angle_rad(radar.times_s)
+        hub = (level[:, r] * np.exp(1j * draws.value("phase_rad"))).astype(np.complex64)
+        for count in BLADES:
+            rows = np.flatnonzero(blades == count)
+            if not len(rows):
+                continue
+            echo = rotor_echo(
+                angle[rows],
+                wavelength_m=radar.wavelength_m,
+                blade_length_m=length[rows],
+                beta_rad=beta[rows],
+                root_m=root[rows],
+                blade_amplitudes=amplitudes[rows, :count],
+                edge_asymmetry=asymmetry[rows],
+            )
+            micro[rows] += hub[rows, None] * echo
+    truth = {
+        "rotation_hz": rates.mean(axis=1),
+        "rotation_spread": np.ptp(rates, axis=1) / rates.mean(axis=1),
+        "blades": blades.astype(float),
+        "rotors": np.full(len(draws), float(rotors)),
+        "blade_length_m": length,
+        "beta_rad": beta,
+        "velocity_mps": velocity,
+        "acceleration_mps2": acceleration,
+        "tip_mps": TWO_PI * rates.max(axis=1) * length,
+        # one reflecting blade repeats once a turn, equal blades `blades` times
+        "chopping_hz": rates.mean(axis=1) * np.where((amplitudes[:, 1:] > 0).any(axis=1), blades, 1),
+    }
+    if kind == "helicopter":
+        tail, truth["tail_rotation_hz"] = _tail_rotor(draws, radar, length, rotation)
+        micro += tail
+
+    vibration = draws.value("vibration_rad")[:, None] * np.sin(
+        TWO_PI * rates[:, :1] * radar.times_s + draws.value("phase_rad")[:, None]
+    )
+    path = range_phasor(straight_path(radar.times_s, velocity, acceleration), radar.wavelength_m)
+    body = phasor(vibration + draws.value("phase_rad")[:, None]) * path
+    return Target(micro * path, body, draws.value("uav_body_db"), truth=truth)
+
+
+def _motion(draws: Draws, rate_hz: NDArray[np.float64]) -> RotorMotion:
+    """One rotor's sense, phase, drift and wander."""
+    return RotorMotion(
+        rotation_hz=rate_hz * draws.sign(),
+        phase_rad=draws.value("phase_rad"),
+        drift_hz_per_s=rate_hz * draws.value("drift_per_s") * draws.sign(),
+        wander_hz=rate_hz * draws.value("wander"),
+        wander_rate_hz=draws.value("wander_rate_hz"),
+        wander_phase_rad=draws.value("phase_rad"),
+    )
+
+
+def _blade_amplitudes(draws: Draws) -> NDArray[np.float64]:
+    """Amplitudes, shape (records, max(BLADES)): equal, unequal, or (seldom) one reflecting blade alone."""
+    inequality = np.where(draws.chance(0.5), 0.0, draws.value("blade_inequality"))
+    amplitudes = np.exp(inequality[:, None] * draws.normal(max(BLADES)))
+    amplitudes[draws.chance(0.06), 1:] = 0.0
+    return amplitudes
+
+
+def _tail_rotor(
+    draws: Draws,
+    radar: Radar,
+    main_length_m: NDArray[np.float64],
+    main_rotation_hz: NDArray[np.float64],
+) -> tuple[NDArray[np.complex64], NDArray[np.float64]]:
+    """A two-blade tail rotor, geared to the main one, in an upright plane: its aspect is another angle.
+
+    Tip speed is held below 200 m/s, as on real airframes.
+    """
+    length = main_length_m * draws.value("tail_ratio")
+    rate = np.minimum(main_rotation_hz * draws.value("gear_ratio"), 200.0 / (TWO_PI * length))
+    motion = _motion(draws, rate)
+    echo = rotor_echo(
+        motion.angle_rad(radar.times_s),
+        wavelength_m=radar.wavelength_m,
+        blade_length_m=length,
+        beta_rad=LAWS["uav_beta_rad"](draws.uniform()),
+        blade_amplitudes=(1.0, 1.0),
+        root_m=0.2 * length,
+    )
+    level = 0.4 * np.exp(0.5 * draws.normal() + 1j * draws.value("phase_rad"))
+    return level.astype(np.complex64)[:, None] * echo, rate
