@@ -1,1 +1,1 @@
-"""TODO."""
+"""The shipped models, one ONNX file each, as package data."""

@@ -1,0 +1,280 @@
+"""ONNX models that need nothing beside them: raw inputs in, raw scores and calibrated probabilities out.
+
+Every graph reads float32 inputs whose first axis is the batch, the only one that may vary, and gives "scores" and
+"probabilities", both (batch, 3). The calibration is three nodes at the end: Mul, Add, Softmax.
+"""
+
+import logging
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import numpy as np
+import onnx
+from numpy.typing import NDArray
+from onnx import TensorProto, helper, numpy_helper
+
+from ._checks import CLASS_COUNT
+from .calibration import Calibration
+from .seal import PLACEHOLDER, SEAL_KEY
+
+if TYPE_CHECKING:
+    from sklearn.ensemble import HistGradientBoostingClassifier
+    from sklearn.pipeline import Pipeline
+
+    from .cnn import EvidenceNet
+
+# Old enough for runtimes of 2024 (onnxruntime 1.18), new enough for every operator here.
+_OPSET = 18
+_ML_OPSET = 3
+_IR_VERSION = 10
+
+NETWORK_TOLERANCE = 1e-4
+"""Largest difference of a probability that an exported network may show."""
+TABULAR_TOLERANCE = 1e-5
+"""Largest difference of a probability that an exported tabular model may show."""
+
+_CHECK_BATCH = 1024
+
+
+def export_network(net: "EvidenceNet", input_shapes: Mapping[str, tuple[int, ...]], calibration: Calibration) -> bytes:
+    """Export a network.
+
+    Parameters
+    ----------
+    net
+        Trained, on the CPU; is left in the state for inference.
+    input_shapes
+        Input name to shape of one record; must be those that the network was made for.
+    calibration
+        How its scores become probabilities.
+
+    Returns
+    -------
+    bytes
+        The serialised ONNX model.
+
+    Raises
+    ------
+    ValueError
+        Where the shapes are not those of the network.
+    """
+    import torch
+
+    if dict(input_shapes) != net.input_shapes:
+        raise ValueError(f"input_shapes is {dict(input_shapes)}; the network was made for {net.input_shapes}")
+    batch = torch.export.Dim("batch")
+    example = tuple(torch.zeros(2, *shape) for shape in net.input_shapes.values())
+    with _quiet_exporter():
+        program = torch.onnx.export(
+            net.eval(),
+            example,
+            dynamo=True,
+            external_data=False,
+            verbose=False,
+            opset_version=_OPSET,
+            input_names=list(net.input_shapes),
+            output_names=["scores"],
+            dynamic_shapes=tuple({0: batch} for _ in example),
+        )
+    assert program is not None
+    return _finish(program.model_proto, net.input_shapes, calibration)
+
+
+def export_tabular(
+    model: "Pipeline | HistGradientBoostingClassifier", n_features: int, input_name: str, calibration: Calibration
+) -> bytes:
+    """Export logistic regression or boosted trees.
+
+    Parameters
+    ----------
+    model
+        From `tabular.train_linear` or `tabular.train_boosted`.
+    n_features
+        Number of measurements F.
+    input_name
+        Name of the graph's input, "features" or "joint_features".
+    calibration
+        How its scores become probabilities.
+
+    Returns
+    -------
+    bytes
+        The serialised ONNX model.
+
+    Raises
+    ------
+    ValueError
+        Where the model was fitted on another number of measurements.
+    """
+    from skl2onnx import convert_sklearn
+    from skl2onnx.common.data_types import FloatTensorType
+
+    if model.n_features_in_ != n_features:
+        raise ValueError(f"n_features is {n_features}; the model was fitted on {model.n_features_in_}")
+    last = model.steps[-1][1] if hasattr(model, "steps") else model
+    proto = convert_sklearn(
+        model,
+        initial_types=[(input_name, FloatTensorType([None, n_features]))],
+        options={id(last): {"zipmap": False, "raw_scores": True}},
+        target_opset={"": _OPSET, "ai.onnx.ml": _ML_OPSET},
+    )
+    _rename(proto.graph, proto.graph.output[1].name, "scores")
+    for node in proto.graph.node:
+        _drop_unused_tree_attributes(node)
+    return _finish(proto, {input_name: (n_features,)}, calibration)
+
+
+def attach_metadata(onnx_bytes: bytes, metadata: Mapping[str, str]) -> bytes:
+    """Write a model's metadata, with an empty place for the seal beside them; earlier metadata are replaced.
+
+    Parameters
+    ----------
+    onnx_bytes
+        A serialised ONNX model.
+    metadata
+        Keys and values, all strings.
+
+    Returns
+    -------
+    bytes
+        The model with its metadata, to be sealed by `seal.seal`.
+
+    Raises
+    ------
+    ValueError
+        Where a value is not a string.
+    """
+    for key, value in metadata.items():
+        if not isinstance(value, str):
+            raise ValueError(
+                f"metadata {key!r} is {type(value).__name__}; every value must be a string: use json.dumps"
+            )
+    model = onnx.load_model_from_string(onnx_bytes)
+    helper.set_model_props(model, {**metadata, SEAL_KEY: PLACEHOLDER})
+    return model.SerializeToString(deterministic=True)
+
+
+def check_export(
+    onnx_bytes: bytes,
+    reference_probabilities: NDArray[np.floating],
+    inputs: Mapping[str, NDArray[np.floating]],
+    tolerance: float = NETWORK_TOLERANCE,
+) -> float:
+    """Run an exported model and compare it with the one it came from.
+
+    Parameters
+    ----------
+    onnx_bytes
+        A serialised ONNX model.
+    reference_probabilities
+        Calibrated probabilities of the original model, shape (n, 3), n at least 1.
+    inputs
+        Input name to array (n, *shape).
+    tolerance
+        Largest difference that is accepted; `NETWORK_TOLERANCE` or `TABULAR_TOLERANCE`.
+
+    Returns
+    -------
+    float
+        Largest absolute difference of a probability, over the records in large batches and the first record alone.
+
+    Raises
+    ------
+    ValueError
+        Where the difference exceeds the tolerance, or is not a number.
+    """
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    session = onnxruntime.InferenceSession(onnx_bytes, options, providers=["CPUExecutionProvider"])
+    names = [node.name for node in session.get_inputs()]
+    count = len(reference_probabilities)
+    worst = 0.0
+    for start, stop in [(0, 1), *((start, start + _CHECK_BATCH) for start in range(0, count, _CHECK_BATCH))]:
+        feed = {name: np.asarray(inputs[name][start:stop], dtype=np.float32) for name in names}
+        found = session.run(["probabilities"], feed)[0]
+        worst = float(np.maximum(worst, np.abs(found - reference_probabilities[start:stop]).max()))  # keeps NaN
+    if not worst <= tolerance:
+        raise ValueError(
+            f"the exported model differs from the original by {worst:.2g} in probability; allowed {tolerance:.2g}"
+        )
+    return worst
+
+
+def _finish(model: onnx.ModelProto, input_shapes: Mapping[str, tuple[int, ...]], calibration: Calibration) -> bytes:
+    """Append the calibration, remove what inference does not need, check, serialise."""
+    graph = model.graph
+    _require_free_batch(graph, input_shapes)
+    graph.name = "bladewing"
+    graph.initializer.extend(
+        [
+            numpy_helper.from_array(np.float32(calibration.scale).reshape(1), "calibration_scale"),
+            numpy_helper.from_array(np.asarray(calibration.bias, dtype=np.float32), "calibration_bias"),
+        ]
+    )
+    graph.node.extend(
+        [
+            helper.make_node("Mul", ["scores", "calibration_scale"], ["scaled_scores"]),
+            helper.make_node("Add", ["scaled_scores", "calibration_bias"], ["calibrated_scores"]),
+            helper.make_node("Softmax", ["calibrated_scores"], ["probabilities"], axis=-1),
+        ]
+    )
+    del graph.input[:], graph.output[:], graph.value_info[:]
+    graph.input.extend(
+        helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *shape])
+        for name, shape in input_shapes.items()
+    )
+    graph.output.extend(
+        helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", CLASS_COUNT])
+        for name in ("scores", "probabilities")
+    )
+    # Converters leave call stacks with the paths of the machine they ran on.
+    for part in [model, graph, *graph.node, *graph.initializer]:
+        part.ClearField("doc_string")
+        part.ClearField("metadata_props")
+    model.producer_name, model.producer_version, model.domain = "bladewing", "", ""
+    model.ir_version = _IR_VERSION
+    onnx.checker.check_model(model, full_check=True)
+    return model.SerializeToString(deterministic=True)
+
+
+def _require_free_batch(graph: onnx.GraphProto, input_shapes: Mapping[str, tuple[int, ...]]) -> None:
+    """Refuse a graph whose inputs vary elsewhere than in the batch, or not there: converters err silently."""
+    found = {}
+    for node in graph.input:
+        dims = node.type.tensor_type.shape.dim
+        found[node.name] = tuple(dim.dim_value if dim.HasField("dim_value") else None for dim in dims)
+    expected = {name: (None, *shape) for name, shape in input_shapes.items()}
+    if found != expected:
+        raise ValueError(f"the converter gave the inputs {found}; they must be {expected}, only the batch free")
+
+
+@contextmanager
+def _quiet_exporter() -> Iterator[None]:
+    """Hold back what torch says about its own parts (no torchvision, deprecated calls) while it exports."""
+    logger = logging.getLogger("torch.onnx")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logger.setLevel(level)
+
+
+def _rename(graph: onnx.GraphProto, old: str, new: str) -> None:
+    """Rename one value wherever it is written or read."""
+    for node in graph.node:
+        for names in (node.input, node.output):
+            names[:] = [new if name == old else name for name in names]
+
+
+def _drop_unused_tree_attributes(node: onnx.NodeProto) -> None:
+    """Take out an eighth of a tree ensemble that runtimes ignore."""
+    kept = [attribute for attribute in node.attribute if attribute.name != "nodes_hitrates"]
+    del node.attribute[:]
+    node.attribute.extend(kept)

@@ -1,0 +1,203 @@
+"""The loop that trains a network: one seed, one schedule, the best state kept."""
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from ._checks import require_every_class, require_labels
+from .cnn import EvidenceNet
+
+Inputs = Mapping[str, NDArray[np.floating]]
+"""Input name to array (n, *shape); float16 saves memory, every batch is cast to float32."""
+
+Augment = Callable[[Mapping[str, Tensor], torch.Generator], Mapping[str, Tensor]]
+"""Takes a batch and a CPU generator, returns the batch to learn from; see `augment.VelocityMirror`."""
+
+OnEpoch = Callable[[int, int, dict[str, float]], None]
+"""Called with the epoch just done (from 1), the number of epochs, and the metrics of the epoch."""
+
+
+@dataclass(frozen=True)
+class TrainingResult:
+    """What a training did.
+
+    Parameters
+    ----------
+    best_epoch
+        Epoch whose state the network was left in, counted from 1.
+    device
+        "cpu" or "cuda".
+    seconds
+        Wall time [s].
+    epochs
+        One mapping an epoch: train_loss and validation_loss [nats], validation_accuracy (0 to 1), seconds (since the
+        start) [s].
+    """
+
+    best_epoch: int
+    device: str
+    seconds: float
+    epochs: tuple[dict[str, float], ...]
+
+
+def train_network(
+    net: EvidenceNet,
+    inputs: Inputs,
+    y: NDArray[np.integer],
+    validation: tuple[Inputs, NDArray[np.integer]],
+    *,
+    seed: int,
+    epochs: int,
+    batch: int = 256,
+    learning_rate: float = 4e-3,
+    weight_decay: float = 0.02,
+    label_smoothing: float = 0.02,
+    device: str = "auto",
+    augment: Augment | None = None,
+    on_epoch: OnEpoch | None = None,
+) -> TrainingResult:
+    """Train in place, and leave the network in its best state, on the CPU, ready for inference.
+
+    Measures the standardisation of the inputs, then runs AdamW on a one-cycle schedule. The best state is that of the
+    least validation loss. On a CPU the outcome is a function of the seed, bit by bit, for a given number of threads.
+
+    Parameters
+    ----------
+    net
+        The network; its present weights are where it starts.
+    inputs
+        Training inputs, name to array (n, *shape).
+    y
+        Training labels, shape (n,), whole numbers 0 to 2, at least two records of each.
+    validation
+        Inputs and labels of other records, which choose the best epoch.
+    seed
+        Draws the order of the records, the dropout and the augmentation.
+    epochs
+        Passes over the records, at least 1.
+    batch
+        Records a step, at least 2. The rest of an epoch that fills no batch is left out of it.
+    learning_rate
+        Peak of the schedule.
+    weight_decay
+        Of AdamW.
+    label_smoothing
+        Share of the target that is spread over the classes, 0 to below 1.
+    device
+        "auto" (a GPU where there is one), or any that torch knows: "cpu", "cuda", ...
+    augment
+        Changes each training batch.
+    on_epoch
+        Called after each epoch; what it raises ends the training.
+
+    Returns
+    -------
+    TrainingResult
+        The metrics of every epoch.
+
+    Raises
+    ------
+    ValueError
+        Where an array has the wrong shape or values, or a parameter is out of range.
+    FloatingPointError
+        Where no epoch gave a finite validation loss.
+    """
+    count = net.require(inputs)
+    require_labels(y, count, "y")
+    require_every_class(y, "y")
+    require_labels(validation[1], net.require(validation[0]), "validation labels")
+    if epochs < 1 or batch < 2:
+        raise ValueError(f"epochs is {epochs} and batch {batch}; they must be at least 1 and 2")
+    started = time.perf_counter()
+    place = torch.device(("cuda" if torch.cuda.is_available() else "cpu") if device == "auto" else device)
+    batch = min(batch, count)
+    steps = count // batch
+    net.measure(inputs)
+    net.to(place)
+    tensors = {name: _tensor(inputs[name]).to(place) for name in net.input_shapes}
+    truth = torch.as_tensor(y, dtype=torch.int64).to(place)
+    optimiser = torch.optim.AdamW(net.parameters(), lr=learning_rate, weight_decay=weight_decay)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, learning_rate, total_steps=epochs * steps, pct_start=0.2)
+    criterion = nn.CrossEntropyLoss(label_smoothing=label_smoothing)
+    rng = torch.Generator().manual_seed(seed)
+    best_loss, best_epoch, best_state = math.inf, 0, {}
+    history: list[dict[str, float]] = []
+    with torch.random.fork_rng(devices=[place] if place.type == "cuda" else []):
+        torch.manual_seed(seed)
+        for epoch in range(1, epochs + 1):
+            net.train()
+            total = torch.zeros((), device=place)
+            order = torch.randperm(count, generator=rng)[: steps * batch].to(place)
+            for rows in order.split(batch):
+                part: Mapping[str, Tensor] = {name: values[rows].float() for name, values in tensors.items()}
+                if augment:
+                    part = augment(part, rng)
+                loss = criterion(net(*(part[name] for name in net.input_shapes)), truth[rows])
+                optimiser.zero_grad(set_to_none=True)
+                loss.backward()
+                optimiser.step()
+                schedule.step()
+                total += loss.detach()
+            scores = torch.from_numpy(network_scores(net, validation[0]))
+            labels = torch.as_tensor(validation[1], dtype=torch.int64)
+            metrics = {
+                "train_loss": float(total) / steps,
+                "validation_loss": float(nn.functional.cross_entropy(scores, labels)),
+                "validation_accuracy": float((scores.argmax(1) == labels).float().mean()),
+                "seconds": time.perf_counter() - started,
+            }
+            history.append(metrics)
+            if metrics["validation_loss"] < best_loss:
+                best_loss, best_epoch = metrics["validation_loss"], epoch
+                best_state = {name: value.detach().cpu().clone() for name, value in net.state_dict().items()}
+            if on_epoch:
+                on_epoch(epoch, epochs, metrics)
+    if not best_state:
+        raise FloatingPointError(f"no epoch gave a finite validation loss; learning_rate {learning_rate} is too high")
+    net.to("cpu").load_state_dict(best_state)
+    net.eval()
+    return TrainingResult(best_epoch, place.type, time.perf_counter() - started, tuple(history))
+
+
+def network_scores(net: EvidenceNet, inputs: Inputs, batch: int = 1024) -> NDArray[np.float32]:
+    """Return the raw scores of a network, and leave it in the state for inference.
+
+    Parameters
+    ----------
+    net
+        The network, on any device.
+    inputs
+        Input name to array (n, *shape), finite.
+    batch
+        Records a call, at least 1.
+
+    Returns
+    -------
+    ndarray
+        Shape (n, 3), float32, in the order uav, bird, clutter.
+
+    Raises
+    ------
+    ValueError
+        Where an input is missing, has another shape, or holds NaN or infinity.
+    """
+    count = net.require(inputs)
+    place = next(net.parameters()).device
+    net.eval()
+    with torch.inference_mode():
+        parts = [
+            net(*(_tensor(inputs[name][start : start + batch]).to(place).float() for name in net.input_shapes)).cpu()
+            for start in range(0, count, batch)
+        ]
+    return torch.cat(parts).numpy()
+
+
+def _tensor(values: NDArray[np.floating]) -> Tensor:
+    """Share the memory of an array where torch can; copy where it is read-only or not contiguous."""
+    return torch.from_numpy(np.require(values, requirements=["C", "W"]))
