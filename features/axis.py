@@ -1,0 +1,109 @@
+"""The velocity axis that all radars share: fine where birds and bodies are, coarse where blade tips are."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from .spectrum import LOWEST_DB, NOISE_BANDWIDTH_BINS, SPEED_OF_LIGHT_MPS, to_db
+
+#: Velocity below which bins are of about equal width [m/s]; above it their width grows with the velocity.
+KNEE_MPS = 4.0
+
+#: Outer edge of the axis [m/s], beyond the fastest tips (below Mach 0.6).
+LIMIT_MPS = 200.0
+
+#: Level of a bin outside the radar's unambiguous span [dB]: lower than any noise, so "not seen" differs from "empty".
+UNSEEN_DB = LOWEST_DB / 2
+
+
+def axis_edges_mps(bins: int) -> NDArray[np.float64]:
+    """Edges of the shared axis [m/s], rising, shape (bins + 1,): equal steps of asinh(v / KNEE_MPS)."""
+    limit = np.arcsinh(LIMIT_MPS / KNEE_MPS)
+    return KNEE_MPS * np.sinh(np.linspace(-limit, limit, bins + 1))
+
+
+def axis_velocities_mps(bins: int) -> NDArray[np.float64]:
+    """Centres of the shared axis [m/s], rising, shape (bins,)."""
+    edges = axis_edges_mps(bins)
+    return (edges[1:] + edges[:-1]) / 2
+
+
+@dataclass(frozen=True)
+class Pooling:
+    """How one radar's bins fall onto the shared axis.
+
+    Parameters
+    ----------
+    starts : ndarray of int, shape (seen,)
+        First spectrum bin of each axis bin that the radar sees, in rising frequency.
+    stop : int
+        End of the last axis bin in the spectrum.
+    counts : ndarray of float32, shape (seen,)
+        Spectrum bins in each, at least 1: where the axis is finer than the spectrum the nearest bin is repeated.
+    seen : slice
+        The axis bins (rising velocity) within the unambiguous span.
+    bins : int
+        Length of the axis.
+    """
+
+    starts: NDArray[np.intp]
+    stop: int
+    counts: NDArray[np.float32]
+    seen: slice
+    bins: int
+
+    def mean_db(self, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Mean level of each axis bin [dB], shape (..., bins)."""
+        total = np.add.reduceat(relative_power[..., : self.stop], self.starts, axis=-1)
+        return self._place(to_db(total / self.counts))
+
+    def peak_db(self, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Largest level of each axis bin over that of noise in as many bins [dB], shape (..., bins)."""
+        independent = np.maximum(self.counts / np.float32(NOISE_BANDWIDTH_BINS), 1)
+        expected = np.log(independent) + np.float32(np.euler_gamma)  # of the largest of so many exponentials
+        peak = np.maximum.reduceat(relative_power[..., : self.stop], self.starts, axis=-1)
+        return self._place(to_db(peak / np.maximum(expected, 1).astype(np.float32)))
+
+    def _place(self, levels_db: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Lay the seen bins into the whole axis; frequency rises where velocity falls."""
+        out = np.full((*levels_db.shape[:-1], self.bins), UNSEEN_DB, np.float32)
+        out[..., self.seen] = levels_db[..., ::-1]
+        return out
+
+
+@lru_cache(maxsize=64)
+def pooling(spectrum_bins: int, carrier_hz: float, prf_hz: float, bins: int) -> Pooling:
+    """Pooling of a centred spectrum onto the shared axis.
+
+    Parameters
+    ----------
+    spectrum_bins : int
+        Length of the spectrum.
+    carrier_hz, prf_hz : float
+        Carrier and pulse repetition frequency [Hz].
+    bins : int
+        Length of the shared axis, even.
+
+    Returns
+    -------
+    Pooling
+    """
+    wavelength = SPEED_OF_LIGHT_MPS / carrier_hz
+    frequency = fft.fftshift(fft.fftfreq(spectrum_bins, 1 / prf_hz))
+    step = prf_hz / spectrum_bins
+    edges = -axis_edges_mps(bins)[::-1] * 2 / wavelength  # Doppler [Hz], rising
+    low, high = edges[:-1], edges[1:]
+    centre = (low + high) / 2
+    inside = np.flatnonzero(np.abs(centre) <= prf_hz / 2)  # never empty: the innermost bins hold frequency 0
+    first = np.searchsorted(frequency, low[inside] - step / 2)
+    stop = np.searchsorted(frequency, high[inside] - step / 2)
+    nearest = np.clip(np.rint((centre[inside] - frequency[0]) / step).astype(np.intp), 0, spectrum_bins - 1)
+    starts = np.minimum(np.where(stop > first, first, nearest), spectrum_bins - 1)
+    starts = np.maximum.accumulate(starts)
+    end = max(int(stop[-1]), int(starts[-1]) + 1)
+    counts = np.maximum(np.diff(starts, append=end), 1).astype(np.float32)
+    seen = slice(bins - 1 - int(inside[-1]), bins - int(inside[0]))
+    return Pooling(starts, end, counts, seen, bins)

@@ -1,0 +1,63 @@
+"""From slow-time samples to the named inputs that models take: only what is asked for is computed."""
+
+from collections.abc import Collection
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .axis import pooling
+from .change import change_db, parts_of
+from .joint import joint_vector, stft_image
+from .schema import AXIS_BINS, INPUT_SHAPES
+from .spectrum import doppler_spectrum
+from .vector import feature_vector
+
+
+def model_inputs(
+    iq: ArrayLike, *, carrier_hz: float, prf_hz: float, names: Collection[str] = ("features", "spectrum")
+) -> dict[str, NDArray[np.float32]]:
+    """Compute named model inputs from slow-time samples.
+
+    Parameters
+    ----------
+    iq : array_like of complex, shape (..., pulses)
+        Slow-time samples of one range cell, any gain.
+    carrier_hz, prf_hz : float
+        Carrier and pulse repetition frequency [Hz].
+    names : collection of str
+        Which of `INPUT_SHAPES`: "features", "spectrum" (one FFT of the dwell and one of its parts), "joint_features",
+        "image" (an STFT).
+
+    Returns
+    -------
+    dict of str to ndarray of float32
+        Each of shape (..., *INPUT_SHAPES[name]), finite.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown, or the samples cannot make a spectrum.
+    """
+    unknown = set(names) - set(INPUT_SHAPES)
+    if unknown:
+        raise ValueError(f"model input {sorted(unknown)[0]!r} is unknown: it must be one of {', '.join(INPUT_SHAPES)}")
+    samples = np.asarray(iq, np.complex64)
+    spectrum = doppler_spectrum(samples, carrier_hz=carrier_hz, prf_hz=prf_hz)
+    out: dict[str, NDArray[np.float32]] = {}
+    if "spectrum" in names or "features" in names:
+        pool = pooling(spectrum.bins, spectrum.carrier_hz, spectrum.prf_hz, AXIS_BINS)
+        mean = pool.mean_db(spectrum.relative_power)
+        parts = parts_of(samples, spectrum, AXIS_BINS)
+        change = change_db(parts)
+        if "spectrum" in names:
+            peak = pool.peak_db(spectrum.relative_power)
+            out["spectrum"] = np.stack([mean, peak, change], axis=-2)
+        if "features" in names:
+            out["features"] = feature_vector(spectrum, mean, parts, change)
+    if "image" in names or "joint_features" in names:
+        image = stft_image(samples, spectrum)
+        if "image" in names:
+            out["image"] = image[..., None, :, :]
+        if "joint_features" in names:
+            out["joint_features"] = joint_vector(image, spectrum)
+    return out

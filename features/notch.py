@@ -1,0 +1,115 @@
+"""The body line, and what is left outside a notch about it and about velocity zero."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .spectrum import Spectrum
+
+#: Half width of the notch [m/s]. Set in velocity, not in Hz: a wingbeat of 18 Hz is not a Doppler of 18 Hz, and a
+#: bird's body with its heave stays within this of its mean at every carrier.
+NOTCH_MPS = 3.0
+
+#: The notch is never narrower than the window's main lobe, this many bins to each side.
+LOBE_BINS = 5
+
+
+@dataclass(frozen=True)
+class Body:
+    """The strongest line of each spectrum.
+
+    Parameters
+    ----------
+    index : ndarray of int, shape (...)
+        Bin of the strongest line.
+    velocity_mps : ndarray of float32, shape (...)
+        Its radial velocity [m/s], refined below the bin.
+    level_db : ndarray of float32, shape (...)
+        Its level over the noise floor [dB].
+    """
+
+    index: NDArray[np.intp]
+    velocity_mps: NDArray[np.float32]
+    level_db: NDArray[np.float32]
+
+
+def body_line(spectrum: Spectrum) -> Body:
+    """Find the strongest line of each spectrum, refined by a parabola through three levels in dB.
+
+    The window's main lobe is close to a Gaussian, of which the logarithm is a parabola: the error stays below 1 % of a
+    bin.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Spectra, shape (..., bins).
+
+    Returns
+    -------
+    Body
+    """
+    level = spectrum.level_db
+    index = spectrum.relative_power.argmax(axis=-1)
+    bins = spectrum.bins
+    left, middle, right = (
+        np.take_along_axis(level, ((index + shift) % bins)[..., None], axis=-1)[..., 0] for shift in (-1, 0, 1)
+    )
+    curve = 2 * middle - left - right
+    offset = np.where(curve > 0, (right - left) / np.where(curve > 0, 2 * curve, 1), 0)
+    step = spectrum.prf_hz / bins * spectrum.wavelength_m / 2
+    velocity = spectrum.velocity_mps[index] - np.clip(offset, -0.5, 0.5) * step
+    return Body(index, velocity.astype(np.float32), middle)
+
+
+def notch_mask(spectrum: Spectrum, body: Body, notch_mps: float = NOTCH_MPS) -> NDArray[np.bool_]:
+    """True outside the notches about the body line and about velocity zero, shape (..., bins).
+
+    Distances are taken around the circle of the unambiguous velocities.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Spectra, shape (..., bins).
+    body : Body
+        Their strongest lines.
+    notch_mps : float
+        Half width [m/s], > 0.
+
+    Returns
+    -------
+    ndarray of bool, shape (..., bins)
+    """
+    bins = spectrum.bins
+    step = spectrum.prf_hz / bins * spectrum.wavelength_m / 2
+    # At least the main lobe, at most a third of the span: a slow radar must keep something to look at.
+    half = min(max(LOBE_BINS, int(np.ceil(notch_mps / step))), max(1, bins // 6))
+    position = np.arange(bins)
+    keep = np.abs(position - bins // 2) > half
+    away = np.abs(position - body.index[..., None])
+    return keep & (np.minimum(away, bins - away) > half)
+
+
+def residual(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Power over the floor outside the notches, in units of the floor, shape (..., bins); 0 inside and below noise."""
+    return np.where(mask, np.maximum(spectrum.relative_power - np.float32(1), 0), np.float32(0))
+
+
+def notch_residual_db(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Notch-residual energy: mean power outside the notches over the noise floor [dB].
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Spectra, shape (..., bins).
+    mask : ndarray of bool, shape (..., bins)
+        From `notch_mask`.
+
+    Returns
+    -------
+    ndarray of float32, shape (...)
+        0 dB for noise alone; micro-Doppler lifts it.
+    """
+    kept = np.maximum(mask.sum(axis=-1), 1)
+    mean = np.where(mask, spectrum.relative_power, np.float32(0)).sum(axis=-1) / kept
+    return (10 * np.log10(np.maximum(mean, 1e-2))).astype(np.float32)
