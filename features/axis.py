@@ -58,14 +58,15 @@ class Pooling:
     def mean_db(self, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
         """Mean level of each axis bin [dB], shape (..., bins)."""
         total = np.add.reduceat(relative_power[..., : self.stop], self.starts, axis=-1)
-        return self._place(to_db(total / self.counts))
+        return self._place(to_db((total / self.counts).astype(np.float32, copy=False)))
 
     def peak_db(self, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
         """Largest level of each axis bin over that of noise in as many bins [dB], shape (..., bins)."""
         independent = np.maximum(self.counts / np.float32(NOISE_BANDWIDTH_BINS), 1)
-        expected = np.log(independent) + np.float32(np.euler_gamma)  # of the largest of so many exponentials
+        # of the largest of so many exponentials
+        expected = np.maximum(np.log(independent) + np.euler_gamma, 1).astype(np.float32)
         peak = np.maximum.reduceat(relative_power[..., : self.stop], self.starts, axis=-1)
-        return self._place(to_db(peak / np.maximum(expected, 1).astype(np.float32)))
+        return self._place(to_db((peak / expected).astype(np.float32, copy=False)))
 
     def _place(self, levels_db: NDArray[np.float32]) -> NDArray[np.float32]:
         """Lay the seen bins into the whole axis; frequency rises where velocity falls."""

@@ -12,6 +12,9 @@ from .schema import AXIS_BINS, INPUT_SHAPES
 from .spectrum import doppler_spectrum
 from .vector import feature_vector
 
+#: Fewest pulses that leave anything to measure outside the notches.
+MIN_PULSES = 16
+
 
 def model_inputs(
     iq: ArrayLike, *, carrier_hz: float, prf_hz: float, names: Collection[str] = ("features", "spectrum")
@@ -36,12 +39,14 @@ def model_inputs(
     Raises
     ------
     ValueError
-        If a name is unknown, or the samples cannot make a spectrum.
+        If a name is unknown, there are fewer than `MIN_PULSES` pulses, or a frequency is not positive.
     """
     unknown = set(names) - set(INPUT_SHAPES)
     if unknown:
         raise ValueError(f"model input {sorted(unknown)[0]!r} is unknown: it must be one of {', '.join(INPUT_SHAPES)}")
     samples = np.asarray(iq, np.complex64)
+    if samples.ndim < 1 or samples.shape[-1] < MIN_PULSES:
+        raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least {MIN_PULSES} pulses")
     spectrum = doppler_spectrum(samples, carrier_hz=carrier_hz, prf_hz=prf_hz)
     out: dict[str, NDArray[np.float32]] = {}
     if "spectrum" in names or "features" in names:
