@@ -1,0 +1,141 @@
+"""IQ from .npy, .npz and .mat files. Nothing is ever unpickled."""
+
+import lzma
+import warnings
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import BadInput
+
+ARRAY_SUFFIXES = (".npy", ".npz", ".mat")
+
+# What zipfile raises for damaged, encrypted or unknown contents.
+_ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, NotImplementedError, RuntimeError, ValueError)
+
+
+class _PickledError(BadInput):
+    """An array of Python objects."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(
+            f"{name}: an array of Python objects, which is never unpickled here: store complex samples (complex64)"
+        )
+
+
+def read_array(path: Path, variable: str | None = None) -> NDArray[np.generic]:
+    """Read the array of samples out of a file.
+
+    Parameters
+    ----------
+    path
+        An existing .npy, .npz or .mat file.
+    variable
+        Which array of an .npz or .mat file.
+
+    Returns
+    -------
+    numpy.ndarray
+        Whatever shape and type it has; `bladewing.classify.recording` judges that.
+
+    Raises
+    ------
+    BadInput
+        The file is damaged or cut short, or does not say which array is meant.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".npy" and variable is not None:
+        raise BadInput(f"{path}: variable {variable!r} given, but a .npy file holds one array: leave it out")
+    try:
+        if path.stat().st_size == 0:
+            raise BadInput(f"{path}: the file is empty (0 bytes): copy or record it again")
+        if suffix == ".npy":
+            with open(path, "rb") as file:
+                return _parse_npy(file, str(path))
+        arrays = _read_npz(path, variable) if suffix == ".npz" else _read_mat(path, variable)
+    except OSError as error:
+        if error.errno is None:  # not the system's: the readers' word for a file that ends too early
+            raise BadInput(_damaged(path, error)) from None
+        raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
+    return _choose(arrays, variable, path)
+
+
+def _parse_npy(file: IO[bytes], name: str) -> NDArray[np.generic]:
+    try:
+        return np.lib.format.read_array(file, allow_pickle=False)
+    except (ValueError, EOFError, MemoryError, OverflowError, TypeError) as error:
+        if "Object arrays" in str(error):
+            raise _PickledError(name) from None
+        raise BadInput(_damaged(name, error)) from None
+
+
+def _read_npz(path: Path, variable: str | None) -> dict[str, NDArray[np.generic]]:
+    arrays: dict[str, NDArray[np.generic]] = {}
+    pickled: dict[str, _PickledError] = {}
+    try:
+        with zipfile.ZipFile(path) as archive:
+            for member in archive.namelist():
+                name = member.removesuffix(".npy")
+                with archive.open(member) as file:
+                    try:
+                        arrays[name] = _parse_npy(file, f"{path}: {member}")
+                    except _PickledError as error:
+                        pickled[name] = error
+    except BadInput:
+        raise
+    except _ZIP_ERRORS as error:
+        raise BadInput(_damaged(path, error)) from None
+    if variable in pickled:
+        raise pickled[variable]
+    if pickled and not any(array.dtype.kind == "c" for array in arrays.values()):
+        raise next(iter(pickled.values()))
+    return arrays
+
+
+def _read_mat(path: Path, variable: str | None) -> dict[str, NDArray[np.generic]]:
+    import scipy.io
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about variables that are of no concern here
+            kinds = {name: kind for name, _, kind in scipy.io.whosmat(path, appendmat=False)}
+            numeric = [name for name, kind in kinds.items() if kind.startswith(("double", "single", "int", "uint"))]
+            if variable in kinds and variable not in numeric:
+                raise BadInput(f"{path}: variable {variable!r} is a {kinds[variable]}: store complex numbers")
+            read = scipy.io.loadmat(path, appendmat=False, variable_names=numeric) if numeric else {}
+            return {name: read[name] for name in numeric}
+    except (BadInput, OSError):
+        raise
+    except NotImplementedError:
+        raise BadInput(f"{path}: a MATLAB 7.3 file (HDF5): save it with version 7: save(name, 'iq', '-v7')") from None
+    except Exception as error:  # a damaged file makes scipy raise nearly anything
+        raise BadInput(_damaged(path, error)) from None
+
+
+def _choose(arrays: Mapping[str, NDArray[np.generic]], variable: str | None, path: Path) -> NDArray[np.generic]:
+    """The array that was named, or the only one that can be meant."""
+    if variable is not None:
+        if variable not in arrays:
+            raise BadInput(f"{path}: no variable {variable!r}: it holds {_listed(arrays)}")
+        return arrays[variable]
+    candidates = [name for name, array in arrays.items() if array.dtype.kind == "c"]
+    if len(candidates) == 1:
+        return arrays[candidates[0]]
+    if candidates:
+        raise BadInput(f"{path}: {len(candidates)} complex arrays, {_listed(arrays)}: say which with --variable NAME")
+    raise BadInput(f"{path}: no complex array, it holds {_listed(arrays)}: IQ must be complex, I + jQ (complex64)")
+
+
+def _listed(arrays: Mapping[str, NDArray[np.generic]]) -> str:
+    parts = [f"{name} {array.dtype} {array.shape}" for name, array in sorted(arrays.items())]
+    return ", ".join(parts) or "no array of numbers"
+
+
+def _damaged(name: object, error: BaseException) -> str:
+    first_line = (str(error).splitlines() or [type(error).__name__])[0]
+    return f"{name}: damaged or cut short ({first_line}): copy or save it again"

@@ -1,0 +1,186 @@
+"""The command line. Exit codes: 0 done, 1 unexpected, 2 bad input, 130 interrupted; errors are one line on stderr."""
+
+import json
+import os
+import sys
+import warnings
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, cast
+
+import typer
+
+from .errors import BadInput, one_line
+
+app = typer.Typer(
+    name="bladewing",
+    help="Tell UAV, bird and clutter apart from a radar's slow-time returns.",
+    add_completion=False,
+    rich_markup_mode=None,  # else the units in [brackets] are taken for markup
+)
+
+# The parent of all usage errors has no public name that old and new versions of typer share.
+_UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])
+
+_TRAIN_EXTRA = {"torch", "sklearn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2"}
+_TRACEBACK = "BLADEWING_TRACEBACK"
+
+
+@app.command()
+def predict(
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RECORDING",
+            help="SigMF (.sigmf-meta, .sigmf-data, their stem, or an archive .sigmf), .npy, .npz or .mat.",
+            show_default=False,
+        ),
+    ],
+    model: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|FILE", help="A shipped model or an .onnx file.", show_default="spectrum-cnn"),
+    ] = None,
+    dwell: Annotated[float, typer.Option(metavar="SECONDS", help="Length of a dwell [s].")] = 0.08,
+    carrier_hz: Annotated[
+        float | None, typer.Option(metavar="F", help="Carrier [Hz], where the file does not say.")
+    ] = None,
+    prf_hz: Annotated[float | None, typer.Option(metavar="F", help="PRF [Hz], where the file does not say.")] = None,
+    variable: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Which array of an .npz or .mat file, if it holds several.")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="One JSON object a line: one a dwell, a closing one a recording.")
+    ] = False,
+) -> None:
+    """Say of each dwell of each recording: uav, bird, clutter or unknown, with probabilities and the reason."""
+    from rich.console import Console
+
+    from . import predict as work
+    from .inference import Classifier
+
+    dwell_s = work.checked_dwell_s(dwell)
+    classifier = Classifier.load(model)
+    said: Counter[str] = Counter()
+    unreadable = 0
+    for result in work.answers(
+        recordings, classifier, dwell_s=dwell_s, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable
+    ):
+        if isinstance(result, BadInput):
+            unreadable += 1
+            _complain(str(result))
+            continue
+        said[result.track.label] += 1
+        if as_json:
+            for line in result.json_objects():
+                print(json.dumps(line, allow_nan=False))
+        else:
+            result.print(Console(highlight=False))
+        sys.stdout.flush()
+    if not as_json and said.total() + unreadable > 1:
+        print(work.summary(said, unreadable))
+    if unreadable:
+        raise typer.Exit(2)
+
+
+@app.command()
+def train(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the models and train.json go.")] = Path("out"),
+    config: Annotated[
+        Path | None, typer.Option(metavar="FILE.toml", help="Settings; the options given here come first.")
+    ] = None,
+    records: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Synthetic records to train on.", show_default=False)
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="S", min=0, help="Root of all randomness.")] = 0,
+    quick: Annotated[bool, typer.Option("--quick", help="Few records and epochs: a try, not a model to use.")] = False,
+) -> None:
+    """Train all models on synthetic records and write them as ONNX."""
+    from .train import run_training
+
+    run_training(out, records=records, seed=seed, quick=quick, config=config, progress=True)
+
+
+@app.command()
+def report(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where report.html and report.json go.")] = Path("out"),
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer records and shorter timings.")] = False,
+    models: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of .onnx files.", show_default="the shipped models")
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="S", min=0, help="Root seed of the test records.")] = 0,
+) -> None:
+    """Measure models on fresh synthetic records: what each choice of input and model costs and gives."""
+    from .report import run_report
+
+    run_report(out, models=models, quick=quick, seed=seed, progress=True)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments
+        Without the program's name; by default those of the process.
+
+    Returns
+    -------
+    int
+        0 done, 1 unexpected, 2 bad input, 130 interrupted.
+    """
+    if arguments is None and not sys.warnoptions:
+        warnings.simplefilter("ignore")  # a library's warning is for developers, unless one asks for it with -W
+    try:
+        code = _run(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:  # such as `bladewing predict ... | head`: no more is wanted
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    return code
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    try:
+        code = typer.main.get_command(app).main(arguments, prog_name="bladewing", standalone_mode=False)
+        if code == 130:
+            _complain("interrupted", kind="stopped")
+        return code if isinstance(code, int) else 0
+    except BrokenPipeError:
+        raise
+    except (KeyboardInterrupt, typer.Abort):
+        _complain("interrupted", kind="stopped")
+        return 130
+    except BadInput as error:
+        _complain(str(error))
+        return 2
+    except _UsageError as error:
+        return _usage(error)
+    except ModuleNotFoundError as error:
+        if error.name not in _TRAIN_EXTRA:
+            return _unexpected(error)
+        _complain(f"{error.name} is not installed, this command needs it: pip install 'bladewing[train]'")
+        return 2
+    except Exception as error:
+        return _unexpected(error)
+
+
+def _usage(error: Exception) -> int:
+    message = getattr(error, "format_message", lambda: str(error))()
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context is not None else "bladewing"
+    _complain(f"{' '.join(message.split())} (see {command} --help)")
+    return 2
+
+
+def _unexpected(error: Exception) -> int:
+    if os.environ.get(_TRACEBACK):
+        import traceback
+
+        traceback.print_exc()
+    _complain(f"unexpected {type(error).__name__}: {error} (set {_TRACEBACK}=1 to see where)")
+    return 1
+
+
+def _complain(message: str, kind: str = "error") -> None:
+    print(f"bladewing: {kind}: {one_line(message)}", file=sys.stderr, flush=True)

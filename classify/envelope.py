@@ -1,0 +1,137 @@
+"""The radars a model answers for, and what to do where one lies outside."""
+
+import json
+import math
+from dataclasses import asdict, dataclass, fields
+
+from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
+
+from .samples import positive
+
+_ROUNDING = 1e-9  # relative: 0.005 s x 25 kHz must be 125 pulses, whatever the last bit says
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """The limits within which a model was trained; all of them count as inside.
+
+    Attributes
+    ----------
+    carrier_min_hz, carrier_max_hz
+        Carrier [Hz].
+    prf_min_hz, prf_max_hz
+        Pulse repetition frequency [Hz].
+    pulses_min, pulses_max
+        Number of pulses of a dwell.
+    dwell_min_s
+        Shortest dwell, pulses / PRF [s].
+    unambiguous_min_mps
+        Smallest unambiguous velocity to one side, wavelength x PRF / 4 [m/s].
+    """
+
+    carrier_min_hz: float = 2e9
+    carrier_max_hz: float = 100e9
+    prf_min_hz: float = 1e3
+    prf_max_hz: float = 100e3
+    pulses_min: int = 64
+    pulses_max: int = 65536
+    dwell_min_s: float = 5e-3
+    unambiguous_min_mps: float = 10.0
+
+    def to_json(self) -> str:
+        """Give the limits as they stand in a model's metadata (a JSON object of the attributes)."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> "Envelope":
+        """Read the limits from a model's metadata.
+
+        Parameters
+        ----------
+        text
+            JSON object with exactly the attributes of this class.
+
+        Raises
+        ------
+        ValueError
+            A limit is missing, unknown, or not a number above 0.
+        """
+        limits = json.loads(text)
+        names = {field.name for field in fields(cls)}
+        if not isinstance(limits, dict) or set(limits) != names:
+            raise ValueError(f"the envelope must hold {', '.join(sorted(names))}, it is {text}")
+        checked = {name: positive(value, name) for name, value in limits.items()}
+        pulses_min, pulses_max = int(checked.pop("pulses_min")), int(checked.pop("pulses_max"))
+        return cls(**checked, pulses_min=pulses_min, pulses_max=pulses_max)
+
+    def reason(self, carrier_hz: float, prf_hz: float, pulses: int) -> str | None:
+        """Say why a dwell of a radar lies outside, or None where it lies inside.
+
+        Parameters
+        ----------
+        carrier_hz, prf_hz
+            Carrier and pulse repetition frequency [Hz], above 0.
+        pulses
+            Number of pulses of the dwell.
+
+        Returns
+        -------
+        str or None
+            The first rule that is broken: the value, the rule and the cure.
+        """
+        return self._radar_reason(carrier_hz, prf_hz) or self._dwell_reason(prf_hz, pulses)
+
+    def _radar_reason(self, carrier_hz: float, prf_hz: float) -> str | None:
+        wavelength_m = SPEED_OF_LIGHT_MPS / carrier_hz
+        unambiguous_mps = wavelength_m * prf_hz / 4
+        prf_needed_hz = math.ceil(max(self.prf_min_hz, self._prf_for_velocity_hz(carrier_hz)) * (1 - _ROUNDING))
+        if not self.carrier_min_hz <= carrier_hz <= self.carrier_max_hz:
+            return (
+                f"carrier {carrier_hz / 1e9:g} GHz is outside {self.carrier_min_hz / 1e9:g} to "
+                f"{self.carrier_max_hz / 1e9:g} GHz, the bands this model was trained for: use or train another model"
+            )
+        if prf_hz < self.prf_min_hz:
+            return f"PRF {prf_hz:g} Hz is below {self.prf_min_hz:g} Hz: raise the PRF to {prf_needed_hz} Hz or more"
+        if prf_hz > self.prf_max_hz:
+            step = math.ceil(prf_hz / self.prf_max_hz)
+            return (
+                f"PRF {prf_hz:g} Hz is above {self.prf_max_hz:g} Hz: sum every {step} pulses into one, "
+                f"for a PRF of {prf_hz / step:g} Hz (PRF / {step})"
+            )
+        if unambiguous_mps < self.unambiguous_min_mps * (1 - _ROUNDING):
+            return (
+                f"unambiguous velocity {_under(unambiguous_mps, self.unambiguous_min_mps)} m/s is below "
+                f"{self.unambiguous_min_mps:g} m/s (wavelength x PRF / 4): raise the PRF to {prf_needed_hz} Hz or more"
+            )
+        return None
+
+    def _dwell_reason(self, prf_hz: float, pulses: int) -> str | None:
+        dwell_s = pulses / prf_hz
+        pulses_needed = max(self.pulses_min, math.ceil(self.dwell_min_s * prf_hz * (1 - _ROUNDING)))
+        cure = f"take {pulses_needed} pulses, {_up(pulses_needed / prf_hz)} s, or more (dwell = pulses / PRF)"
+        if pulses < self.pulses_min:
+            return f"{pulses} pulses are fewer than {self.pulses_min}: {cure}"
+        if pulses > self.pulses_max:
+            longest_s = self.pulses_max / prf_hz
+            return (
+                f"{pulses} pulses are more than {self.pulses_max}: "
+                f"take dwells of {longest_s:.4g} s or less (dwell = pulses / PRF)"
+            )
+        if dwell_s < self.dwell_min_s * (1 - _ROUNDING):
+            shortest_ms = self.dwell_min_s * 1e3
+            return f"dwell {_under(dwell_s * 1e3, shortest_ms)} ms is below {shortest_ms:g} ms: {cure}"
+        return None
+
+    def _prf_for_velocity_hz(self, carrier_hz: float) -> float:
+        return 4 * self.unambiguous_min_mps * carrier_hz / SPEED_OF_LIGHT_MPS
+
+
+def _under(value: float, limit: float) -> str:
+    """Write a value with one decimal, or with as many as show that it is under the limit."""
+    return next((text for d in range(1, 7) if float(text := f"{value:.{d}f}") < limit), f"{value:.9g}")
+
+
+def _up(value: float) -> str:
+    """Round up to 4 digits, so that who follows the cure is not just short of it."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 3)
+    return f"{math.ceil(value / step * (1 - _ROUNDING)) * step:.4g}"

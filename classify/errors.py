@@ -1,0 +1,25 @@
+"""The one exception for what a user can put right."""
+
+
+class BadInput(ValueError):  # noqa: N818 - it is the user's input that is bad
+    """Something given is wrong: a file, a field or a value.
+
+    Parameters
+    ----------
+    message
+        What (file or field), the value, the rule and the cure. Kept to one line, whatever the file name holds.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
+
+
+def one_line(text: str) -> str:
+    r"""Escape what would break a line or drive a terminal (line ends, escape codes, undecodable bytes).
+
+    Examples
+    --------
+    >>> one_line("a\nb")
+    'a\\nb'
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)

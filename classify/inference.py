@@ -1,0 +1,272 @@
+"""A trained model at work: IQ in, labels with calibrated probabilities out.
+
+Imports numpy, scipy.fft (through the features) and onnxruntime, nothing else heavy.
+"""
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import onnxruntime
+from bladewing.features.inputs import model_inputs
+from bladewing.features.schema import INPUT_SHAPES, schema_hash
+from bladewing.models import DEFAULT_MODEL
+from bladewing.models.seal import verify
+from numpy.typing import ArrayLike, NDArray
+
+from .envelope import Envelope
+from .errors import BadInput
+from .labels import CLASSES, UNKNOWN, decide
+from .samples import complex_samples, positive
+
+__all__ = ["Classifier", "Envelope", "Prediction", "model_names"]
+
+FORMAT = "1"
+"""Version of the metadata that this code reads."""
+
+# One step of the work: bounded in records and in samples, so that memory stays flat however large the batch is.
+_STEP_RECORDS = 256
+_STEP_SAMPLES = 1 << 21
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The answers for a batch of records.
+
+    Attributes
+    ----------
+    labels
+        Shape (...): "uav", "bird", "clutter" or "unknown".
+    probabilities
+        Shape (..., 3), float32, order ("uav", "bird", "clutter"); 1/3 each where a record could not be judged.
+    reasons
+        Shape (...): why a label is "unknown" (rule and cure), "" for the others.
+    """
+
+    labels: NDArray[np.str_]
+    probabilities: NDArray[np.float32]
+    reasons: NDArray[np.str_]
+
+
+def model_names() -> tuple[str, ...]:
+    """Names of the shipped models, the default first."""
+    folder = resources.files("bladewing.models.pretrained")
+    names = {entry.name.removesuffix(".onnx") for entry in folder.iterdir() if entry.name.endswith(".onnx")}
+    return tuple(sorted(names, key=lambda name: (name != DEFAULT_MODEL, name)))
+
+
+class Classifier:
+    """A model ready to answer. Use `Classifier.load`.
+
+    It holds no state between calls: threads may share one.
+
+    Parameters
+    ----------
+    onnx_bytes
+        A sealed bladewing model.
+    source
+        What error messages call it.
+    threads
+        CPU threads that one call may use.
+
+    Attributes
+    ----------
+    classes
+        ("uav", "bird", "clutter"), the order of the probabilities.
+    metadata
+        What the file says of itself: text, JSON where structured (see `bladewing.models.export`).
+    envelope
+        The radars it answers for.
+    accept
+        Least probability at which each class is named.
+    inputs
+        Names of the inputs it reads, keys of `bladewing.features.schema.INPUT_SHAPES`.
+
+    Raises
+    ------
+    BadInput
+        Not a bladewing model, altered after it was written, or made for other inputs or another version.
+    """
+
+    classes: tuple[str, str, str] = CLASSES
+    metadata: Mapping[str, str]
+    envelope: Envelope
+    accept: tuple[float, float, float]
+    inputs: tuple[str, ...]
+
+    def __init__(self, onnx_bytes: bytes, *, source: str = "model", threads: int = 1) -> None:
+        if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+            raise BadInput(f"threads is {threads!r}: it must be a whole number of 1 or more")
+        try:
+            verify(onnx_bytes)  # before anything of the file is run
+        except ValueError as error:
+            raise BadInput(f"{source}: {error}") from None
+        self._session = _open_session(onnx_bytes, source, threads)
+        self.metadata = MappingProxyType(dict(self._session.get_modelmeta().custom_metadata_map))
+        self.envelope, self.accept = _read_metadata(self.metadata, source)
+        self.inputs = _read_inputs(self._session, source)
+
+    @classmethod
+    def load(cls, name_or_path: str | os.PathLike[str] | None = None, threads: int = 1) -> "Classifier":
+        """Load a shipped model by its name, or any bladewing model by its path.
+
+        Parameters
+        ----------
+        name_or_path
+            One of `model_names()`, or a file; by default the shipped default model.
+        threads
+            CPU threads that one call may use.
+
+        Raises
+        ------
+        BadInput
+            There is no such model, or it is not one that can be used (see `Classifier`).
+        """
+        given = DEFAULT_MODEL if name_or_path is None else os.fspath(name_or_path)
+        if given in model_names():
+            content = resources.files("bladewing.models.pretrained").joinpath(f"{given}.onnx").read_bytes()
+            return cls(content, source=given, threads=threads)
+        path = Path(given)
+        if path.is_dir():
+            raise BadInput(f"{given} is a directory: name the .onnx file in it")
+        try:
+            content = path.read_bytes()
+        except (FileNotFoundError, NotADirectoryError):
+            shipped = ", ".join(model_names()) or "none"
+            raise BadInput(
+                f"no model {given!r}: give the path of an .onnx file or one of the shipped: {shipped}"
+            ) from None
+        except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+            raise BadInput(f"{given}: the model cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        return cls(content, source=given, threads=threads)
+
+    def predict(self, iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Prediction:
+        """Tell UAV, bird and clutter apart.
+
+        Parameters
+        ----------
+        iq
+            Shape (..., pulses), complex: one range cell, one sample a pulse. Leading axes are a batch, and every
+            record is answered as if it were alone. The gain does not matter.
+        carrier_hz
+            Carrier [Hz].
+        prf_hz
+            Pulse repetition frequency [Hz].
+
+        Returns
+        -------
+        Prediction
+            With the leading axes of `iq`. Records outside the envelope and records without signal are "unknown",
+            with the reason.
+
+        Raises
+        ------
+        BadInput
+            The samples are not complex or not finite, there is no sample, or a frequency is not above 0.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from bladewing.classify import Classifier
+        >>> answer = Classifier.load().predict(np.ones(100, dtype=complex), carrier_hz=10e9, prf_hz=500.0)
+        >>> print(answer.labels, answer.reasons)
+        unknown PRF 500 Hz is below 1000 Hz: raise the PRF to 1335 Hz or more
+        """
+        samples = complex_samples(iq, "iq")
+        carrier_hz, prf_hz = positive(carrier_hz, "carrier_hz"), positive(prf_hz, "prf_hz")
+        if samples.ndim == 0 or samples.shape[-1] == 0:
+            raise BadInput(f"iq has shape {samples.shape}: it must be (..., pulses) with one pulse or more")
+        *leading, pulses = samples.shape
+        records = samples.reshape(-1, pulses)
+        probabilities = np.full((len(records), len(CLASSES)), 1 / len(CLASSES), dtype=np.float32)
+        labels = np.full(len(records), UNKNOWN, dtype="<U7")
+        outside = self.envelope.reason(carrier_hz, prf_hz, pulses)
+        if outside is not None:
+            reasons = np.full(len(records), outside)
+        else:
+            live = np.flatnonzero(records.any(axis=-1))
+            probabilities[live] = self._probabilities(records, live, carrier_hz, prf_hz)
+            labels[live], why = decide(probabilities[live], self.accept)
+            texts = np.full(len(records), "no signal: every sample is 0", dtype=object)
+            texts[live] = why
+            reasons = texts.astype(np.str_)
+        return Prediction(
+            labels.reshape(leading), probabilities.reshape(*leading, len(CLASSES)), reasons.reshape(leading)
+        )
+
+    def _probabilities(
+        self, records: NDArray[np.complex64], rows: NDArray[np.intp], carrier_hz: float, prf_hz: float
+    ) -> NDArray[np.float32]:
+        """Run the chosen rows of (records, pulses) through the model, a bounded number at a time."""
+        step = max(1, min(_STEP_RECORDS, _STEP_SAMPLES // records.shape[-1]))
+        out = np.empty((len(rows), len(CLASSES)), dtype=np.float32)
+        for start in range(0, len(rows), step):
+            chunk = _unit_gain(records[rows[start : start + step]])
+            feed = model_inputs(chunk, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs)
+            (out[start : start + step],) = self._session.run(["probabilities"], feed)
+        return out
+
+
+def _unit_gain(records: NDArray[np.complex64]) -> NDArray[np.complex64]:
+    """Scale each record by a power of two to a largest component of 0.5 to 1.
+
+    Exact, so that it changes no answer, and it keeps the squares of very strong or very weak samples within float32.
+    """
+    parts = np.ascontiguousarray(records).view(np.float32)
+    _, exponent = np.frexp(np.abs(parts).max(axis=-1, keepdims=True))
+    return np.ldexp(parts, -exponent).view(np.complex64)
+
+
+def _open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.InferenceSession:
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 4  # its messages come as exceptions; nothing else may reach the user's terminal
+    try:
+        return onnxruntime.InferenceSession(onnx_bytes, options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # its exceptions share no base class
+        raise BadInput(f"{source}: onnxruntime {onnxruntime.__version__} cannot open the model: {error}") from None
+
+
+def _read_metadata(metadata: Mapping[str, str], source: str) -> tuple[Envelope, tuple[float, float, float]]:
+    """Check what a model says of itself against what this version can serve."""
+    if metadata.get("product") != "bladewing":
+        raise BadInput(f"{source}: not a bladewing model: its product is {metadata.get('product')!r}")
+    if metadata.get("format") != FORMAT:
+        raise BadInput(
+            f"{source}: model format {metadata.get('format')!r}, this version reads {FORMAT!r}: train it again"
+        )
+    if metadata.get("schema_sha256") != schema_hash():
+        raise BadInput(
+            f"{source}: trained on other measurements than this version makes (schema "
+            f"{metadata.get('schema_sha256', 'missing')[:12]}, here {schema_hash()[:12]}): train it again"
+        )
+    try:
+        classes, accept = json.loads(metadata["classes"]), json.loads(metadata["accept"])
+        envelope = Envelope.from_json(metadata["envelope"])
+        if tuple(classes) != CLASSES:
+            raise ValueError(f"classes are {classes}, they must be {list(CLASSES)}")
+        uav, bird, clutter = (float(limit) for limit in accept)
+        if not all(np.isfinite((uav, bird, clutter))):
+            raise ValueError(f"accept is {accept}, it must be three finite numbers")
+    except (KeyError, TypeError, ValueError) as error:
+        raise BadInput(f"{source}: damaged metadata: {error}: train it again") from None
+    return envelope, (uav, bird, clutter)
+
+
+def _read_inputs(session: onnxruntime.InferenceSession, source: str) -> tuple[str, ...]:
+    """Names of the graph's inputs, checked against what the features give."""
+    for node in session.get_inputs():
+        if INPUT_SHAPES.get(node.name) != tuple(node.shape[1:]):
+            raise BadInput(
+                f"{source}: input {node.name!r} of shape {tuple(node.shape)}: this version gives "
+                f"{ {name: ('records', *shape) for name, shape in INPUT_SHAPES.items()} }: train it again"
+            )
+    if "probabilities" not in [node.name for node in session.get_outputs()]:
+        raise BadInput(f"{source}: no output 'probabilities': not a complete bladewing model, train it again")
+    return tuple(node.name for node in session.get_inputs())

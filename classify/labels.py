@@ -1,0 +1,47 @@
+"""The answers, and how probabilities become one."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+CLASSES = ("uav", "bird", "clutter")
+UNKNOWN = "unknown"
+
+
+def decide(probabilities: NDArray[np.floating], accept: Sequence[float]) -> tuple[NDArray[np.str_], list[str]]:
+    """Name the most probable class, or say "unknown" where it is not probable enough.
+
+    Parameters
+    ----------
+    probabilities
+        Shape (records, 3), order `CLASSES`.
+    accept
+        Least probability at which each class is named, order `CLASSES`.
+
+    Returns
+    -------
+    labels
+        Shape (records,): a class or "unknown".
+    reasons
+        Why a record is "unknown"; "" where it is named.
+    """
+    best = np.argmax(probabilities, axis=-1)
+    top = np.take_along_axis(probabilities, best[:, None], axis=-1)[:, 0].astype(np.float64)
+    needed = np.asarray(accept, dtype=np.float64)[best]
+    named = top >= needed
+    labels = np.where(named, np.asarray(CLASSES)[best], UNKNOWN)
+    reasons = [
+        "" if ok else f"not sure: best {CLASSES[index]} {_below(value, limit)}"
+        for ok, index, value, limit in zip(named, best, top, needed, strict=True)
+    ]
+    return labels, reasons
+
+
+def _below(value: float, limit: float) -> str:
+    """`value < limit` with two decimals, or as many as it takes to tell them apart."""
+    for decimals in range(2, 7):
+        left, right = f"{value:.{decimals}f}", f"{limit:.{decimals}f}"
+        if left != right:
+            break
+    return f"{left} < {right}"

@@ -1,0 +1,193 @@
+"""The work behind `bladewing predict`: recordings in, one answer a dwell and one a recording out."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import BadInput, one_line
+from .labels import CLASSES, UNKNOWN
+from .recording import Recording, find_recording, load_recording
+from .samples import positive
+from .track import Track, fuse
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from .inference import Classifier, Prediction
+
+DWELL_S = 0.08
+"""Default length of a dwell [s]."""
+
+_COLOURS = {"uav": "bold red", "bird": "green", "clutter": "cyan", UNKNOWN: "yellow"}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is said of one recording.
+
+    Attributes
+    ----------
+    name
+        The recording, as it was asked for.
+    start_s, stop_s
+        Shape (dwells,): where each dwell begins and ends [s].
+    dwells
+        The answers, shape (dwells,).
+    track
+        The dwells together.
+    """
+
+    name: str
+    start_s: np.ndarray
+    stop_s: np.ndarray
+    dwells: "Prediction"
+    track: Track
+
+    def json_objects(self) -> Iterator[dict[str, Any]]:
+        """One object a dwell and a closing one, as `predict --json` prints them."""
+        rows = zip(
+            self.start_s, self.stop_s, self.dwells.labels, self.dwells.probabilities, self.dwells.reasons, strict=True
+        )
+        for start_s, stop_s, label, probabilities, reason in rows:
+            yield {
+                "file": self.name,
+                "start_s": round(float(start_s), 9),
+                "stop_s": round(float(stop_s), 9),
+                "label": str(label),
+                "probabilities": _named(probabilities),
+                "reason": str(reason) or None,
+            }
+        track = {
+            "label": self.track.label,
+            "probabilities": _named(self.track.probabilities),
+            "dwells": len(self.dwells.labels),
+        }
+        yield {"file": self.name, "track": track}
+
+    def print(self, console: "Console") -> None:
+        """Write a table, one line a dwell, and the line of the recording."""
+        from rich.table import Table
+        from rich.text import Text
+
+        table = Table("start s", "stop s", "label", *CLASSES, "reason", box=None, pad_edge=False)
+        for column in (0, 1, 3, 4, 5):
+            table.columns[column].justify = "right"
+        for column in range(6):
+            table.columns[column].no_wrap = True
+        before = ""
+        for row in list(self.json_objects())[:-1]:
+            reason = row["reason"] or ""
+            table.add_row(
+                f"{row['start_s']:.3f}",
+                f"{row['stop_s']:.3f}",
+                Text(row["label"], style=_COLOURS[row["label"]]),
+                *(f"{row['probabilities'][name]:.2f}" for name in CLASSES),
+                Text("as above" if reason and reason == before else reason),
+            )
+            before = reason
+        console.print(Text(one_line(self.name), style="bold"), soft_wrap=True)
+        console.print(table)
+        shares = "  ".join(f"{name} {share:.2f}" for name, share in zip(CLASSES, self.track.probabilities, strict=True))
+        line = Text("track: ").append(self.track.label, style=_COLOURS[self.track.label])
+        line.append(f"  {shares}  from {self.track.used} of {len(self.dwells.labels)} dwells")
+        if self.track.reason:
+            line.append(f"  ({self.track.reason})")
+        console.print(line, soft_wrap=True)
+
+
+def distinct(paths: Iterable[Path]) -> Iterator[Path]:
+    """Leave out every name that stands for a recording named before.
+
+    A shell pattern gives both files of a SigMF recording; it is answered once, under the first of its names. A name
+    for which no recording is found is passed on, so that reading it says what is wrong.
+    """
+    seen = set()
+    for path in paths:
+        try:
+            key = find_recording(path).resolve()
+        except BadInput:
+            key = path
+        if key not in seen:
+            seen.add(key)
+            yield path
+
+
+def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = DWELL_S) -> Answer:
+    """Cut a recording into dwells and judge each, and all of them together.
+
+    Parameters
+    ----------
+    recording
+        One range cell.
+    classifier
+        The model to ask.
+    dwell_s
+        Length of a dwell [s], above 0. Dwells follow one another without overlap; a rest shorter than a dwell is
+        dropped, but a recording shorter than one dwell is taken whole.
+    """
+    wanted = max(1, round(min(dwell_s * recording.prf_hz, len(recording.iq))))
+    count = len(recording.iq) // wanted
+    iq = recording.iq[: count * wanted].reshape(count, wanted)
+    dwells = classifier.predict(iq, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
+    start_s = recording.start_s + np.arange(count) * wanted / recording.prf_hz
+    track = fuse(dwells.probabilities, dwells.labels, accept=classifier.accept)
+    return Answer(recording.name, start_s, start_s + wanted / recording.prf_hz, dwells, track)
+
+
+def answers(
+    paths: Iterable[Path],
+    classifier: "Classifier",
+    *,
+    dwell_s: float = DWELL_S,
+    carrier_hz: float | None = None,
+    prf_hz: float | None = None,
+    variable: str | None = None,
+) -> Iterator[Answer | BadInput]:
+    """Answer recordings one after another; one that is bad gives its error instead and does not stop the others.
+
+    Parameters
+    ----------
+    paths, carrier_hz, prf_hz, variable
+        As for `bladewing.classify.recording.load_recording`.
+    classifier, dwell_s
+        As for `answer`.
+    """
+    for path in distinct(paths):
+        try:
+            recording = load_recording(path, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable)
+            yield answer(recording, classifier, dwell_s=dwell_s)
+        except BadInput as error:
+            yield error
+
+
+def summary(labels: Counter[str], unreadable: int) -> str:
+    """One line about many recordings.
+
+    Examples
+    --------
+    >>> summary(Counter(uav=2, clutter=1), 1)
+    '4 recordings: 2 uav, 1 clutter, 1 unreadable'
+    """
+    parts = [f"{labels[name]} {name}" for name in (*CLASSES, UNKNOWN) if labels[name]]
+    if unreadable:
+        parts.append(f"{unreadable} unreadable")
+    return f"{labels.total() + unreadable} recordings: {', '.join(parts)}"
+
+
+def checked_dwell_s(dwell_s: float) -> float:
+    """Check the option --dwell.
+
+    Raises
+    ------
+    BadInput
+        It is not a finite number above 0.
+    """
+    return positive(dwell_s, "--dwell [s]")
+
+
+def _named(probabilities: np.ndarray) -> dict[str, float]:
+    return {name: round(float(value), 6) for name, value in zip(CLASSES, probabilities, strict=True)}

@@ -1,0 +1,139 @@
+"""Recordings: one range cell's IQ with the carrier and the PRF it was taken at."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrays import ARRAY_SUFFIXES, read_array
+from .errors import BadInput
+from .samples import complex_samples, positive
+from .sigmf_file import find_sigmf, read_sigmf
+
+_SAME = 1e-9  # relative: an option that repeats the file's number may be rounded as text is
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Slow-time samples of one range cell.
+
+    Attributes
+    ----------
+    name
+        As it was asked for.
+    iq
+        Shape (pulses,), one sample a pulse.
+    carrier_hz, prf_hz
+        Carrier and pulse repetition frequency [Hz].
+    start_s
+        Time of the first sample [s]; above 0 where a SigMF file says that it goes on from an earlier one.
+    """
+
+    name: str
+    iq: NDArray[np.complex64]
+    carrier_hz: float
+    prf_hz: float
+    start_s: float = 0.0
+
+
+def load_recording(
+    path: str | os.PathLike[str],
+    *,
+    carrier_hz: float | None = None,
+    prf_hz: float | None = None,
+    variable: str | None = None,
+) -> Recording:
+    """Read a SigMF recording, or IQ from a .npy, .npz or .mat file.
+
+    Parameters
+    ----------
+    path
+        SigMF: the .sigmf-meta, the .sigmf-data, their common stem, or an archive (.sigmf, .sigmf.gz, .sigmf.xz,
+        .sigmf.zip). Arrays: .npy, .npz, .mat (up to version 7).
+    carrier_hz, prf_hz
+        Carrier and pulse repetition frequency [Hz], where the file does not say.
+    variable
+        Which array of an .npz or .mat file; needed where it holds several complex ones.
+
+    Raises
+    ------
+    BadInput
+        The file is missing, damaged or cut short, holds no finite complex samples of one range cell, or lacks the
+        carrier or the PRF, or contradicts the ones given. Nothing is ever unpickled.
+    """
+    name = os.fspath(path)
+    found = find_recording(path)
+    if found.suffix.lower() in ARRAY_SUFFIXES:
+        samples, file_carrier_hz, file_prf_hz, first = read_array(found, variable), None, None, 0
+    elif variable is not None:
+        raise BadInput(
+            f"{name}: variable {variable!r} given, but a SigMF recording holds one signal only: leave it out"
+        )
+    else:
+        samples, file_carrier_hz, file_prf_hz, first = read_sigmf(found)
+    iq = _one_range_cell(samples, name)
+    carrier = _agreed(name, "carrier", carrier_hz, file_carrier_hz)
+    prf = _agreed(name, "PRF", prf_hz, file_prf_hz)
+    if carrier is None and prf is None:
+        raise BadInput(f"{name}: the file says no carrier and no PRF: give --carrier-hz and --prf-hz [Hz]")
+    if carrier is None:
+        raise BadInput(f"{name}: the file says no carrier (SigMF core:frequency): give --carrier-hz [Hz]")
+    if prf is None:
+        raise BadInput(f"{name}: the file says no PRF (SigMF core:sample_rate): give --prf-hz [Hz]")
+    return Recording(name, iq, carrier, prf, first / prf)
+
+
+def find_recording(path: str | os.PathLike[str]) -> Path:
+    """Give the file that stands for a recording: one for all the names that a SigMF recording goes by.
+
+    Parameters
+    ----------
+    path
+        As for `load_recording`.
+
+    Raises
+    ------
+    BadInput
+        There is no such file, or it is of no known kind.
+    """
+    given = Path(path)
+    try:
+        sigmf = find_sigmf(given)
+        if sigmf is not None:
+            return sigmf
+        if given.is_dir():
+            raise BadInput(f"{path} is a directory: name the recordings in it, such as {given}/*.sigmf-meta")
+        if not given.exists():
+            raise BadInput(f"{path}: no such file, and no {given.name}.sigmf-meta beside it")
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
+    if given.suffix.lower() not in ARRAY_SUFFIXES:
+        raise BadInput(f"{path}: not a kind of recording known here: give SigMF, {', '.join(ARRAY_SUFFIXES)}")
+    return given
+
+
+def _one_range_cell(samples: NDArray[np.generic], name: str) -> NDArray[np.complex64]:
+    """Check the samples, and let go of axes of length 1 (MATLAB has no other vectors)."""
+    if samples.size == 0:
+        raise BadInput(f"{name}: no samples (shape {samples.shape}): a recording needs at least one pulse")
+    if samples.ndim == 0 or samples.size != max(samples.shape):
+        raise BadInput(
+            f"{name}: samples of shape {samples.shape}: a recording is one range cell, shape (pulses,): "
+            "store each range cell in a recording of its own"
+        )
+    return complex_samples(samples.reshape(-1), name)
+
+
+def _agreed(name: str, what: str, given: float | None, in_file: float | None) -> float | None:
+    """Take the file's number or the one given; two that differ are an error, because one of them is wrong."""
+    if given is not None:
+        given = positive(given, f"{what} given")
+    if given is None or in_file is None:
+        return in_file if given is None else given
+    if abs(given - in_file) > _SAME * in_file:
+        raise BadInput(
+            f"{name}: {what} {given:.12g} Hz given, but the file says {in_file:.12g} Hz: leave the option out"
+        )
+    return in_file

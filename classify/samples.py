@@ -1,0 +1,62 @@
+"""What every array of IQ samples must be, wherever it comes from."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import BadInput
+
+
+def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
+    """Check samples and give them as complex64.
+
+    Parameters
+    ----------
+    values
+        Complex array of any shape.
+    name
+        What the samples are, for the error message: a file, or an argument.
+
+    Raises
+    ------
+    BadInput
+        The samples are not complex numbers, or one is not finite as complex64.
+    """
+    given = np.asarray(values)
+    if given.dtype.names is not None:
+        raise BadInput(f"{name}: a structured array with fields {list(given.dtype.names)}: store complex samples")
+    if given.dtype.kind == "O":
+        raise BadInput(f"{name}: an array of Python objects: store complex samples (complex64)")
+    if given.dtype.kind in "fiub":
+        raise BadInput(f"{name}: real samples ({given.dtype}): IQ must be complex, I + jQ (complex64)")
+    if given.dtype.kind != "c":
+        raise BadInput(f"{name}: samples of type {given.dtype}: IQ must be complex, I + jQ (complex64)")
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is found below, with its index
+        iq = given.astype(np.complex64, copy=False)
+    finite = np.isfinite(iq)
+    if not finite.all():
+        first = np.unravel_index(int(np.argmin(finite)), iq.shape)
+        where = int(first[0]) if iq.ndim == 1 else tuple(int(i) for i in first)
+        raise BadInput(
+            f"{name}: sample {where} is {given[first]}: every sample must be finite in complex64 "
+            f"({int(np.sum(~finite))} of {iq.size} are not): cut them out or replace them by 0"
+        )
+    return iq
+
+
+def positive(value: object, name: str) -> float:
+    """Check a frequency or a time: a finite number above 0.
+
+    Raises
+    ------
+    BadInput
+        It is not; `name` (with its unit) says what.
+    """
+    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
+        raise BadInput(f"{name} is {value!r}: it must be a number above 0")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = float("inf")
+    if not np.isfinite(number) or number <= 0:
+        raise BadInput(f"{name} is {number:g}: it must be a finite number above 0")
+    return number

@@ -1,0 +1,230 @@
+"""SigMF recordings, read through the `sigmf` library (which checks the SHA-512) with the rules for one range cell."""
+
+import json
+import re
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import BadInput
+from .samples import positive
+
+if TYPE_CHECKING:
+    from sigmf import SigMFFile
+
+_META, _DATA = ".sigmf-meta", ".sigmf-data"
+_ARCHIVES = (".sigmf", ".sigmf.gz", ".sigmf.xz", ".sigmf.zip")
+_DATATYPE = re.compile(r"([cr])([fiu])(8|16|32|64)(_le|_be)?")
+
+
+class SigmfSamples(NamedTuple):
+    """What a SigMF recording holds.
+
+    Attributes
+    ----------
+    iq
+        Shape (pulses,); fixed-point samples are scaled to -1..1.
+    carrier_hz, prf_hz
+        `core:frequency` and `core:sample_rate` [Hz]; None where the file does not say.
+    first_sample
+        Index of the first sample in the whole recording (`core:offset` and the first capture's start).
+    """
+
+    iq: NDArray[np.generic]
+    carrier_hz: float | None
+    prf_hz: float | None
+    first_sample: int
+
+
+def find_sigmf(path: Path) -> Path | None:
+    """Give the metadata file or the archive that a name stands for, or None where it is not SigMF.
+
+    Parameters
+    ----------
+    path
+        A .sigmf-meta, a .sigmf-data, their stem, or an archive.
+
+    Raises
+    ------
+    BadInput
+        Half of a recording is missing, or it is a collection.
+    """
+    if path.name.endswith(".sigmf-collection"):
+        raise BadInput(f"{path}: a collection of recordings: name the recordings themselves (.sigmf-meta)")
+    if path.name.endswith(_ARCHIVES):
+        return path if path.is_file() else None
+    if path.name.endswith((_META, _DATA)):
+        stem, missing = path.with_suffix(""), f"{path}: no such file"
+    elif path.is_file() or not path.name:
+        return None
+    else:
+        stem, missing = path, ""
+    meta, data = (stem.with_name(stem.name + suffix) for suffix in (_META, _DATA))
+    if meta.is_file():
+        return meta
+    if data.is_file():
+        raise BadInput(f"{data}: its metadata {meta.name} are missing: a SigMF recording is both files")
+    if missing:
+        raise BadInput(missing)
+    return None
+
+
+def read_sigmf(path: Path) -> SigmfSamples:
+    """Read a recording of one channel at one carrier.
+
+    Parameters
+    ----------
+    path
+        As `find_sigmf` gives it.
+
+    Raises
+    ------
+    BadInput
+        Damaged, cut short or altered, not complex, of several channels or carriers, or with a field that is wrong.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what matters of the library's warnings is an error below
+        try:
+            return _read_pair(path) if path.name.endswith(_META) else _read_archive(path)
+        except OSError as error:
+            raise BadInput(f"{path}: cannot be read: {error.strerror or error}") from None
+
+
+def _read_pair(path: Path) -> SigmfSamples:
+    import sigmf
+    from sigmf.error import SigMFError
+
+    try:
+        metadata = json.loads(path.read_bytes())
+    except (ValueError, RecursionError) as error:  # not UTF-8, not JSON, or nested beyond reason
+        raise BadInput(f"{path}: not JSON: {error}: SigMF metadata are a JSON object") from None
+    _check_structure(metadata, path)
+    data = path.with_suffix(_DATA)
+    if metadata["global"].get("core:dataset"):
+        raise BadInput(
+            f"{path}: core:dataset names a file that is not SigMF ({metadata['global']['core:dataset']!r}): "
+            f"store the samples as {data.name} and leave core:dataset out"
+        )
+    if not data.is_file():
+        raise BadInput(f"{path}: its samples {data.name} are missing: a SigMF recording is both files")
+    _check_length(metadata, data.stat().st_size, path)
+    try:
+        recording = sigmf.SigMFFile(metadata=metadata, data_file=data)
+    except SigMFError as error:
+        raise BadInput(_library_message(data, error)) from None
+    return _samples(recording, path)
+
+
+def _read_archive(path: Path) -> SigmfSamples:
+    import sigmf
+
+    try:
+        recording = sigmf.fromarchive(path)
+    except OSError:
+        raise
+    except Exception as error:  # tar, zip, xz, JSON and schema each raise their own
+        raise BadInput(_library_message(path, error)) from None
+    metadata = {
+        "global": recording.get_global_info(),
+        "captures": recording.get_captures(),
+        "annotations": recording.get_annotations(),
+    }
+    _check_structure(metadata, path)
+    _check_length(metadata, recording.data_size_bytes, path)
+    return _samples(recording, path)
+
+
+def _library_message(path: Path, error: Exception) -> str:
+    if "hash does not match" in str(error):
+        return f"{path}: altered or damaged: the SHA-512 of its samples is not the one in core:sha512: copy it again"
+    first = (str(error).splitlines() or [""])[0]
+    return f"{path}: not a readable SigMF recording ({type(error).__name__}: {first}): copy or record it again"
+
+
+def _check_structure(metadata: Any, path: Path) -> None:
+    """Check every field that is used here, so that none is trusted for its type."""
+    if not isinstance(metadata, dict) or not isinstance(metadata.get("global"), dict):
+        raise BadInput(f"{path}: no 'global' object: SigMF metadata are an object of global, captures, annotations")
+    for section in ("captures", "annotations"):
+        entries = metadata.setdefault(section, [])
+        if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+            raise BadInput(f"{path}: {section!r} must be a list of objects")
+        for index, entry in enumerate(entries):
+            entry["core:sample_start"] = _count(entry, "core:sample_start", f"{path}: {section}[{index}]")
+            if "core:sample_count" in entry:
+                _count(entry, "core:sample_count", f"{path}: {section}[{index}]")
+    general = metadata["global"]
+    datatype = general.get("core:datatype")
+    match = _DATATYPE.fullmatch(datatype) if isinstance(datatype, str) else None
+    if match is None:
+        raise BadInput(f"{path}: core:datatype is {datatype!r}: it must be a SigMF type such as 'cf32_le'")
+    if match[1] == "r":
+        raise BadInput(f"{path}: real samples (core:datatype {datatype}): IQ must be complex, such as cf32_le")
+    channels = _count(general, "core:num_channels", str(path), absent=1)
+    if channels != 1:
+        raise BadInput(
+            f"{path}: {channels} channels (core:num_channels): a recording is one range cell: "
+            "store each channel in a recording of its own"
+        )
+    headers = any(_count(capture, "core:header_bytes", str(path)) for capture in metadata["captures"])
+    if headers or _count(general, "core:trailing_bytes", str(path)):
+        raise BadInput(f"{path}: core:header_bytes or core:trailing_bytes above 0: store the samples alone")
+
+
+def _count(entry: dict[str, Any], field: str, where: str, absent: int = 0) -> int:
+    value = entry.get(field, absent)
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise BadInput(f"{where}: {field} is {value!r}: it must be a whole number of 0 or more")
+    return value
+
+
+def _check_length(metadata: dict[str, Any], size_bytes: int, path: Path) -> None:
+    """The data must be whole samples, and as many as the metadata speak of."""
+    datatype = metadata["global"]["core:datatype"]
+    match = _DATATYPE.fullmatch(datatype)
+    assert match is not None  # _check_structure came first
+    sample_bytes = 2 * int(match[3]) // 8
+    if size_bytes == 0:
+        raise BadInput(f"{path}: no samples, its data are empty (0 bytes): copy or record it again")
+    if size_bytes % sample_bytes:
+        raise BadInput(
+            f"{path}: cut short: {size_bytes} bytes of data are not a whole number of {datatype} samples "
+            f"({sample_bytes} bytes each): copy it again"
+        )
+    samples = size_bytes // sample_bytes
+    offset = _count(metadata["global"], "core:offset", str(path))
+    for section in ("captures", "annotations"):
+        for index, entry in enumerate(metadata[section]):
+            claimed = entry["core:sample_start"] + entry.get("core:sample_count", 0) - offset
+            if claimed > samples:
+                raise BadInput(
+                    f"{path}: cut short: {section}[{index}] speaks of {claimed} samples, the data hold {samples}: "
+                    "copy it again"
+                )
+
+
+def _samples(recording: "SigMFFile", path: Path) -> SigmfSamples:
+    general, captures = recording.get_global_info(), recording.get_captures()
+    offset = general["core:offset"]
+    start = captures[0]["core:sample_start"] if captures else offset
+    if start < offset:
+        raise BadInput(
+            f"{path}: captures[0] starts at sample {start}, before core:offset {offset}: correct one of them"
+        )
+    iq = recording.read_samples()[start - offset :]
+    prf = general.get("core:sample_rate")
+    prf_hz = None if prf is None else positive(prf, f"{path}: core:sample_rate (the PRF) [Hz]")
+    carriers = {
+        positive(capture["core:frequency"], f"{path}: captures[{index}] core:frequency (the carrier) [Hz]"): index
+        for index, capture in reversed(list(enumerate(captures)))
+        if capture.get("core:frequency") is not None
+    }
+    if len(carriers) > 1:
+        said = ", ".join(
+            f"captures[{index}] {carrier:.12g} Hz" for carrier, index in sorted(carriers.items(), key=lambda c: c[1])
+        )
+        raise BadInput(f"{path}: {len(carriers)} carriers ({said}): store each one in a recording of its own")
+    return SigmfSamples(iq, next(iter(carriers), None), prf_hz, start)

@@ -1,0 +1,108 @@
+"""Small models and recordings that the tests of classify share."""
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bladewing.classify.envelope import Envelope
+from bladewing.features.schema import INPUT_SHAPES, schema_hash
+from bladewing.models.seal import PLACEHOLDER, SEAL_KEY, seal
+
+CARRIER_HZ, PRF_HZ = 10e9, 20e3
+
+
+def model_bytes(
+    *,
+    bias: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
+    slope: float = 0.0,
+    sealed: bool = True,
+    input_name: str = "features",
+    width: int | None = None,
+    **metadata: str | None,
+) -> bytes:
+    """Softmax(features @ weights + bias): with slope 0 it always answers softmax(bias)."""
+    import onnx
+    from onnx import TensorProto, helper, numpy_helper
+
+    width = INPUT_SHAPES["features"][0] if width is None else width
+    weights = (slope * np.random.default_rng(0).normal(size=(width, 3))).astype(np.float32)
+    graph = helper.make_graph(
+        [
+            helper.make_node("MatMul", [input_name, "weights"], ["product"]),
+            helper.make_node("Add", ["product", "bias"], ["scores"]),
+            helper.make_node("Softmax", ["scores"], ["probabilities"], axis=-1),
+        ],
+        "tiny",
+        [helper.make_tensor_value_info(input_name, TensorProto.FLOAT, ["batch", width])],
+        [helper.make_tensor_value_info(n, TensorProto.FLOAT, ["batch", 3]) for n in ("scores", "probabilities")],
+        [
+            numpy_helper.from_array(weights, "weights"),
+            numpy_helper.from_array(np.asarray(bias, dtype=np.float32), "bias"),
+        ],
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
+    onnx.checker.check_model(model)
+    said = {
+        "product": "bladewing",
+        "format": "1",
+        "name": "tiny",
+        "classes": json.dumps(["uav", "bird", "clutter"]),
+        "schema_sha256": schema_hash(),
+        "envelope": Envelope().to_json(),
+        "accept": json.dumps([0.6, 0.6, 0.6]),
+        SEAL_KEY: PLACEHOLDER,
+    } | metadata
+    helper.set_model_props(model, {key: value for key, value in said.items() if value is not None})
+    content = model.SerializeToString()
+    return seal(content) if sealed else content
+
+
+@pytest.fixture(scope="session")
+def make_model() -> Callable[..., bytes]:
+    return model_bytes
+
+
+@pytest.fixture(scope="session")
+def uav_model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A model that always answers uav 0.8."""
+    path = tmp_path_factory.mktemp("models") / "always-uav.onnx"
+    path.write_bytes(model_bytes(bias=np.log([0.8, 0.15, 0.05])))
+    return path
+
+
+@pytest.fixture(scope="session")
+def mixed_model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A model whose answer depends on the record."""
+    path = tmp_path_factory.mktemp("models") / "mixed.onnx"
+    path.write_bytes(model_bytes(slope=0.05))
+    return path
+
+
+@pytest.fixture
+def sigmf_pair(tmp_path: Path) -> Callable[..., Path]:
+    """Write a SigMF recording, by default 4000 pulses of noise; keywords change the metadata, None drops a field."""
+
+    def write(
+        name: str = "rec",
+        iq: np.ndarray | None = None,
+        *,
+        data: bytes | None = None,
+        captures: object = None,
+        annotations: object = (),
+        **fields: object,
+    ) -> Path:
+        samples = np.random.default_rng(0).normal(size=8000).astype(np.float32).view(np.complex64) if iq is None else iq
+        general = {"datatype": "cf32_le", "sample_rate": PRF_HZ, "version": "1.2.0"} | fields
+        metadata = {
+            "global": {f"core:{key}": value for key, value in general.items() if value is not None},
+            "captures": [{"core:sample_start": 0, "core:frequency": CARRIER_HZ}] if captures is None else captures,
+            "annotations": list(annotations) if isinstance(annotations, tuple) else annotations,
+        }
+        meta = tmp_path / f"{name}.sigmf-meta"
+        meta.write_text(json.dumps(metadata))
+        meta.with_suffix(".sigmf-data").write_bytes(samples.tobytes() if data is None else data)
+        return meta
+
+    return write

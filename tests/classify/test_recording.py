@@ -1,0 +1,133 @@
+"""What every kind of recording must satisfy, and the carrier and the PRF. SigMF and arrays have files of their own."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bladewing.classify.errors import BadInput
+from bladewing.classify.recording import find_recording, load_recording
+
+CARRIER_HZ, PRF_HZ = 10e9, 20e3
+RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+
+
+def noise(pulses: int, records: tuple[int, ...] = ()) -> np.ndarray:
+    parts = np.random.default_rng(0).normal(size=(*records, pulses, 2)).astype(np.float32)
+    return parts.view(np.complex64)[..., 0]
+
+
+def refused(path, **options) -> str:
+    """The message of a recording that is refused: one line, which names the file."""
+    with pytest.raises(BadInput) as caught:
+        load_recording(path, **options)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert Path(path).stem.split(".")[0] in message
+    return message
+
+
+@pytest.fixture
+def npy(tmp_path):
+    def write(array, name="rec.npy"):
+        np.save(tmp_path / name, array, allow_pickle=True)
+        return tmp_path / name
+
+    return write
+
+
+def test_samples_come_back_as_they_were(npy):
+    recording = load_recording(npy(noise(100)), **RADAR)
+    np.testing.assert_array_equal(recording.iq, noise(100))
+    assert recording.iq.dtype == np.complex64
+    assert (recording.carrier_hz, recording.prf_hz, recording.start_s) == (CARRIER_HZ, PRF_HZ, 0)
+
+
+@pytest.mark.parametrize("shape", [(100,), (100, 1), (1, 100), (1, 100, 1)])
+def test_axes_of_length_one_are_let_go(npy, shape):
+    assert load_recording(npy(noise(100).reshape(shape)), **RADAR).iq.shape == (100,)
+
+
+@pytest.mark.parametrize("dtype", ["complex128", ">c8", ">c16", "clongdouble"])
+def test_every_complex_type_becomes_complex64(npy, dtype):
+    recording = load_recording(npy(noise(100).astype(dtype)), **RADAR)
+    assert recording.iq.dtype == np.dtype(np.complex64)
+    np.testing.assert_array_equal(recording.iq, noise(100))
+
+
+@pytest.mark.parametrize(
+    ("array", "said"),
+    [
+        (np.zeros(0, dtype=np.complex64), r"no samples \(shape \(0,\)\): a recording needs at least one pulse"),
+        (np.zeros((0, 5), dtype=np.complex64), r"no samples \(shape \(0, 5\)\)"),
+        (np.complex64(1), r"samples of shape \(\): a recording is one range cell"),
+        (noise(50, records=(2,)), r"samples of shape \(2, 50\): a recording is one range cell, shape \(pulses,\)"),
+        (np.ones(100, dtype=np.float32), r"real samples \(float32\): IQ must be complex"),
+        (np.ones(100, dtype=np.int16), r"real samples \(int16\): IQ must be complex"),
+        (np.ones(100, dtype=bool), r"real samples \(bool\)"),
+        (np.array(["a"] * 70), r"samples of type <U1: IQ must be complex"),
+        (np.zeros(100, dtype=[("i", "f4"), ("q", "f4")]), r"structured array with fields \['i', 'q'\]"),
+        (np.array([1 + 1j] * 70, dtype=object), "Python objects, which is never unpickled"),
+        (np.r_[noise(70), np.nan], r"sample 70 is \(?nan.*must be finite.*1 of 71"),
+        (np.r_[1j * np.inf, noise(70)], r"sample 0 is .*inf.*must be finite"),
+        (np.r_[noise(70).astype(complex), 1e300], r"sample 70 is .*1e\+300.*finite in complex64"),
+    ],
+)
+def test_samples_that_are_refused(npy, array, said):
+    assert re.search(said, refused(npy(array), **RADAR))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({}, "no carrier and no PRF: give --carrier-hz and --prf-hz"),
+        ({"prf_hz": PRF_HZ}, "no carrier .*: give --carrier-hz"),
+        ({"carrier_hz": CARRIER_HZ}, "no PRF .*: give --prf-hz"),
+        (RADAR | {"prf_hz": 0.0}, "PRF given is 0: it must be a finite number above 0"),
+        (RADAR | {"prf_hz": -5.0}, "PRF given is -5"),
+        (RADAR | {"carrier_hz": float("nan")}, "carrier given is nan"),
+        (RADAR | {"carrier_hz": float("inf")}, "carrier given is inf"),
+    ],
+)
+def test_carrier_and_prf_must_be_known(npy, options, said):
+    with pytest.raises(BadInput, match=said):
+        load_recording(npy(noise(100)), **options)
+
+
+def test_a_directory_is_refused_with_the_cure(tmp_path):
+    with pytest.raises(BadInput, match=r"is a directory: name the recordings in it, such as .*/\*\.sigmf-meta"):
+        load_recording(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["gone.npy", "gone.mat", "gone.sigmf-meta", "gone.sigmf-data", "gone.sigmf", "gone"])
+def test_a_missing_file_is_named(tmp_path, name):
+    assert "no such file" in refused(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["rec.wav", "rec", "rec.bin", "rec.txt"])
+def test_other_kinds_are_refused_with_those_that_are_known(tmp_path, name):
+    (tmp_path / name).write_bytes(b"x" * 100)
+    assert "give SigMF, .npy, .npz, .mat" in refused(tmp_path / name)
+
+
+def test_a_name_with_a_line_end_stays_on_one_line(tmp_path):
+    with pytest.raises(BadInput) as caught:
+        load_recording(tmp_path / "re\nc.npy")
+    assert r"re\nc.npy: no such file" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_names_with_spaces_and_upper_case_endings(npy):
+    assert load_recording(npy(noise(64), "my rec 1.npy"), **RADAR).iq.size == 64
+    path = npy(noise(64), "plain.npy")
+    upper = path.rename(path.with_name("LOUD.NPY"))
+    assert load_recording(upper, **RADAR).iq.size == 64
+
+
+def test_all_names_of_a_sigmf_recording_stand_for_one(sigmf_pair):
+    meta = sigmf_pair("drone-3.30GHz")
+    names = [meta, meta.with_suffix(".sigmf-data"), meta.with_suffix("")]
+    assert {find_recording(name) for name in names} == {meta}
+    iq = [load_recording(name).iq for name in names]
+    np.testing.assert_array_equal(iq[0], iq[1])
+    np.testing.assert_array_equal(iq[0], iq[2])

@@ -1,0 +1,128 @@
+import numpy as np
+import pytest
+from bladewing.classify.labels import CLASSES, UNKNOWN, decide
+from bladewing.classify.track import fuse
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+ACCEPT = (0.6, 0.6, 0.6)
+
+
+@st.composite
+def dwells(draw, least=1, most=12):
+    """Probabilities (n, 3), each row a distribution."""
+    rows = draw(st.lists(st.tuples(*[st.floats(0.001, 1)] * 3), min_size=least, max_size=most))
+    p = np.array(rows)
+    return (p / p.sum(axis=1, keepdims=True)).astype(np.float32)
+
+
+def labelled(p):
+    return decide(p, ACCEPT)[0]
+
+
+@given(dwells(), st.randoms(use_true_random=False))
+def test_order_does_not_matter(p, random):
+    order = list(range(len(p)))
+    random.shuffle(order)
+    one, other = fuse(p, labelled(p), accept=ACCEPT), fuse(p[order], labelled(p)[order], accept=ACCEPT)
+    np.testing.assert_allclose(one.probabilities, other.probabilities, atol=1e-6)
+
+
+@given(dwells(most=1))
+def test_one_dwell_is_left_as_it_is(p):
+    assume(np.ptp(p) > 1e-3)  # a uniform one says nothing: see below
+    track = fuse(p, labelled(p), accept=ACCEPT)
+    np.testing.assert_array_equal(track.probabilities, p[0])
+    assert track.label == labelled(p)[0]
+    assert track.used == 1
+
+
+@given(dwells(most=1), st.integers(2, 50), st.floats(0, 0.9))
+def test_agreement_sharpens(p, count, correlation):
+    best = int(np.argmax(p[0]))
+    assume(p[0, best] - np.sort(p[0])[1] > 0.01)
+    many = np.repeat(p, count, axis=0)
+    fused = fuse(many, labelled(many), accept=ACCEPT, correlation=correlation).probabilities
+    more = fuse(np.repeat(p, count + 1, axis=0), labelled(np.repeat(p, count + 1, axis=0)), accept=ACCEPT,
+                correlation=correlation).probabilities  # fmt: skip
+    assert fused[best] > p[0, best] or p[0, best] > 0.9999
+    assert more[best] >= fused[best] - 1e-6
+
+
+@given(dwells(), st.floats(0, 1))
+def test_a_track_is_a_distribution(p, correlation):
+    track = fuse(p, labelled(p), accept=ACCEPT, correlation=correlation)
+    assert track.probabilities.dtype == np.float32
+    assert np.all(track.probabilities >= 0)
+    assert track.probabilities.sum() == pytest.approx(1, abs=1e-5)
+    assert track.label in (*CLASSES, UNKNOWN)
+    assert (track.label == UNKNOWN) == bool(track.reason)
+
+
+@given(dwells(), st.integers(1, 20))
+def test_dwells_outside_the_envelope_change_nothing(p, count):
+    silent = np.full((count, 3), 1 / 3, dtype=np.float32)
+    labels = np.concatenate([labelled(p), np.full(count, UNKNOWN)])
+    alone, mixed = fuse(p, labelled(p), accept=ACCEPT), fuse(np.concatenate([p, silent]), labels, accept=ACCEPT)
+    np.testing.assert_array_equal(alone.probabilities, mixed.probabilities)
+    assert (alone.label, alone.used) == (mixed.label, mixed.used)
+
+
+def test_independent_evidence_multiplies_and_full_correlation_counts_once():
+    p = np.array([[0.5, 0.3, 0.2], [0.6, 0.2, 0.2]])
+    product = p[0] * p[1] / np.sum(p[0] * p[1])
+    np.testing.assert_allclose(fuse(p, labelled(p), correlation=0).probabilities, product, rtol=1e-6)
+    twice = p[[0, 0]]
+    np.testing.assert_allclose(fuse(twice, labelled(twice), correlation=1).probabilities, p[0], rtol=1e-6)
+
+
+def test_correlated_dwells_are_never_worth_more_than_the_limit():
+    # 1 / 0.25 = 4 dwells: odds of 2 to 1 grow to at most 2^4 to 1, however long the track.
+    p = np.tile([0.5, 0.25, 0.25], (10_000, 1))
+    uav, bird, _ = fuse(p, labelled(p), correlation=0.25).probabilities
+    assert uav / bird == pytest.approx(2**4, rel=1e-2)
+
+
+def test_dwells_that_are_not_sure_add_up_to_an_answer():
+    p = np.tile(np.float32([0.55, 0.25, 0.20]), (5, 1))
+    assert set(labelled(p)) == {UNKNOWN}
+    assert fuse(p, labelled(p), accept=ACCEPT).label == "uav"
+
+
+def test_contradiction_is_unknown():
+    p = np.float32([[0.9, 0.05, 0.05], [0.05, 0.9, 0.05]])
+    track = fuse(p, labelled(p), accept=ACCEPT)
+    assert track.label == UNKNOWN
+    assert track.reason.startswith("not sure: best ")
+
+
+@pytest.mark.parametrize("count", [0, 1, 7])
+def test_unknown_when_no_dwell_could_be_judged(count):
+    track = fuse(np.full((count, 3), 1 / 3), np.full(count, UNKNOWN), accept=ACCEPT)
+    assert (track.label, track.used) == (UNKNOWN, 0)
+    np.testing.assert_array_equal(track.probabilities, np.float32([1 / 3] * 3))
+    assert track.reason == "no dwell could be judged"
+
+
+def test_one_certain_dwell_cannot_rule_a_class_out():
+    p = np.float32([[0, 0, 1]] + [[0.9, 0.05, 0.05]] * 20)
+    assert fuse(p, labelled(p), accept=ACCEPT).label == "uav"
+
+
+@pytest.mark.parametrize(
+    ("p", "labels", "correlation", "message"),
+    [
+        (np.ones((2, 2)), ["uav"] * 2, 0.5, r"\(2, 2\)"),
+        (np.ones((2, 3)), ["uav"], 0.5, r"labels \(1,\)"),
+        (np.ones((2, 3)), ["uav"] * 2, 1.5, "correlation is 1.5: it must be in 0 to 1"),
+    ],
+)
+def test_bad_arguments(p, labels, correlation, message):
+    with pytest.raises(ValueError, match=message):
+        fuse(p, labels, correlation=correlation)
+
+
+def test_reason_shows_that_the_probability_is_below_the_limit():
+    labels, reasons = decide(np.array([[0.48, 0.32, 0.2], [0.6199, 0.2, 0.1801], [0.62, 0.2, 0.18]]), (0.62,) * 3)
+    assert list(labels) == [UNKNOWN, UNKNOWN, "uav"]
+    assert reasons == ["not sure: best uav 0.48 < 0.62", "not sure: best uav 0.6199 < 0.6200", ""]
