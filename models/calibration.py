@@ -1,7 +1,8 @@
 """From scores to probabilities that mean what they say, and to the thresholds of an honest "unknown".
 
 Vector scaling: probabilities = softmax(scale * scores + bias), with one scale and one bias a class, fitted on records
-that the model did not train on. Temperature scaling (Guo et al. 2017) is the case without biases, scale = 1 / temperature.
+that the model did not train on. Temperature scaling (Guo et al. 2017) is the case without biases,
+scale = 1 / temperature.
 """
 
 from dataclasses import dataclass
@@ -11,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._checks import CLASS_COUNT, require_finite, require_labels
 
-# Widths of the Gaussian priors that hold a fit on few or separable records; a thousand records outweigh them.
+# Widths of the Gaussian priors that hold a fit on few or separable records; a thousand records outweigh them. The prior
+# of the scale is centred where the scaled scores spread by 1, so that the units of the scores do not matter.
 _LOG_SCALE_SIGMA = np.log(10.0)
 _BIAS_SIGMA = 1.0
 
@@ -151,25 +153,25 @@ def _fit(scores: NDArray[np.floating], labels: NDArray[np.integer], *, biased: b
     scores = np.asarray(scores, dtype=np.float64)
     count = len(scores)
     truth = np.eye(CLASS_COUNT)[labels]
+    spread = (scores - scores.mean(axis=1, keepdims=True)).std()
+    centre = -np.log(max(float(spread), 1e-6))
 
     def loss(parameters: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         """Penalised mean negative log likelihood, and its gradient."""
         log_scale, bias = parameters[0], parameters[1:] if biased else np.zeros(CLASS_COUNT)
+        pull = (log_scale - centre) / _LOG_SCALE_SIGMA
         logits = np.exp(log_scale) * scores + bias
         top = logits.max(axis=1, keepdims=True)
         log_sum = top + np.log(np.exp(logits - top).sum(axis=1, keepdims=True))
         value = (log_sum[:, 0] - (logits * truth).sum(axis=1)).mean()
         slope = (np.exp(logits - log_sum) - truth) / count
-        value += ((log_scale / _LOG_SCALE_SIGMA) ** 2 + ((bias / _BIAS_SIGMA) ** 2).sum()) / (2 * count)
-        by_scale = np.exp(log_scale) * (slope * scores).sum() + log_scale / _LOG_SCALE_SIGMA**2 / count
+        value += (pull**2 + ((bias / _BIAS_SIGMA) ** 2).sum()) / (2 * count)
+        by_scale = np.exp(log_scale) * (slope * scores).sum() + pull / _LOG_SCALE_SIGMA / count
         by_bias = slope.sum(axis=0) + bias / _BIAS_SIGMA**2 / count
         return value, np.concatenate([[by_scale], by_bias]) if biased else np.array([by_scale])
 
-    bounds = [(-10.0, 10.0)] * (1 + CLASS_COUNT * biased)
-    start = np.zeros(len(bounds))
-    start[0] = -np.log(
-        max(float(scores.std()), 1e-3)
-    )  # a scale that brings the scores to order 1 keeps the first step sane
+    start = np.array([centre] + [0.0] * (CLASS_COUNT * biased))
+    bounds = [(value - 10, value + 10) for value in start]
     best = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-12, "gtol": 1e-8}).x
     bias = best[1:] - best[1:].mean() if biased else np.zeros(CLASS_COUNT)
     return Calibration(scale=float(np.exp(best[0])), bias=tuple(float(b) for b in bias))

@@ -16,7 +16,7 @@ from ._checks import CLASS_COUNT, require_finite
 
 _BRANCH = 32
 _HEAD = 48
-_DROPOUT = 0.1
+_DROPOUT = 0.2
 _CLIP = 8.0  # standard deviations; beyond them an input says no more than "very much"
 _CHUNK = 1024
 

@@ -66,7 +66,7 @@ def export_network(net: "EvidenceNet", input_shapes: Mapping[str, tuple[int, ...
         raise ValueError(f"input_shapes is {dict(input_shapes)}; the network was made for {net.input_shapes}")
     batch = torch.export.Dim("batch")
     example = tuple(torch.zeros(2, *shape) for shape in net.input_shapes.values())
-    with _quiet_exporter():
+    with _quiet_converters():
         program = torch.onnx.export(
             net.eval(),
             example,
@@ -114,12 +114,13 @@ def export_tabular(
     if model.n_features_in_ != n_features:
         raise ValueError(f"n_features is {n_features}; the model was fitted on {model.n_features_in_}")
     last = model.steps[-1][1] if hasattr(model, "steps") else model
-    proto = convert_sklearn(
-        model,
-        initial_types=[(input_name, FloatTensorType([None, n_features]))],
-        options={id(last): {"zipmap": False, "raw_scores": True}},
-        target_opset={"": _OPSET, "ai.onnx.ml": _ML_OPSET},
-    )
+    with _quiet_converters():
+        proto = convert_sklearn(
+            model,
+            initial_types=[(input_name, FloatTensorType([None, n_features]))],
+            options={id(last): {"zipmap": False, "raw_scores": True}},
+            target_opset={"": _OPSET, "ai.onnx.ml": _ML_OPSET},
+        )
     _rename(proto.graph, proto.graph.output[1].name, "scores")
     for node in proto.graph.node:
         _drop_unused_tree_attributes(node)
@@ -253,8 +254,8 @@ def _require_free_batch(graph: onnx.GraphProto, input_shapes: Mapping[str, tuple
 
 
 @contextmanager
-def _quiet_exporter() -> Iterator[None]:
-    """Hold back what torch says about its own parts (no torchvision, deprecated calls) while it exports."""
+def _quiet_converters() -> Iterator[None]:
+    """Hold back what converters say of themselves: no torchvision, deprecated calls into each other."""
     logger = logging.getLogger("torch.onnx")
     level = logger.level
     logger.setLevel(logging.ERROR)

@@ -1,7 +1,8 @@
 """The seal of a model file: a SHA-256 inside the file that shows any later change of a byte.
 
 The digest stands in the ONNX metadata under `SEAL_KEY`. It is taken over the whole file with its own 64 characters set
-to "0", so sealing changes neither the length nor anything else. It proves that a file is as it was written, not who wrote it.
+to "0", so sealing changes neither the length nor anything else. It proves that a file is as it was
+written, not who wrote it.
 """
 
 import hashlib

@@ -119,6 +119,7 @@ def train_boosted(
             progress(done, iterations)
         if done < target:
             break
+    _round_thresholds(model)
     return model
 
 
@@ -144,6 +145,18 @@ def tabular_scores(model: "Pipeline | HistGradientBoostingClassifier", x: NDArra
     """
     require_vectors(x, "x")
     return np.asarray(model.decision_function(x), dtype=np.float64)
+
+
+def _round_thresholds(model: "HistGradientBoostingClassifier") -> None:
+    """Round every threshold down to float32, so that the exported trees, which hold float32, send no record elsewhere.
+
+    No answer changes: a float32 x is at most t exactly where it is at most the greatest float32 not above t.
+    """
+    for trees in model._predictors:
+        for tree in trees:
+            exact = tree.nodes["num_threshold"]
+            near = exact.astype(np.float32)
+            tree.nodes["num_threshold"] = np.where(near > exact, np.nextafter(near, np.float32(-np.inf)), near)
 
 
 def _require_training_set(x: NDArray[np.float32], y: NDArray[np.integer]) -> None:

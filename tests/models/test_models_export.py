@@ -1,0 +1,157 @@
+"""Export: the ONNX model says what the original says, at every batch size, and needs nothing beside itself."""
+
+from pathlib import Path
+
+import bladewing.models.export as export_module
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+from bladewing.models.calibration import Calibration
+from bladewing.models.cnn import ImageNet, SpectrumNet
+from bladewing.models.export import (
+    NETWORK_TOLERANCE,
+    TABULAR_TOLERANCE,
+    attach_metadata,
+    check_export,
+    export_network,
+    export_tabular,
+)
+from bladewing.models.seal import seal, verify
+from bladewing.models.tabular import tabular_scores, train_boosted, train_linear
+from bladewing.models.training import network_scores, train_network
+from onnx import helper
+
+CALIBRATION = Calibration(0.7, (0.3, -0.5, 0.2))
+FEATURES = 6
+KINDS = ("features-linear", "features-boosted", "spectrum-cnn", "image-cnn")
+
+
+def _tabular(train, name):
+    rng = np.random.default_rng(0)
+    y = rng.integers(0, 3, 800)
+    x = (rng.normal(size=(800, FEATURES)) + np.eye(FEATURES)[y]).astype(np.float32)
+    model = train(x, y, seed=0)
+    onnx_bytes = export_tabular(model, FEATURES, name, CALIBRATION)
+    return onnx_bytes, {name: x}, tabular_scores(model, x), TABULAR_TOLERANCE
+
+
+def _network(net):
+    rng = np.random.default_rng(0)
+    y = np.arange(130) % 3
+    # far from standard, so that a forgotten buffer shows
+    inputs = {name: (5 + 20 * rng.random((130, *shape))).astype(np.float32) for name, shape in net.input_shapes.items()}
+    train_network(net, inputs, y, (inputs, y), seed=0, epochs=1, batch=64)
+    onnx_bytes = export_network(net, dict(net.input_shapes), CALIBRATION)
+    return onnx_bytes, inputs, network_scores(net, inputs), NETWORK_TOLERANCE
+
+
+@pytest.fixture(scope="module")
+def exported():
+    return {
+        "features-linear": _tabular(train_linear, "features"),
+        "features-boosted": _tabular(train_boosted, "joint_features"),
+        "spectrum-cnn": _network(SpectrumNet((3, 64), FEATURES, seed=0)),
+        "image-cnn": _network(ImageNet((1, 32, 16), FEATURES, seed=0)),
+    }
+
+
+def _session(onnx_bytes):
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    return onnxruntime.InferenceSession(onnx_bytes, options)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_scores_and_probabilities_are_those_of_the_original_at_every_batch_size(exported, kind):
+    onnx_bytes, inputs, scores, tolerance = exported[kind]
+    session = _session(onnx_bytes)
+    expected = CALIBRATION.probabilities(scores)
+    assert expected.std() > 0.001  # the model tells records apart, so agreement says something
+    for batch in (1, 2, 7, 64):
+        found = session.run(["scores", "probabilities"], {name: values[:batch] for name, values in inputs.items()})
+        assert found[0] == pytest.approx(scores[:batch], abs=1e-3, rel=1e-4)
+        assert np.abs(found[1] - expected[:batch]).max() <= tolerance
+        assert found[1].dtype == np.float32
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_check_accepts_the_original_and_refuses_another(exported, kind):
+    onnx_bytes, inputs, scores, tolerance = exported[kind]
+    expected = CALIBRATION.probabilities(scores)
+    assert check_export(onnx_bytes, expected, inputs, tolerance) <= tolerance
+    for place in (0, -1):
+        wrong = expected.copy()
+        wrong[place, 0] += 2 * tolerance
+        with pytest.raises(ValueError, match="differs from the original by"):
+            check_export(onnx_bytes, wrong, inputs, tolerance)
+    with pytest.raises(ValueError, match="differs from the original by nan"):
+        check_export(onnx_bytes, expected * np.nan, inputs, tolerance)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_only_the_batch_is_free(exported, kind):
+    onnx_bytes, inputs, _, _ = exported[kind]
+    session = _session(onnx_bytes)
+    found = {node.name: (node.type, node.shape) for node in session.get_inputs()}
+    assert found == {name: ("tensor(float)", ["batch", *values.shape[1:]]) for name, values in inputs.items()}
+    outputs = {node.name: node.shape for node in session.get_outputs()}
+    assert outputs == {"scores": ["batch", 3], "probabilities": ["batch", 3]}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_of_the_machine_stays_in_the_model(exported, kind):
+    onnx_bytes = exported[kind][0]
+    for trace in (str(Path(onnx.__file__).parents[1]), str(Path(__file__).parents[2]), ".py", "pkg.torch"):
+        assert trace.encode() not in onnx_bytes
+    model = onnx.load_model_from_string(onnx_bytes)
+    assert not any(tensor.external_data for tensor in model.graph.initializer)
+    assert model.ir_version <= 10
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_sealed_model_still_answers(exported, kind):
+    onnx_bytes, inputs, scores, tolerance = exported[kind]
+    sealed = seal(attach_metadata(onnx_bytes, {"name": kind}))
+    verify(sealed)
+    check_export(sealed, CALIBRATION.probabilities(scores), inputs, tolerance)
+
+
+def test_trees_agree_on_neighbouring_float32_values():
+    """Thresholds lie between neighbours, where rounding one of them up would send a record the other way."""
+    rng = np.random.default_rng(0)
+    steps = rng.integers(0, 60, (2000, 2))
+    x = (np.float32(1) + steps * np.finfo(np.float32).eps).astype(np.float32)
+    y = np.digitize(steps[:, 0] + 0.1 * steps[:, 1], [20, 40])
+    model = train_boosted(x, y, seed=0, iterations=10)
+    onnx_bytes = export_tabular(model, 2, "features", CALIBRATION)
+    check_export(onnx_bytes, CALIBRATION.probabilities(tabular_scores(model, x)), {"features": x}, TABULAR_TOLERANCE)
+
+
+def test_a_full_ensemble_stays_under_300_kb_and_a_network_under_200():
+    rng = np.random.default_rng(0)
+    x = rng.normal(size=(4000, 8)).astype(np.float32)
+    y = np.digitize(np.sin(3 * x[:, 0]) + x[:, 1] * x[:, 2], [-0.4, 0.4])
+    model = train_boosted(x, y, seed=0)
+    assert model.n_iter_ > 60
+    assert len(export_tabular(model, 8, "features", CALIBRATION)) < 300_000
+    for net in (SpectrumNet((3, 256), 60, seed=0), ImageNet((1, 64, 32), 60, seed=0)):
+        assert sum(p.numel() for p in net.parameters()) * 4 < 180_000
+
+
+def test_wrong_shapes_are_refused():
+    net = SpectrumNet((3, 64), FEATURES, seed=0)
+    with pytest.raises(ValueError, match="the network was made for"):
+        export_network(net, {"spectrum": (3, 128), "features": (FEATURES,)}, CALIBRATION)
+    x = np.random.default_rng(0).normal(size=(60, 2)).astype(np.float32)
+    model = train_linear(x, np.arange(60) % 3, seed=0)
+    with pytest.raises(ValueError, match="n_features is 3; the model was fitted on 2"):
+        export_tabular(model, 3, "features", CALIBRATION)
+
+
+@pytest.mark.parametrize("dims", [(2, 4), ("batch", "other"), ("batch", 5)])
+def test_a_converter_that_frees_or_fixes_the_wrong_axis_is_caught(dims):
+    value = helper.make_tensor_value_info("features", onnx.TensorProto.FLOAT, dims)
+    graph = helper.make_graph([], "g", [value], [])
+    with pytest.raises(ValueError, match="only the batch free"):
+        export_module._require_free_batch(graph, {"features": (4,)})

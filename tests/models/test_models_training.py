@@ -1,0 +1,249 @@
+"""Training: reproducible, keeps its best state, learns what can be learnt, standardises its inputs."""
+
+import numpy as np
+import pytest
+import torch
+from bladewing.models.augment import VelocityMirror
+from bladewing.models.cnn import ImageNet, SpectrumNet, Standardise
+from bladewing.models.tabular import tabular_scores, train_boosted, train_linear
+from bladewing.models.training import network_scores, train_network
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+BINS, FEATURES = 32, 4
+
+
+def _spectra(count, seed):
+    """Classes that differ in shape alone: many lines, one line, none; anywhere on the axis. The features are noise."""
+    rng = np.random.default_rng(seed)
+    y = rng.integers(0, 3, count)
+    spectrum = rng.normal(size=(count, 2, BINS))
+    for row, label in enumerate(y):
+        shift = rng.integers(BINS)
+        spectrum[row, :, (shift + np.arange(0, BINS, (4, BINS)[label])) % BINS if label < 2 else []] += 5
+    features = rng.normal(size=(count, FEATURES)).astype(np.float32)
+    return {"spectrum": spectrum.astype(np.float32), "features": features}, y
+
+
+def _images(count, seed):
+    """Classes that differ in the direction of their stripes: along one axis, along the other, none."""
+    rng = np.random.default_rng(seed)
+    y = rng.integers(0, 3, count)
+    image = rng.normal(size=(count, 1, 16, 16))
+    for row, label in enumerate(y):
+        if label < 2:
+            np.moveaxis(image[row, 0], label, 0)[rng.integers(4) :: 4] += 2
+    return {"image": image.astype(np.float32), "joint_features": np.zeros((count, FEATURES), np.float32)}, y
+
+
+def _trained(seed=0, epochs=2, **options):
+    inputs, y = _spectra(300, 1)
+    net = SpectrumNet((2, BINS), FEATURES, seed=seed)
+    result = train_network(net, inputs, y, _spectra(100, 2), seed=seed, epochs=epochs, batch=64, **options)
+    return net, result
+
+
+@pytest.mark.parametrize(
+    ("draw", "make"),
+    [
+        (_spectra, lambda: SpectrumNet((2, BINS), FEATURES, seed=0)),
+        (_images, lambda: ImageNet((1, 16, 16), FEATURES, seed=0)),
+    ],
+)
+def test_a_net_learns_what_its_signal_tells(draw, make):
+    net = make()
+    inputs, y = draw(600, 1)
+    train_network(net, inputs, y, draw(200, 2), seed=0, epochs=8, batch=64)
+    fresh, truth = draw(300, 3)
+    accuracy = (network_scores(net, fresh).argmax(axis=1) == truth).mean()
+    assert accuracy > 0.9  # chance is 0.33 with a spread of 0.03
+
+
+def test_a_net_learns_what_its_measurements_tell():
+    rng = np.random.default_rng(0)
+    y = rng.integers(0, 3, 600)
+    inputs = {
+        "spectrum": rng.normal(size=(600, 2, BINS)).astype(np.float32),
+        "features": (rng.normal(size=(600, FEATURES)) + 4 * np.eye(FEATURES)[y]).astype(np.float32),
+    }
+    net = SpectrumNet((2, BINS), FEATURES, seed=0)
+    train_network(net, inputs, y, (inputs, y), seed=0, epochs=4, batch=64)
+    assert (network_scores(net, inputs).argmax(axis=1) == y).mean() > 0.9
+
+
+def test_training_is_the_same_to_the_bit_for_a_seed_and_differs_for_another():
+    mirror = VelocityMirror(axes={"spectrum": 2}, odd={"features": [0]})
+    torch.manual_seed(1)
+    first, once = _trained(seed=5, augment=mirror)
+    torch.manual_seed(2)
+    state = torch.random.get_rng_state()
+    second, twice = _trained(seed=5, augment=mirror)
+    assert torch.equal(torch.random.get_rng_state(), state)  # the caller's generator is left alone
+    other, _ = _trained(seed=6, augment=mirror)
+    assert [e["validation_loss"] for e in once.epochs] == [e["validation_loss"] for e in twice.epochs]
+    for name, values in first.state_dict().items():
+        assert torch.equal(values, second.state_dict()[name]), name
+    assert not torch.equal(first.head[0].weight, other.head[0].weight)
+
+
+def test_the_best_state_is_kept_when_the_last_epochs_are_ruined():
+    seen = []
+
+    def ruin(epoch, epochs, metrics):
+        seen.append((epoch, epochs))
+        if epoch == 2:
+            with torch.no_grad():
+                for parameter in net.parameters():
+                    parameter.add_(50 * torch.randn(parameter.shape, generator=torch.Generator().manual_seed(0)))
+
+    net = SpectrumNet((2, BINS), FEATURES, seed=0)
+    inputs, y = _spectra(300, 1)
+    validation = _spectra(100, 2)
+    result = train_network(net, inputs, y, validation, seed=0, epochs=4, batch=64, on_epoch=ruin)
+    assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert result.best_epoch <= 2
+    losses = [epoch["validation_loss"] for epoch in result.epochs]
+    assert max(losses[2:]) > 2 * min(losses)
+    kept = torch.nn.functional.cross_entropy(
+        torch.from_numpy(network_scores(net, validation[0])), torch.from_numpy(validation[1])
+    )
+    assert float(kept) == min(losses)
+    assert not net.training
+
+
+def test_a_training_that_never_gives_a_number_says_so():
+    net = SpectrumNet((2, BINS), FEATURES, seed=0)
+    inputs, y = _spectra(64, 1)
+    with pytest.raises(FloatingPointError, match="learning_rate inf is too high"):
+        train_network(net, inputs, y, _spectra(64, 2), seed=0, epochs=1, batch=32, learning_rate=float("inf"))
+
+
+def test_half_precision_in_memory_gives_what_its_values_give_in_full():
+    inputs, y = _spectra(128, 1)
+    half = {name: values.astype(np.float16) for name, values in inputs.items()}
+    full = {name: values.astype(np.float32) for name, values in half.items()}
+    states = []
+    for given_inputs in (half, full):
+        net = SpectrumNet((2, BINS), FEATURES, seed=0)
+        train_network(net, given_inputs, y, (given_inputs, y), seed=0, epochs=1, batch=32)
+        states.append(network_scores(net, given_inputs))
+    assert np.array_equal(*states)
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    scale=st.lists(st.floats(0.01, 100), min_size=2, max_size=2),
+    shift=st.lists(st.floats(-10, 10), min_size=2, max_size=2),
+)
+def test_scaled_inputs_measured_anew_give_the_same_scores(scale, shift):
+    inputs, _ = _spectra(64, 1)
+    net = SpectrumNet((2, BINS), FEATURES, seed=0)
+    net.measure(inputs)
+    scores = network_scores(net, inputs)
+    column = np.array([scale]).T
+    moved = {
+        "spectrum": (inputs["spectrum"] * column + column * np.array([shift]).T).astype(np.float32),
+        "features": inputs["features"] * np.float32(scale[0]),
+    }
+    if not np.allclose(scale, 1, atol=0.2):
+        assert np.abs(network_scores(net, moved) - scores).max() > 1e-3  # the old buffers are the wrong ones
+    net.measure(moved)
+    assert network_scores(net, moved) == pytest.approx(scores, abs=1e-4)
+
+
+@settings(deadline=None)
+@given(level=st.floats(-1000, 1000, width=32), count=st.integers(1, 3000))
+def test_a_constant_input_is_only_centred(level, count):
+    layer = Standardise(2, 0)
+    values = np.stack([np.full(count, level), np.arange(count) % 2], axis=1).astype(np.float32)
+    layer.measure(values)
+    result = layer(torch.from_numpy(values))
+    assert torch.isfinite(result).all()
+    assert result[:, 0].abs().max() < 1e-3
+
+
+def test_an_outlier_is_clipped_to_very_much():
+    layer = Standardise(1, 0)
+    layer.measure(np.array([[-1.0], [1.0]], np.float32))
+    assert layer(torch.tensor([[3.0], [1e30]])).tolist() == [[3.0], [8.0]]
+
+
+@pytest.mark.parametrize("train", [train_linear, train_boosted])
+def test_tabular_models_learn_and_repeat_themselves(train):
+    rng = np.random.default_rng(0)
+    y = rng.integers(0, 3, 900)
+    x = (rng.normal(size=(900, 5)) + 2 * np.eye(5)[y]).astype(np.float32)
+    x[:, 4] = 7  # a constant column
+    calls = []
+    model = train(x[:600], y[:600], seed=3, progress=lambda done, most: calls.append((done, most)))
+    scores = tabular_scores(model, x[600:])
+    assert np.isfinite(scores).all()
+    assert (scores.argmax(axis=1) == y[600:]).mean() > 0.8
+    assert np.array_equal(scores, tabular_scores(train(x[:600], y[:600], seed=3), x[600:]))
+    assert calls
+    assert calls[-1][0] <= calls[-1][1]
+
+
+def test_boosting_stops_early_where_there_is_nothing_to_learn_and_uses_all_trees_where_there_is():
+    rng = np.random.default_rng(0)
+    x = rng.normal(size=(600, 3)).astype(np.float32)
+    noise = train_boosted(x, rng.integers(0, 3, 600), seed=0)
+    assert noise.n_iter_ < 40
+    told = train_boosted(x, np.digitize(x[:, 0] + 0.5 * x[:, 1], [-0.5, 0.5]), seed=0, iterations=25)
+    assert told.n_iter_ == 25
+
+
+def test_the_mirror_turns_some_records_whole_and_leaves_the_others():
+    batch = {
+        "spectrum": torch.arange(400.0 * 2 * 6).reshape(400, 2, 6) + 1,
+        "features": torch.arange(400.0 * 3).reshape(400, 3) + 1,
+    }
+    mirror = VelocityMirror(axes={"spectrum": 2}, odd={"features": [1]})
+    result = mirror(batch, torch.Generator().manual_seed(0))
+    turned = result["features"][:, 1] < 0
+    assert 140 < int(turned.sum()) < 260  # six standard deviations of 200 +- 10
+    assert torch.equal(result["spectrum"][turned], batch["spectrum"][turned].flip(2))
+    assert torch.equal(result["spectrum"][~turned], batch["spectrum"][~turned])
+    assert torch.equal(result["features"].abs(), batch["features"])
+    assert torch.equal(result["features"][:, [0, 2]], batch["features"][:, [0, 2]])
+
+
+def _refuse_network(change):
+    inputs, y = _spectra(60, 1)
+    arguments = {"inputs": inputs, "y": y, "validation": (dict(inputs), y), "seed": 0, "epochs": 1} | change(inputs, y)
+    train_network(SpectrumNet((2, BINS), FEATURES, seed=0), **arguments)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda x, y: {"inputs": {"spectrum": x["spectrum"]}}, "input 'features' is missing"),
+        (lambda x, y: {"inputs": x | {"features": x["features"][:, 1:]}}, r"has shape \(60, 3\); it must be \(n, 4,"),
+        (lambda x, y: {"inputs": x | {"features": x["features"][1:]}}, r"\[59, 60\] records"),
+        (lambda x, y: {"inputs": x | {"features": x["features"] * np.float32("nan")}}, r"'features'\[0, 0\] is nan"),
+        (lambda x, y: {"y": y[1:]}, r"y has shape \(59,\)"),
+        (lambda x, y: {"y": y % 2}, "each needs 2"),
+        (lambda x, y: {"validation": (x, y + 1)}, "validation labels holds the label 3"),
+        (lambda x, y: {"epochs": 0}, "epochs is 0"),
+    ],
+)
+def test_bad_input_of_a_network_is_named(change, message):
+    with pytest.raises(ValueError, match=message):
+        _refuse_network(change)
+
+
+@pytest.mark.parametrize("train", [train_linear, train_boosted])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda x, y: (x[0], y), r"x has shape \(2,\)"),
+        (lambda x, y: (x.astype(float), y), "x is float64; it must be float32"),
+        (lambda x, y: (np.where(x == x[3, 1], np.float32("inf"), x), y), r"x\[3, 1\] is inf"),
+        (lambda x, y: (x, y[:-1]), r"y has shape \(59,\)"),
+        (lambda x, y: (x, y % 2), "each needs 2"),
+    ],
+)
+def test_bad_input_of_a_tabular_model_is_named(train, change, message):
+    x = np.random.default_rng(0).normal(size=(60, 2)).astype(np.float32)
+    with pytest.raises(ValueError, match=message):
+        train(*change(x, np.arange(60) % 3), seed=0)
