@@ -78,7 +78,7 @@ def predict(
             result.print(Console(highlight=False))
         sys.stdout.flush()
     if not as_json and said.total() + unreadable > 1:
-        print(work.summary(said, unreadable))
+        print(work.summary(said, unreadable), flush=True)
     if unreadable:
         raise typer.Exit(2)
 
@@ -132,22 +132,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None and not sys.warnoptions:
         warnings.simplefilter("ignore")  # a library's warning is for developers, unless one asks for it with -W
     try:
-        code = _run(arguments)
-        sys.stdout.flush()
-    except BrokenPipeError:  # such as `bladewing predict ... | head`: no more is wanted
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
-    return code
-
-
-def _run(arguments: Sequence[str] | None) -> int:
-    try:
         code = typer.main.get_command(app).main(arguments, prog_name="bladewing", standalone_mode=False)
-        if code == 130:
-            _complain("interrupted", kind="stopped")
+        if code == 130:  # how typer tells of an interrupt
+            raise KeyboardInterrupt
         return code if isinstance(code, int) else 0
-    except BrokenPipeError:
-        raise
     except (KeyboardInterrupt, typer.Abort):
         _complain("interrupted", kind="stopped")
         return 130

@@ -96,7 +96,7 @@ class Answer:
         line.append(f"  {shares}  from {self.track.used} of {len(self.dwells.labels)} dwells")
         if self.track.reason:
             line.append(f"  ({self.track.reason})")
-        console.print(line, soft_wrap=True)
+        console.print(line)
 
 
 def distinct(paths: Iterable[Path]) -> Iterator[Path]:

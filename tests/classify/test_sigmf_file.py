@@ -191,6 +191,15 @@ def test_archives_are_read_like_pairs(sigmf_pair, tmp_path, suffix):
         load_recording(archive)
 
 
+def test_an_undeclared_namespace_in_an_archive_is_no_ones_trouble(sigmf_pair, tmp_path):
+    meta = sigmf_pair()  # the library warns of it, and a warning is an error here
+    meta.write_text(meta.read_text().replace('"core:version"', '"mine:note": "x", "core:version"'))
+    with tarfile.open(tmp_path / "packed.sigmf", "w") as archive:
+        for path in (meta, meta.with_suffix(".sigmf-data")):
+            archive.add(path, f"rec/{path.name}")
+    assert load_recording(tmp_path / "packed.sigmf").iq.size == 4000
+
+
 def test_archives_obey_the_same_rules(sigmf_pair, tmp_path):
     meta = sigmf_pair(datatype="rf32_le")
     with tarfile.open(tmp_path / "packed.sigmf", "w") as archive:

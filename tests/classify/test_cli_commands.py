@@ -1,0 +1,87 @@
+"""`bladewing train` and `bladewing report` hand their options on; help and usage errors of the whole command line."""
+
+import sys
+import types
+from pathlib import Path
+
+import pytest
+from bladewing.classify.cli import main
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """Stand in for the work of both commands; gives what they were called with."""
+    seen: list[tuple[object, dict[str, object]]] = []
+    for name, function in (("train", "run_training"), ("report", "run_report")):
+        module = types.ModuleType(f"bladewing.classify.{name}")
+        setattr(module, function, lambda out, **options: seen.append((out, options)))
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+    return seen
+
+
+def test_train_hands_its_options_on(calls):
+    assert main(["train"]) == 0
+    assert main(["train", "--out", "m", "--config", "c.toml", "--records", "50", "--seed", "7", "--quick"]) == 0
+    assert calls == [
+        (Path("out"), {"records": None, "seed": 0, "quick": False, "config": None, "progress": True}),
+        (Path("m"), {"records": 50, "seed": 7, "quick": True, "config": Path("c.toml"), "progress": True}),
+    ]
+
+
+def test_report_hands_its_options_on(calls):
+    assert main(["report"]) == 0
+    assert main(["report", "--out", "r", "--models", "m", "--seed", "3", "--quick"]) == 0
+    assert calls == [
+        (Path("out"), {"models": None, "quick": False, "seed": 0, "progress": True}),
+        (Path("r"), {"models": Path("m"), "quick": True, "seed": 3, "progress": True}),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "Missing command"),
+        (["tain"], "No such command 'tain'"),
+        (["train", "--records", "0"], "--records"),
+        (["train", "--records", "many"], "--records"),
+        (["train", "--seed", "-1"], "--seed"),
+        (["report", "--seed", "1.5"], "--seed"),
+        (["train", "extra"], "extra"),
+    ],
+)
+def test_usage_errors_are_one_line(calls, capsys, arguments, said):
+    assert main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("bladewing: error: ")
+    assert err.count("\n") == 1
+    assert said in err
+    assert "--help)" in err
+    assert calls == []
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["predict", "--help"], ["train", "--help"], ["report", "--help"]])
+def test_help_goes_to_stdout(capsys, arguments):
+    assert main(arguments) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("Usage: bladewing")
+    assert err == ""
+
+
+def test_help_shows_units(capsys):
+    main(["predict", "--help"])
+    assert "[s]" in capsys.readouterr().out
+
+
+def test_a_missing_training_library_is_said_with_the_cure(monkeypatch, capsys):
+    module = types.ModuleType("bladewing.classify.train")
+
+    def needs_torch(*_, **__):
+        raise ModuleNotFoundError("No module named 'torch'", name="torch")
+
+    module.run_training = needs_torch  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    assert main(["train"]) == 2
+    assert capsys.readouterr().err == (
+        "bladewing: error: torch is not installed, this command needs it: pip install 'bladewing[train]'\n"
+    )

@@ -1,0 +1,323 @@
+"""`bladewing predict`, through `main` in this process and a few times as a user runs it."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bladewing.classify import predict as work
+from bladewing.classify.cli import main
+
+PRF_HZ = 20e3
+NAMES = ["uav", "bird", "clutter"]
+
+
+def noise(pulses: int) -> np.ndarray:
+    return np.random.default_rng(0).normal(size=2 * pulses).astype(np.float32).view(np.complex64)
+
+
+@pytest.fixture
+def run(uav_model, capsys, monkeypatch):
+    """Run predict with a model that always answers uav 0.8; gives the exit code, stdout and stderr."""
+    monkeypatch.setenv("COLUMNS", "80")
+
+    def predict(*arguments: object, model: object = uav_model) -> tuple[int, str, str]:
+        code = main(["predict", "--model", str(model), *map(str, arguments)])
+        return code, *capsys.readouterr()
+
+    return predict
+
+
+@pytest.fixture
+def run_json(run):
+    def predict(*arguments: object, **options: object) -> list[dict]:
+        code, out, err = run("--json", *arguments, **options)
+        assert (code, err) == (0, "")
+
+        def no_constant(name):
+            raise AssertionError(f"{name} is not JSON")
+
+        return [json.loads(line, parse_constant=no_constant) for line in out.splitlines()]
+
+    return predict
+
+
+def refused(result, said: str) -> None:
+    """Exit code 2, one line on stderr, nothing on stdout."""
+    code, out, err = result
+    assert said in err
+    assert err.startswith("bladewing: error: ")
+    assert err.count("\n") == 1
+    assert err.endswith("\n")
+    assert (code, out) == (2, "")
+
+
+def test_one_line_a_dwell_and_a_closing_line(run_json, sigmf_pair):
+    meta = sigmf_pair()  # 4000 pulses at 20 kHz: 0.2 s, two dwells of 0.08 s and a rest that is dropped
+    first, second, closing = run_json(meta)
+    said = {"file": str(meta), "label": "uav", "probabilities": {"uav": 0.8, "bird": 0.15, "clutter": 0.05}}
+    assert first == said | {"start_s": 0.0, "stop_s": 0.08, "reason": None}
+    assert second == said | {"start_s": 0.08, "stop_s": 0.16, "reason": None}
+    assert list(first) == ["file", "start_s", "stop_s", "label", "probabilities", "reason"]
+    assert list(closing) == ["file", "track"]
+    assert list(closing["track"]) == ["label", "probabilities", "dwells"]
+    assert (closing["track"]["label"], closing["track"]["dwells"]) == ("uav", 2)
+    assert list(closing["track"]["probabilities"]) == NAMES
+    assert closing["track"]["probabilities"]["uav"] > 0.8  # two dwells that agree
+
+
+@pytest.mark.parametrize(
+    ("dwell_s", "ends"),
+    [
+        (0.05, [0.05, 0.1, 0.15, 0.2]),
+        (0.2, [0.2]),
+        (0.11, [0.11]),
+        (5.0, [0.2]),  # shorter than one dwell: taken whole
+        (1e300, [0.2]),
+        (0.066674, [0.06665, 0.1333, 0.19995]),  # whole pulses: round(dwell x PRF) = 1333
+    ],
+)
+def test_dwells_follow_one_another(run_json, sigmf_pair, dwell_s, ends):
+    *dwells, closing = run_json(sigmf_pair(), "--dwell", dwell_s)
+    assert [line["stop_s"] for line in dwells] == ends
+    assert [line["start_s"] for line in dwells] == [0.0, *ends[:-1]]
+    assert closing["track"]["dwells"] == len(ends)
+
+
+def test_times_go_on_where_the_recording_begins(run_json, sigmf_pair):
+    captures = [{"core:sample_start": 20_000, "core:frequency": 10e9}]
+    first, *_ = run_json(sigmf_pair(captures=captures, offset=20_000))
+    assert (first["start_s"], first["stop_s"]) == (1.0, 1.08)
+
+
+def test_outside_the_envelope_is_answered_unknown_with_the_cure(run_json, sigmf_pair):
+    *dwells, closing = run_json(sigmf_pair(sample_rate=1000.0), "--dwell", 1)
+    assert {line["label"] for line in dwells} == {"unknown"}
+    assert {line["reason"] for line in dwells} == {
+        "unambiguous velocity 7.5 m/s is below 10 m/s (wavelength x PRF / 4): raise the PRF to 1335 Hz or more"
+    }
+    assert dwells[0]["probabilities"] == dict.fromkeys(NAMES, 0.333333)
+    assert closing["track"] == {"label": "unknown", "probabilities": dict.fromkeys(NAMES, 0.333333), "dwells": 4}
+
+
+def test_a_dwell_too_short_is_unknown(run_json, sigmf_pair):
+    first, *_ = run_json(sigmf_pair(), "--dwell", 0.001)
+    assert first["reason"].startswith("20 pulses are fewer than 64: take 100 pulses, 0.005 s, or more")
+
+
+def test_a_silent_dwell_is_unknown_and_left_out_of_the_track(run_json, sigmf_pair):
+    iq = noise(3200)
+    iq[:1600] = 0
+    silent, heard, closing = run_json(sigmf_pair(iq=iq))
+    assert (silent["label"], silent["reason"]) == ("unknown", "no signal: every sample is 0")
+    assert closing["track"] == {"label": "uav", "probabilities": heard["probabilities"], "dwells": 2}
+
+
+def test_both_files_of_a_recording_are_answered_once(run_json, sigmf_pair):
+    meta = sigmf_pair("my rec 3.30GHz")
+    data, stem = meta.with_suffix(".sigmf-data"), meta.with_suffix("")
+    lines = run_json(data, meta, stem, meta.parent / "." / meta.name)
+    assert [line["file"] for line in lines] == [str(data)] * 3
+
+
+def test_arrays_take_the_radar_from_the_options(run_json, tmp_path):
+    np.save(tmp_path / "iq.npy", noise(1600).reshape(-1, 1))
+    np.savez(tmp_path / "two.npz", a=noise(1600), b=noise(3200))
+    radar = ("--carrier-hz", 10e9, "--prf-hz", PRF_HZ)
+    assert len(run_json(tmp_path / "iq.npy", *radar)) == 2
+    assert len(run_json(tmp_path / "two.npz", *radar, "--variable", "b")) == 3
+
+
+def test_good_recordings_are_answered_beside_a_bad_one(run, sigmf_pair, tmp_path):
+    good, bad = sigmf_pair("good"), sigmf_pair("bad", datatype="rf32_le")
+    code, out, err = run("--json", tmp_path / "gone.npy", bad, good)
+    assert code == 2
+    assert {json.loads(line)["file"] for line in out.splitlines()} == {str(good)}
+    first, second = err.splitlines()
+    assert first.startswith(f"bladewing: error: {tmp_path / 'gone.npy'}: no such file")
+    assert second.startswith(f"bladewing: error: {bad}: real samples")
+
+
+def test_people_get_a_table_that_fits_80_columns(run, sigmf_pair):
+    code, out, err = run(sigmf_pair("one"), sigmf_pair("two", sample_rate=1000.0), "--dwell", 1)
+    assert (code, err) == (0, "")
+    lines = [line.rstrip() for line in out.splitlines()]
+    table = [line for line in lines if ".sigmf-" not in line]  # a path is as long as it is
+    assert max(map(len, table)) <= 80
+    assert lines[0].endswith("one.sigmf-meta")
+    assert lines[1].split() == ["start", "s", "stop", "s", "label", *NAMES, "reason"]
+    assert lines[2].split() == ["0.000", "0.200", "uav", "0.80", "0.15", "0.05"]
+    assert lines[3] == "track: uav  uav 0.80  bird 0.15  clutter 0.05  from 1 of 1 dwells"
+    text = " ".join(out.split())
+    assert "unambiguous velocity 7.5 m/s is below 10 m/s" in text
+    assert text.count("as above") == 3  # four dwells, one reason
+    assert "from 0 of 4 dwells (no dwell could be judged)" in text
+    assert lines[-1] == "2 recordings: 1 uav, 1 unknown"
+
+
+def test_the_summary_counts_the_unreadable(run, sigmf_pair, tmp_path):
+    code, out, _ = run(sigmf_pair(), tmp_path / "gone")
+    assert code == 2
+    assert out.splitlines()[-1] == "2 recordings: 1 uav, 1 unreadable"
+
+
+def test_names_are_never_taken_for_markup_or_escape_codes(run, sigmf_pair):
+    code, out, err = run(sigmf_pair("[bold]x\x1b[31m"))
+    assert (code, err) == (0, "")
+    assert r"[bold]x\x1b[31m.sigmf-meta" in out.splitlines()[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("{rec}", "--dwell", "0"), "--dwell [s] is 0: it must be a finite number above 0"),
+        (("{rec}", "--dwell", "-0.1"), "--dwell [s] is -0.1"),
+        (("{rec}", "--dwell", "nan"), "--dwell [s] is nan"),
+        (("{rec}", "--dwell", "long"), "Invalid value for '--dwell'"),
+        (("{rec}", "--carrier-hz", "9e9"), "carrier 9000000000 Hz given, but the file says 10000000000 Hz"),
+        (("{rec}", "--carrier-hz", "0"), "carrier given is 0"),
+        (("{rec}", "--prf-hz", "x"), "Invalid value for '--prf-hz'"),
+        (("{rec}", "--variable", "x"), "variable 'x' given"),
+        (("{rec}", "--no-such-option"), "No such option: --no-such-option"),
+        ((), "Missing argument 'RECORDING'"),
+        (("{folder}",), "is a directory: name the recordings in it"),
+        (("{folder}/gone.npy",), "no such file"),
+    ],
+)
+@pytest.mark.parametrize("as_json", [(), ("--json",)])
+def test_bad_arguments(run, sigmf_pair, tmp_path, arguments, said, as_json):
+    meta = sigmf_pair()
+    refused(run(*as_json, *(text.format(rec=meta, folder=tmp_path) for text in arguments)), said)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"data": bytes(803)}, "cut short: 803 bytes"),
+        ({"data": b""}, "its data are empty"),
+        ({"sha512": "0" * 128}, "the SHA-512 of its samples is not the one in core:sha512"),
+        ({"sample_rate": None}, "give --prf-hz"),
+        ({"captures": []}, "give --carrier-hz"),
+        ({"captures": [{"core:sample_start": 0, "core:frequency": f} for f in (9e9, 10e9)]}, "2 carriers"),
+        ({"num_channels": 2}, "2 channels"),
+        ({"datatype": "ri16_le"}, "real samples"),
+        ({"iq": np.full(100, np.nan, dtype=np.complex64)}, "sample 0 is"),
+        ({"annotations": [{"core:sample_start": 0, "core:sample_count": 4001}]}, "cut short: annotations[0]"),
+    ],
+)
+def test_bad_recordings(run, sigmf_pair, change, said):
+    refused(run("--json", sigmf_pair(**change)), said)
+
+
+@pytest.mark.parametrize(
+    ("array", "said"),
+    [
+        (np.array([{}], dtype=object), "never unpickled"),
+        (np.zeros(100, dtype=[("i", "f4"), ("q", "f4")]), "structured array"),
+        (np.ones(100), "real samples"),
+        (np.ones((2, 100), dtype=complex), "shape (2, 100): a recording is one range cell, shape (pulses,)"),
+        (np.ones(0, dtype=complex), "no samples"),
+    ],
+)
+def test_bad_arrays(run, tmp_path, array, said):
+    np.save(tmp_path / "x.npy", array, allow_pickle=True)
+    refused(run("--json", tmp_path / "x.npy", "--carrier-hz", 10e9, "--prf-hz", PRF_HZ), said)
+
+
+def test_bad_models(run, sigmf_pair, tmp_path, uav_model):
+    meta = sigmf_pair()
+    refused(
+        run(meta, model="no-such-model"),
+        "no model 'no-such-model': give the path of an .onnx file or one of the shipped: ",
+    )
+    (tmp_path / "foreign.onnx").write_bytes(b"x" * 100)
+    refused(run(meta, model=tmp_path / "foreign.onnx"), "foreign.onnx: not a bladewing model")
+    content = bytearray(uav_model.read_bytes())
+    content[len(content) // 3] ^= 1
+    (tmp_path / "altered.onnx").write_bytes(content)
+    refused(run(meta, model=tmp_path / "altered.onnx"), "altered.onnx: the model was altered after it was written")
+
+
+def test_interrupted_by_the_user(run, sigmf_pair, monkeypatch):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(work, "load_recording", interrupt)
+    assert run("--json", sigmf_pair()) == (130, "", "bladewing: stopped: interrupted\n")
+
+
+def test_what_nobody_expected_is_one_line_and_exit_code_1(run, sigmf_pair, monkeypatch):
+    def fail(*_, **__):
+        raise ZeroDivisionError("two\nlines")
+
+    monkeypatch.setattr(work, "load_recording", fail)
+    code, out, err = run("--json", sigmf_pair())
+    assert (code, out) == (1, "")
+    assert (
+        err == "bladewing: error: unexpected ZeroDivisionError: two\\nlines (set BLADEWING_TRACEBACK=1 to see where)\n"
+    )
+    monkeypatch.setenv("BLADEWING_TRACEBACK", "1")
+    assert 'raise ZeroDivisionError("two\\nlines")' in run("--json", sigmf_pair())[2]
+
+
+ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+BLADEWING = [sys.executable, "-c", "import sys; from bladewing.classify.cli import main; sys.exit(main())"]
+
+
+def as_a_user(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*BLADEWING, *map(str, arguments)],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        env=ENVIRONMENT,
+    )
+
+
+def test_a_bad_recording_as_a_user_meets_it(tmp_path, sigmf_pair, uav_model):
+    folder = tmp_path / "cwd"
+    folder.mkdir()
+    cut = sigmf_pair("cut", data=bytes(803))
+    for arguments in ((cut, "--model", uav_model), (cut, "--model", "nope"), ("gone", "--model", uav_model)):
+        done = as_a_user("predict", "--json", *arguments, cwd=folder)
+        refused((done.returncode, done.stdout, done.stderr), "error")
+    assert list(folder.iterdir()) == []
+
+
+def test_warnings_of_libraries_do_not_reach_the_user(tmp_path, sigmf_pair, uav_model):
+    # an undeclared namespace and an old version make the library warn
+    meta = sigmf_pair(version="0.0.1", x=1)
+    text = meta.read_text().replace('"core:x"', '"mine:x"')
+    meta.write_text(text)
+    done = as_a_user("predict", "--json", meta, "--model", uav_model, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert len(done.stdout.splitlines()) == 3
+
+
+def test_a_closed_pipe_ends_quietly(tmp_path, sigmf_pair, uav_model):
+    meta = sigmf_pair()
+    with subprocess.Popen(
+        [*BLADEWING, "predict", "--json", str(meta), "--model", str(uav_model)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=ENVIRONMENT,
+    ) as child:
+        assert child.stdout is not None
+        assert child.stderr is not None
+        child.stdout.close()  # as `head` does
+        assert child.stderr.read() == b""
+    assert child.returncode == 1
+
+
+def test_the_measured_recordings_are_answered(run_json):
+    folder = Path(__file__).parents[2].parent / "shared" / "recordings"
+    if not folder.is_dir():
+        pytest.skip("the measured recordings are not part of the repository")
+    names = sorted(folder.glob("*.sigmf-*"))
+    lines = run_json(*names)
+    closing = [line for line in lines if "track" in line]
+    assert len(closing) == len(names) // 2
+    assert sum(line["track"]["dwells"] for line in closing) == len(lines) - len(closing)

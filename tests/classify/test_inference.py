@@ -1,0 +1,265 @@
+import json
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from bladewing.classify import BadInput, Classifier, inference
+from bladewing.classify.inference import model_names
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+RADAR = {"carrier_hz": 10e9, "prf_hz": 20e3}
+
+
+def noise(pulses: int, records: tuple[int, ...] = (), seed: int = 0) -> np.ndarray:
+    parts = np.random.default_rng(seed).normal(size=(*records, pulses, 2)).astype(np.float32)
+    return parts.view(np.complex64)[..., 0]
+
+
+@pytest.fixture(scope="module")
+def always_uav(uav_model):
+    return Classifier.load(uav_model)
+
+
+@pytest.fixture(scope="module")
+def mixed(mixed_model):
+    return Classifier.load(mixed_model)
+
+
+def test_answers_have_the_leading_axes_of_the_samples(mixed):
+    for leading in [(), (1,), (3,), (2, 3), (0,), (2, 0)]:
+        answer = mixed.predict(noise(200, leading), **RADAR)
+        assert answer.labels.shape == leading
+        assert answer.reasons.shape == leading
+        assert answer.probabilities.shape == (*leading, 3)
+        assert answer.probabilities.dtype == np.float32
+
+
+@settings(max_examples=15, deadline=None)
+@given(pulses=st.integers(100, 400), records=st.integers(1, 5), seed=st.integers(0, 99))
+def test_a_batch_gives_what_a_loop_gives(mixed, pulses, records, seed):
+    iq = noise(pulses, (records,), seed)
+    batch, loop = mixed.predict(iq, **RADAR), [mixed.predict(one, **RADAR) for one in iq]
+    np.testing.assert_allclose(batch.probabilities, [one.probabilities for one in loop], atol=1e-5)
+
+
+@pytest.mark.parametrize("limit", ["_STEP_RECORDS", "_STEP_SAMPLES"])
+def test_the_size_of_the_steps_changes_nothing(mixed, monkeypatch, limit):
+    iq = noise(200, (10,))
+    iq[4] = 0
+    whole = mixed.predict(iq, **RADAR)
+    monkeypatch.setattr(inference, limit, {"_STEP_RECORDS": 3, "_STEP_SAMPLES": 500}[limit])
+    parts = mixed.predict(iq, **RADAR)
+    np.testing.assert_allclose(parts.probabilities, whole.probabilities, atol=1e-5)
+    np.testing.assert_array_equal(parts.labels, whole.labels)
+    assert len(set(map(tuple, whole.probabilities))) == 10  # the records do differ
+
+
+def test_a_step_is_bounded_in_records_and_samples(mixed, monkeypatch):
+    sizes = []
+    real = inference.model_inputs
+
+    def spy(iq, **options):
+        sizes.append(iq.shape)
+        return real(iq, **options)
+
+    monkeypatch.setattr(inference, "model_inputs", spy)
+    mixed.predict(noise(100, (600,)), **RADAR)
+    assert [records for records, _ in sizes] == [256, 256, 88]
+    sizes.clear()
+    monkeypatch.setattr(inference, "_STEP_SAMPLES", 250)
+    mixed.predict(noise(100, (3,)), **RADAR)
+    assert [records for records, _ in sizes] == [2, 1]
+
+
+def test_threads_that_share_a_classifier_get_the_same_answers(mixed):
+    batches = [noise(200, (8,), seed) for seed in range(16)]
+    alone = [mixed.predict(iq, **RADAR).probabilities for iq in batches]
+    with ThreadPoolExecutor(4) as pool:
+        shared = list(pool.map(lambda iq: mixed.predict(iq, **RADAR).probabilities, batches))
+    np.testing.assert_array_equal(shared, alone)
+
+
+@pytest.mark.parametrize("gain", [1e-30, 1e-6, 1e6, 1e30])
+def test_the_gain_does_not_matter(mixed, gain):
+    iq = noise(300, (4,))
+    one, other = mixed.predict(iq, **RADAR), mixed.predict(iq * np.float32(gain), **RADAR)
+    np.testing.assert_allclose(one.probabilities, other.probabilities, atol=1e-3)
+
+
+def test_the_winner_is_named_with_its_probability(always_uav):
+    answer = always_uav.predict(noise(200), **RADAR)
+    assert (answer.labels, answer.reasons) == ("uav", "")
+    np.testing.assert_allclose(answer.probabilities, [0.8, 0.15, 0.05], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("probabilities", "label", "reason"),
+    [
+        ((0.48, 0.32, 0.20), "unknown", "not sure: best uav 0.48 < 0.62"),
+        ((0.63, 0.20, 0.17), "uav", ""),
+        ((0.30, 0.50, 0.20), "bird", ""),
+        ((0.30, 0.20, 0.50), "unknown", "not sure: best clutter 0.50 < 0.90"),
+    ],
+)
+def test_each_class_has_its_own_limit(make_model, probabilities, label, reason):
+    model = Classifier(make_model(bias=np.log(probabilities), accept=json.dumps([0.62, 0.45, 0.9])))
+    answer = model.predict(noise(200), **RADAR)
+    assert (answer.labels, answer.reasons) == (label, reason)
+    np.testing.assert_allclose(answer.probabilities, probabilities, rtol=1e-4)
+
+
+def test_outside_the_envelope_every_record_is_unknown_with_the_cure(always_uav):
+    answer = always_uav.predict(noise(200, (2, 3)), carrier_hz=9.39e9, prf_hz=1000.0)
+    assert set(answer.labels.flat) == {"unknown"}
+    np.testing.assert_allclose(answer.probabilities, 1 / 3)
+    assert set(answer.reasons.flat) == {
+        "unambiguous velocity 8.0 m/s is below 10 m/s (wavelength x PRF / 4): raise the PRF to 1253 Hz or more"
+    }
+
+
+@pytest.mark.parametrize("pulses", [1, 2, 15, 63])
+def test_too_few_pulses_are_unknown_not_an_error(always_uav, pulses):
+    answer = always_uav.predict(noise(pulses), **RADAR)
+    assert answer.labels == "unknown"
+    assert str(answer.reasons).startswith(f"{pulses} pulses are fewer than 64: take 100 pulses")
+
+
+def test_the_envelope_is_the_models_own(make_model):
+    limits = json.loads(inference.Envelope().to_json()) | {"prf_min_hz": 30e3}
+    answer = Classifier(make_model(envelope=json.dumps(limits))).predict(noise(200), **RADAR)
+    assert answer.reasons == "PRF 20000 Hz is below 30000 Hz: raise the PRF to 30000 Hz or more"
+
+
+def test_a_record_of_zeros_is_unknown_and_leaves_the_others_alone(always_uav):
+    iq = noise(200, (3,))
+    iq[1] = 0
+    answer = always_uav.predict(iq, **RADAR)
+    assert list(answer.labels) == ["uav", "unknown", "uav"]
+    assert list(answer.reasons) == ["", "no signal: every sample is 0", ""]
+    np.testing.assert_allclose(answer.probabilities[1], 1 / 3)
+
+
+@pytest.mark.parametrize(
+    ("iq", "said"),
+    [
+        (np.ones(200), r"iq: real samples \(float64\): IQ must be complex"),
+        ([1, 2, 3], r"iq: real samples \(int64\)"),
+        (np.r_[noise(99), np.nan], r"iq: sample 99 is .*nan.*must be finite"),
+        (np.stack([noise(70), np.r_[noise(69), np.inf]]), r"iq: sample \(1, 69\) is .*inf"),
+        (np.complex64(1), r"iq has shape \(\): it must be \(..., pulses\)"),
+        (noise(0), r"iq has shape \(0,\)"),
+        (noise(0, (3,)), r"iq has shape \(3, 0\)"),
+        (np.array([1j] * 100, dtype=object), "iq: an array of Python objects"),
+        ("drone.npy", "iq: samples of type <U9"),
+    ],
+)
+def test_bad_samples_are_refused(always_uav, iq, said):
+    with pytest.raises(BadInput, match=said):
+        always_uav.predict(iq, **RADAR)
+
+
+@pytest.mark.parametrize("value", [0, -1.0, float("nan"), float("inf"), "9.85e9", None, True])
+@pytest.mark.parametrize("name", ["carrier_hz", "prf_hz"])
+def test_bad_frequencies_are_refused(always_uav, name, value):
+    with pytest.raises(BadInput, match=f"{name} is .*above 0"):
+        always_uav.predict(noise(200), **(RADAR | {name: value}))
+
+
+def test_samples_may_be_lists_and_complex128(always_uav):
+    iq = noise(200)
+    for given_iq in (iq.tolist(), iq.astype(complex), np.asfortranarray(noise(200, (2,))), iq[::-1]):
+        assert np.all(always_uav.predict(given_iq, **RADAR).labels == "uav")
+
+
+def test_predict_leaves_the_samples_as_they_were(mixed):
+    iq = noise(200, (2,))
+    iq.flags.writeable = False
+    mixed.predict(iq, **RADAR)
+    np.testing.assert_array_equal(iq, noise(200, (2,)))
+
+
+def test_a_loaded_model_says_what_it_is(always_uav):
+    assert always_uav.classes == ("uav", "bird", "clutter")
+    assert always_uav.metadata["name"] == "tiny"
+    assert always_uav.inputs == ("features",)
+    assert always_uav.accept == (0.6, 0.6, 0.6)
+    assert always_uav.envelope == inference.Envelope()
+
+
+def _flip(content: bytes, at: int) -> bytes:
+    return content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
+
+
+@pytest.mark.parametrize("where", [0.1, 0.5, 0.9])
+def test_an_altered_model_is_refused_before_a_session_is_made(make_model, monkeypatch, where):
+    def no_session(*_, **__):
+        raise AssertionError("a session was made of an unverified file")
+
+    monkeypatch.setattr(inference.onnxruntime, "InferenceSession", no_session)
+    content = make_model()
+    with pytest.raises(BadInput, match=r"x\.onnx: the model was altered after it was written"):
+        Classifier(_flip(content, int(where * len(content) * 0.5)), source="x.onnx")
+    for foreign in (b"", b"not onnx", make_model(sealed=False)[:200], make_model(sealed=False, bladewing_sha256=None)):
+        with pytest.raises(BadInput, match=r"x\.onnx: not a bladewing model"):
+            Classifier(foreign, source="x.onnx")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"product": "other"}, "not a bladewing model: its product is 'other'"),
+        ({"product": None}, "not a bladewing model: its product is None"),
+        ({"format": "2"}, "model format '2', this version reads '1': train it again"),
+        ({"schema_sha256": "ab" * 32}, r"trained on other measurements .* \(schema abababababab, here"),
+        ({"schema_sha256": None}, "trained on other measurements"),
+        ({"classes": '["bird", "uav", "clutter"]'}, "damaged metadata: classes are"),
+        ({"classes": None}, "damaged metadata: 'classes'"),
+        ({"accept": "[0.5, 0.5]"}, "damaged metadata"),
+        ({"accept": "[0.5, 0.5, NaN]"}, "damaged metadata: accept is"),
+        ({"accept": "soon"}, "damaged metadata"),
+        ({"envelope": "{}"}, "damaged metadata: the envelope must hold"),
+        ({"input_name": "raw"}, r"input 'raw' of shape \('batch', \d+\): this version gives"),
+        ({"width": 3}, r"input 'features' of shape \('batch', 3\): this version gives"),
+    ],
+)
+def test_a_model_for_another_version_is_refused(make_model, change, said):
+    with pytest.raises(BadInput, match=f"x.onnx: {said}") as caught:
+        Classifier(make_model(**change), source="x.onnx")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.5, "2", True])
+def test_threads_must_be_a_whole_number(uav_model, threads):
+    with pytest.raises(BadInput, match=r"threads is .*whole number"):
+        Classifier.load(uav_model, threads=threads)
+
+
+def test_two_threads_answer_as_one(mixed, mixed_model):
+    iq = noise(200, (20,))
+    two = Classifier.load(mixed_model, threads=2).predict(iq, **RADAR)
+    np.testing.assert_allclose(two.probabilities, mixed.predict(iq, **RADAR).probabilities, atol=1e-5)
+
+
+def test_names_and_paths_that_lead_nowhere(tmp_path):
+    for wrong in ("spectrum-cmm", "no/such.onnx", tmp_path / "gone.onnx"):
+        with pytest.raises(BadInput, match=f"no model '{os.fspath(wrong)}'.*shipped: {', '.join(model_names())}"):
+            Classifier.load(wrong)
+    with pytest.raises(BadInput, match=r"is a directory: name the \.onnx file in it"):
+        Classifier.load(tmp_path)
+    (tmp_path / "x.onnx").write_bytes(b"x")
+    with pytest.raises(BadInput, match="not a bladewing model"):
+        Classifier.load(tmp_path / "x.onnx")
+
+
+def test_every_shipped_model_loads_and_answers():
+    if not model_names():
+        pytest.skip("no model is shipped in this checkout: `make train` writes them")
+    assert model_names()[0] == "spectrum-cnn"
+    assert Classifier.load().metadata["name"] == "spectrum-cnn"
+    for name in model_names():
+        model = Classifier.load(name)
+        assert model.metadata["name"] == name
+        answer = model.predict(noise(1600, (2,)), **RADAR)
+        np.testing.assert_allclose(answer.probabilities.sum(axis=-1), 1, atol=1e-5)
