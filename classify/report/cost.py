@@ -1,0 +1,109 @@
+"""What an answer costs: every step from IQ to probabilities, beside the bare FFT of the same run."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+import scipy.fft
+from bladewing.features.inputs import model_inputs
+from numpy.typing import NDArray
+
+from ..inference import Classifier
+from .timing import Work, quote, time_in_turns
+
+BATCHES = (1, 64)
+
+
+def time_chain(
+    models: Mapping[str, bytes],
+    iq: NDArray[np.complex64],
+    *,
+    carrier_hz: float,
+    prf_hz: float,
+    seconds: float,
+    least_rounds: int,
+    on_share: Callable[[float], None] | None = None,
+) -> list[dict[str, Any]]:
+    """Time the bare FFT, every input, every model and every whole chain, all in turns and on one thread.
+
+    Parameters
+    ----------
+    models : mapping of str to bytes
+        Name to sealed ONNX model.
+    iq : (64 or more, pulses) complex64
+        Records; the batches take them in rotation.
+    carrier_hz, prf_hz : float
+        Of the records [Hz].
+    seconds : float
+        Time to spend on each batch size [s].
+    least_rounds : int
+        Rounds to make however long they take.
+    on_share : callable, optional
+        Called with the share done, 0 to 1.
+
+    Returns
+    -------
+    list of dict
+        One a batch size: ``batch`` and ``stages``, a list of ``{"stage", "name", "median_us", "p99_us", "passed_us",
+        "rounds", "ratio_to_fft"}``; stage is "fft", "input" (name: the input), "model" or "chain" (name: the model).
+        Times are a record (see `timing.quote`).
+    """
+    results = []
+    for place, batch in enumerate(BATCHES):
+        works = _works(models, iq, batch, carrier_hz=carrier_hz, prf_hz=prf_hz)
+
+        def share(done: float, place: int = place) -> None:
+            if on_share is not None:
+                on_share((place + done) / len(BATCHES))
+
+        taken = time_in_turns(works, seconds=seconds, least_rounds=least_rounds, most_rounds=5000, on_share=share)
+        quoted = {key: quote(durations, per=batch) for key, durations in taken.items()}
+        bare_us = quoted["fft", "fft"]["median_us"]
+        stages = [
+            {"stage": stage, "name": name, **numbers, "ratio_to_fft": numbers["median_us"] / bare_us}
+            for (stage, name), numbers in quoted.items()
+        ]
+        results.append({"batch": batch, "stages": stages})
+    return results
+
+
+def _works(
+    models: Mapping[str, bytes], iq: NDArray[np.complex64], batch: int, *, carrier_hz: float, prf_hz: float
+) -> dict[tuple[str, str], Work]:
+    """Build the work of each step, keyed (stage, name); every call takes the next batch of the records."""
+    classifiers = {name: Classifier(content, source=name) for name, content in models.items()}
+    wanted = tuple(dict.fromkeys(name for classifier in classifiers.values() for name in classifier.inputs))
+    batches = [iq[start : start + batch] for start in range(0, iq.shape[0] - batch + 1, batch)]
+    ready = [model_inputs(some, carrier_hz=carrier_hz, prf_hz=prf_hz, names=wanted) for some in batches]
+
+    make = partial(model_inputs, carrier_hz=carrier_hz, prf_hz=prf_hz)
+    works: dict[tuple[str, str], Work] = {("fft", "fft"): _in_turn([partial(scipy.fft.fft, some) for some in batches])}
+    for name in wanted:
+        works["input", name] = _in_turn([partial(make, some, names=(name,)) for some in batches])
+    for name, classifier in classifiers.items():
+        works["model", name] = _network(models[name], classifier.inputs, ready)
+    for name, classifier in classifiers.items():
+        answer = partial(classifier.predict, carrier_hz=carrier_hz, prf_hz=prf_hz)
+        works["chain", name] = _in_turn([partial(answer, some) for some in batches])
+    return works
+
+
+def _network(content: bytes, inputs: tuple[str, ...], ready: list[dict[str, NDArray[np.float32]]]) -> Work:
+    """Build the bare ONNX call of a model on inputs that are ready."""
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    feeds = [{name: one[name] for name in inputs} for one in ready]
+    return _in_turn([partial(session.run, ["probabilities"], feed) for feed in feeds])
+
+
+def _in_turn(works: list[Work]) -> Work:
+    """Make one piece of work of several: each call does the next."""
+    turns = itertools.cycle(works)
+    return lambda: next(turns)()

@@ -1,0 +1,160 @@
+"""Figures of what an answer costs and what a record weighs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, PercentFormatter
+
+from .series import looks
+from .svg import INK, MUTED, PAPER, SERIES, Panel, drawing, panel
+from .words import batch_words, count, micros, number, percent, size, spoken
+
+_BLUE = SERIES[2]
+
+
+def _log_times(axes: Axes, label: str) -> None:
+    axes.set_xscale("log")
+    # Every decade alone would leave a short axis without any number.
+    low, high = axes.get_xlim()
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 100 * low else (1,)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlabel(label)
+
+
+def front(report: Mapping[str, Any]) -> list[Panel]:
+    """Balanced accuracy against the cost of the whole chain, one panel a batch size; the front is filled and joined."""
+    panels = []
+    look = looks([model["name"] for model in report["models"]])
+    for part in report["trade"]:
+        with drawing(height_in=2.9) as (figure, axes):
+            kept = [point for point in part["points"] if point["front"]]
+            axes.step(
+                [point["cost_us"] for point in kept],
+                [point["balanced_accuracy"] for point in kept],
+                where="post",
+                color=MUTED,
+                linewidth=0.9,
+            )
+            for point in part["points"]:
+                name = point["model"]
+                rate = report["scores"][name]["balanced_accuracy"]
+                spread = [[rate["value"] - rate["low"]], [rate["high"] - rate["value"]]]
+                axes.errorbar(
+                    [point["cost_us"]],
+                    [rate["value"]],
+                    yerr=spread,
+                    color=look[name].colour,
+                    marker=look[name].marker,
+                    markersize=7,
+                    markerfacecolor=look[name].colour if point["front"] else PAPER,
+                    elinewidth=0.9,
+                )
+            axes.margins(x=0.12, y=0.12)
+            _log_times(axes, "whole chain, IQ to probabilities [µs a record]")
+            axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+            axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+            axes.set_ylabel("balanced accuracy")
+            title = batch_words(part["batch"])
+            words = [
+                f"{point['model']}: {micros(point['cost_us'])}, {percent(point['balanced_accuracy'])}"
+                f"{'' if point['front'] else ' (beaten by another)'}."
+                for point in part["points"]
+            ]
+            alt = f"Balanced accuracy against cost, {title}. {' '.join(words)}"
+            panels.append(panel(figure, name=f"front-{part['batch']}", title=title.capitalize(), alt=alt))
+    return panels
+
+
+def stages(report: Mapping[str, Any]) -> list[Panel]:
+    """Median time of every step, one panel a batch size; a tick marks the 99th percentile."""
+    panels = []
+    look = looks([model["name"] for model in report["models"]])
+    for part in report["cost"]["batches"]:
+        rows = part["stages"]
+        with drawing(height_in=0.8 + 0.2 * len(rows)) as (figure, axes):
+            least = min(row["median_us"] for row in rows) / 2
+            for i, row in enumerate(rows):
+                colour = look[row["name"]].colour if row["stage"] in ("model", "chain") else MUTED
+                alpha = 1.0 if row["stage"] in ("chain", "fft") else 0.55
+                axes.barh(i, row["median_us"] - least, left=least, height=0.7, color=colour, alpha=alpha)
+                axes.plot([row["p99_us"]] * 2, [i - 0.35, i + 0.35], color=INK, linewidth=1.1)
+            axes.set_xlim(left=least)
+            _log_times(axes, "µs a record; tick: 99th percentile")
+            axes.set_yticks(range(len(rows)), [stage_name(row) for row in rows])
+            axes.set_ylim(len(rows) - 0.4, -0.6)
+            axes.tick_params(axis="y", length=0)
+            axes.grid(visible=False, axis="y")
+            title = batch_words(part["batch"]).capitalize()
+            words = ", ".join(f"{stage_name(row)} {micros(row['median_us'])}" for row in rows)
+            alt = f"Median time of every step, {title.lower()}: {words}."
+            panels.append(panel(figure, name=f"stages-{part['batch']}", title=title, alt=alt))
+    return panels
+
+
+def stage_name(row: Mapping[str, Any]) -> str:
+    """Name a step of the chain for people."""
+    inputs = {
+        "spectrum": "spectrum input",
+        "image": "STFT image",
+        "features": "features",
+        "joint_features": "joint features",
+    }
+    if row["stage"] == "fft":
+        return "bare FFT"
+    if row["stage"] == "input":
+        return inputs.get(row["name"], row["name"])
+    return f"{row['name']}, {'ONNX' if row['stage'] == 'model' else 'whole'}"
+
+
+def fft_against_stft(report: Mapping[str, Any]) -> list[Panel]:
+    """How many times longer the STFT takes than the FFT, beside the paper's range, one panel a record length."""
+    panels = []
+    for part in report["fft_against_stft"]:
+        rows, (low, high) = part["stft"], part["paper_ratio"]
+        with drawing(height_in=0.9 + 0.24 * len(rows)) as (figure, axes):
+            axes.axvspan(low, high, color=SERIES[1], alpha=0.28, linewidth=0)
+            for i, row in enumerate(rows):
+                axes.barh(i, row["ratio_to_fft"], height=0.6, color=_BLUE, alpha=0.85)
+            axes.set_yticks(range(len(rows)), [f"{row['window']} samples, {row['overlap']:.0%}" for row in rows])
+            axes.set_ylim(len(rows) - 0.4, -0.6)
+            axes.tick_params(axis="y", length=0)
+            axes.grid(visible=False, axis="y")
+            axes.set_xlim(0, max([high, *(row["ratio_to_fft"] for row in rows)]) * 1.06)
+            axes.set_xlabel("STFT time / FFT time")
+            axes.set_ylabel("STFT window, overlap")
+            title = f"{count(part['pulses'])} samples; shaded: the paper's range"
+            words = ", ".join(
+                f"window {row['window']} overlap {row['overlap']:.0%}: {number(row['ratio_to_fft'])}" for row in rows
+            )
+            alt = (
+                f"STFT time over FFT time at {count(part['pulses'])} samples: {words}; the paper: {low:g} to {high:g}."
+            )
+            panels.append(panel(figure, name=f"stft-{part['pulses']}", title=title, alt=alt))
+    return panels
+
+
+def storage(report: Mapping[str, Any]) -> list[Panel]:
+    """Bytes a record in each form, as it is and compressed."""
+    rows = report["storage"]
+    with drawing(height_in=0.8 + 0.36 * len(rows)) as (figure, axes):
+        least = min(row["compressed_bytes"] for row in rows) / 2
+        for i, row in enumerate(rows):
+            axes.barh(i - 0.18, row["bytes"] - least, left=least, height=0.34, color=_BLUE, alpha=0.9)
+            axes.barh(i + 0.18, row["compressed_bytes"] - least, left=least, height=0.34, color=SERIES[1], alpha=0.9)
+        axes.set_xscale("log")
+        axes.set_xlim(left=least)
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: size(value)))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.set_yticks(range(len(rows)), [spoken(row["form"]) for row in rows])
+        axes.set_ylim(len(rows) - 0.4, -0.6)
+        axes.tick_params(axis="y", length=0)
+        axes.grid(visible=False, axis="y")
+        axes.set_xlabel("bytes a record")
+        words = ", ".join(f"{row['form']} {size(row['bytes'])}" for row in rows)
+        return [
+            panel(figure, name="storage", title="A record; lower bars: compressed", alt=f"Bytes a record: {words}.")
+        ]

@@ -1,0 +1,160 @@
+"""Figures of what the models get right."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, PercentFormatter
+
+from .series import looks
+from .svg import INK, MUTED, NARROW_IN, Panel, drawing, panel
+from .words import percent, spoken
+
+GROUPS = ("all", "uav", "bird", "clutter")
+_TITLES = {"all": "All records", "uav": "UAV records", "bird": "Bird records", "clutter": "Clutter records"}
+# A point over fewer records than this says little and is left out of the lines; the tables keep it.
+LEAST_RECORDS = 10
+
+
+def accuracy_by_snr(report: Mapping[str, Any]) -> list[Panel]:
+    """Accuracy against SNR, one panel over all records and one a class."""
+    panels = []
+    for group in GROUPS:
+        with drawing(height_in=2.5, width_in=NARROW_IN) as (figure, axes):
+            alt = _lines(axes, report, "by_snr", group, centre=lambda low, high: (low + high) / 2)
+            axes.set_xlabel("SNR, a sample [dB]")
+            _share_axis(axes, "answered right")
+            alt = f"Accuracy against SNR, {_TITLES[group].lower()}. {alt}"
+            panels.append(panel(figure, name=f"snr-{group}", title=_TITLES[group], alt=alt))
+    return panels
+
+
+def accuracy_by_dwell(report: Mapping[str, Any]) -> list[Panel]:
+    """Accuracy against the length of the record, one panel over all records and one a class."""
+    panels = []
+    for group in GROUPS:
+        with drawing(height_in=2.5, width_in=NARROW_IN) as (figure, axes):
+            axes.set_xscale("log")
+            alt = _lines(axes, report, "by_dwell", group, centre=lambda low, high: (low * high) ** 0.5, unit=1e3)
+            axes.set_xlabel("dwell [ms]")
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axes.xaxis.set_minor_formatter(FuncFormatter(lambda *_: ""))
+            _share_axis(axes, "answered right")
+            alt = f"Accuracy against dwell, {_TITLES[group].lower()}. {alt}"
+            panels.append(panel(figure, name=f"dwell-{group}", title=_TITLES[group], alt=alt))
+    return panels
+
+
+def _lines(axes: Axes, report: Mapping[str, Any], by: str, group: str, *, centre: Any, unit: float = 1.0) -> str:
+    """Draw one line a model with its Wilson band; return in words where each begins and ends."""
+    names = [model["name"] for model in report["models"]]
+    words = []
+    for name, look in looks(names).items():
+        slices = [one for one in report["scores"][name][by] if one[group]["count"] >= LEAST_RECORDS]
+        if not slices:
+            continue
+        x = [centre(one["from"] * unit, one["to"] * unit) for one in slices]
+        rates = [one[group] for one in slices]
+        low, high = [one["low"] for one in rates], [one["high"] for one in rates]
+        axes.fill_between(x, low, high, color=look.colour, alpha=0.1, linewidth=0)
+        axes.plot(x, [one["value"] for one in rates], color=look.colour, marker=look.marker)
+        words.append(
+            f"{name}: {percent(rates[0]['value'])} at the left end, {percent(rates[-1]['value'])} at the right."
+        )
+    axes.axhline(1 / 3, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
+    return " ".join(words)
+
+
+def _share_axis(axes: Axes, label: str) -> None:
+    axes.set_ylim(0, 1.02)
+    axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+    axes.set_ylabel(label)
+
+
+def reliability(report: Mapping[str, Any]) -> list[Panel]:
+    """Reliability diagrams, one panel a model: points on the diagonal mean what they say."""
+    names = [model["name"] for model in report["models"]]
+    panels = []
+    for name, look in looks(names).items():
+        found = report["scores"][name]["reliability"]
+        total = sum(one["accuracy"]["count"] for one in found["bins"])
+        with drawing(height_in=3.0) as (figure, axes):
+            axes.plot([0, 1], [0, 1], color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
+            for one in found["bins"]:
+                share = one["accuracy"]["count"] / total
+                # The bars along the foot show how often the model is that sure.
+                axes.bar(one["from"], share, width=one["to"] - one["from"], align="edge", color=MUTED, alpha=0.35)
+            x = [one["confidence"] for one in found["bins"]]
+            y = [one["accuracy"]["value"] for one in found["bins"]]
+            below = [one["accuracy"]["value"] - one["accuracy"]["low"] for one in found["bins"]]
+            above = [one["accuracy"]["high"] - one["accuracy"]["value"] for one in found["bins"]]
+            axes.errorbar(x, y, yerr=[below, above], color=look.colour, marker=look.marker, elinewidth=0.9)
+            axes.set_xlim(0, 1.02)
+            axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+            axes.set_xlabel("probability given to the answer")
+            _share_axis(axes, "answered right")
+            ece = f"expected calibration error {percent(found['ece'])}"
+            title = f"{name}, error {percent(found['ece'])}"
+            alt = f"Reliability of {name}: {ece} over {total} records; {_worst_bin(found['bins'])}"
+            panels.append(panel(figure, name=f"reliability-{_slug(name)}", title=title, alt=alt))
+    return panels
+
+
+def _worst_bin(bins: Sequence[Mapping[str, Any]]) -> str:
+    big = [one for one in bins if one["accuracy"]["count"] >= LEAST_RECORDS]
+    if not big:
+        return "no bin holds enough records to judge."
+    worst = max(big, key=lambda one: abs(one["accuracy"]["value"] - one["confidence"]))
+    return (
+        f"furthest off where it says {percent(worst['confidence'])} and is right {percent(worst['accuracy']['value'])}."
+    )
+
+
+def called_uav(report: Mapping[str, Any]) -> list[Panel]:
+    """Share of each kind that is called UAV: false drones in one panel, found drones in the other."""
+    panels = []
+    for wanted, title in (
+        (False, "Birds and clutter called UAV (should be 0)"),
+        (True, "UAVs called UAV (should be 100 %)"),
+    ):
+        names = [model["name"] for model in report["models"]]
+        rows = {name: {r["kind"]: r for r in report["scores"][name]["by_kind"]} for name in names}
+        first = report["scores"][names[0]]["by_kind"]
+        kinds = [row["kind"] for row in first if (row["class"] == "uav") is wanted]
+        with drawing(height_in=1.0 + 0.34 * max(len(kinds), 1)) as (figure, axes):
+            words = []
+            for place, (name, look) in enumerate(looks(names).items()):
+                shift = (place - (len(names) - 1) / 2) * 0.72 / max(len(names), 1)
+                rates = [(i, rows[name][kind]["called"]["uav"]) for i, kind in enumerate(kinds) if kind in rows[name]]
+                for i, one in rates:
+                    axes.plot([one["low"], one["high"]], [i + shift] * 2, color=look.colour, linewidth=0.9)
+                axes.plot(
+                    [one["value"] for _, one in rates],
+                    [i + shift for i, _ in rates],
+                    color=look.colour,
+                    marker=look.marker,
+                    linestyle="none",
+                    markersize=3.4,
+                )
+                if rates:
+                    pick = min if wanted else max
+                    at, end = pick(rates, key=lambda pair: pair[1]["value"])
+                    words.append(f"{name}: worst {spoken(kinds[at])}, {percent(end['value'])}.")
+            for line in range(1, len(kinds)):
+                axes.axhline(line - 0.5, color=MUTED, linewidth=0.3)
+            axes.grid(visible=False, axis="y")
+            axes.set_ylim(max(len(kinds), 1) - 0.5, -0.5)
+            axes.set_yticks(range(len(kinds)), [spoken(kind) for kind in kinds])
+            axes.tick_params(axis="y", length=0)
+            axes.set_xlim(-0.02, 1.02)
+            axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+            axes.set_xlabel("called UAV", color=INK)
+            slug = "found" if wanted else "false"
+            panels.append(panel(figure, name=f"kinds-{slug}", title=title, alt=f"{title}. {' '.join(words)}"))
+    return panels
+
+
+def _slug(name: str) -> str:
+    return "".join(letter if letter.isalnum() else "-" for letter in name)

@@ -1,0 +1,204 @@
+"""From answered records to the report's tables: accuracy and its slices, false drones, calibration, acceptance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import metrics
+
+# Answers are class numbers; this one stands for "unknown".
+UNKNOWN = -1
+FALSE_ALARM_RATE = 1e-2
+SNR_STEP_DB = 5.0
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is true of the test records, one entry a record.
+
+    Attributes
+    ----------
+    classes : tuple of str
+        Class names; class numbers below index them.
+    label : (n,) int
+        Class number.
+    kind : (n,) str
+        Sub-kind, e.g. "quadcopter" or "flock".
+    snr_db : (n,) float
+        Micro-motion power over noise, a sample [dB]; NaN where there is none.
+    dwell_s : (n,) float
+        Length of the record [s].
+    radar : (n,) int
+        Number of the radar the record was made for.
+    """
+
+    classes: tuple[str, ...]
+    label: NDArray[np.intp]
+    kind: NDArray[np.str_]
+    snr_db: NDArray[np.float64]
+    dwell_s: NDArray[np.float64]
+    radar: NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What one model said of the same records.
+
+    Attributes
+    ----------
+    probabilities : (n, classes) float
+    label : (n,) int
+        Class number after the acceptance thresholds, `UNKNOWN` where the model declined.
+    answered : (n,) bool
+        False where the record was refused before the model saw it (outside the envelope, no signal).
+    """
+
+    probabilities: NDArray[np.floating]
+    label: NDArray[np.intp]
+    answered: NDArray[np.bool_]
+
+
+def describe_records(truth: Truth) -> dict[str, Any]:
+    """Count what the test set holds.
+
+    Returns
+    -------
+    dict
+        ``total``, ``radars``, ``by_class`` and ``by_kind`` counts, ``without_snr``, the extremes of the SNR [dB] and
+        of the dwell [s].
+    """
+    snr_db = truth.snr_db[np.isfinite(truth.snr_db)]
+    kinds, counts = np.unique(truth.kind, return_counts=True)
+    return {
+        "total": int(truth.label.size),
+        "radars": int(np.unique(truth.radar).size),
+        "by_class": {name: int(np.sum(truth.label == i)) for i, name in enumerate(truth.classes)},
+        "by_kind": {str(kind): int(count) for kind, count in zip(kinds, counts, strict=True)},
+        "without_snr": int(truth.label.size - snr_db.size),
+        "snr_db": [float(snr_db.min()), float(snr_db.max())] if snr_db.size else None,
+        "dwell_s": [float(truth.dwell_s.min()), float(truth.dwell_s.max())],
+    }
+
+
+def score(truth: Truth, answers: Answers) -> dict[str, Any]:
+    """Every score of one model on the test records.
+
+    Scores count the records that the model saw; the refused ones are counted apart. Unless named otherwise an answer
+    is the class of highest probability, whether or not the acceptance thresholds would have withheld it.
+
+    Parameters
+    ----------
+    truth : Truth
+        Of n >= 1 records.
+    answers : Answers
+        Of the same records.
+
+    Returns
+    -------
+    dict
+        Plain numbers, lists and dictionaries, ready for JSON; see `run_report` for the keys.
+    """
+    seen = answers.answered
+    label, probabilities = truth.label[seen], np.asarray(answers.probabilities[seen], np.float64)
+    best, accepted = np.argmax(probabilities, axis=-1), answers.label[seen]
+    right, uav = best == label, truth.classes.index("uav")
+    recalls = {name: metrics.rate(right[label == i]) for i, name in enumerate(truth.classes)}
+    return {
+        "refused": int(np.count_nonzero(~seen)),
+        "accuracy": metrics.rate(right),
+        "design_effect": metrics.design_effect(right, truth.radar[seen]),
+        "balanced_accuracy": metrics.mean_of_rates(list(recalls.values())),
+        "recall": recalls,
+        "confusion": _confusion(label, best, accepted, len(truth.classes)),
+        "uav_at_pfa": metrics.detection_at(probabilities[:, uav], label == uav, false_alarm_rate=FALSE_ALARM_RATE),
+        "false_uav": {
+            "best": metrics.rate(best[label != uav] == uav),
+            "accepted": metrics.rate(accepted[label != uav] == uav),
+        },
+        "reliability": metrics.reliability(probabilities.max(axis=-1, initial=0.0), right),
+        "by_snr": _sliced(truth, seen, right, truth.snr_db[seen], _snr_edges(truth.snr_db)),
+        "by_dwell": _sliced(truth, seen, right, truth.dwell_s[seen], _one_two_five(truth.dwell_s)),
+        "by_kind": _by_kind(truth, seen, best, accepted),
+        "acceptance": _acceptance(truth, seen, accepted),
+    }
+
+
+def _confusion(
+    label: NDArray[np.intp], best: NDArray[np.intp], accepted: NDArray[np.intp], classes: int
+) -> dict[str, list[list[int]]]:
+    """Counts with the true class down and the answer across; ``accepted`` has "unknown" as its last column."""
+    table = np.zeros((classes, classes), int)
+    np.add.at(table, (label, best), 1)
+    withheld = np.zeros((classes, classes + 1), int)
+    np.add.at(withheld, (label, np.where(accepted == UNKNOWN, classes, accepted)), 1)
+    return {"best": table.tolist(), "accepted": withheld.tolist()}
+
+
+def _sliced(
+    truth: Truth,
+    seen: NDArray[np.bool_],
+    right: NDArray[np.bool_],
+    values: NDArray[np.float64],
+    edges: NDArray[np.float64],
+) -> list[dict[str, Any]]:
+    """Accuracy in each slice [from, to) of a quantity, over all records and a class; NaN values fall in no slice."""
+    label = truth.label[seen]
+    slices = []
+    for low, high in pairwise(edges):
+        inside = (values >= low) & (values < high)
+        rates = {name: metrics.rate(right[inside & (label == i)]) for i, name in enumerate(truth.classes)}
+        slices.append({"from": float(low), "to": float(high), "all": metrics.rate(right[inside]), **rates})
+    return slices
+
+
+def _snr_edges(snr_db: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Edges of equal steps that hold every finite SNR; none where there is no finite SNR."""
+    finite = snr_db[np.isfinite(snr_db)]
+    if finite.size == 0:
+        return np.zeros(1)
+    first, last = math.floor(finite.min() / SNR_STEP_DB), math.floor(finite.max() / SNR_STEP_DB) + 1
+    return np.arange(first, last + 1) * SNR_STEP_DB
+
+
+def _one_two_five(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Edges 1, 2, 5, 10, ... that hold every value (positive, any scale)."""
+    decades = range(math.floor(math.log10(values.min())), math.ceil(math.log10(values.max())) + 1)
+    series = np.array([float(f"{step}e{decade}") for decade in decades for step in (1, 2, 5)])
+    first = int(np.searchsorted(series, values.min(), side="right")) - 1
+    last = int(np.searchsorted(series, values.max(), side="right"))
+    return series[first : last + 1]
+
+
+def _by_kind(
+    truth: Truth, seen: NDArray[np.bool_], best: NDArray[np.intp], accepted: NDArray[np.intp]
+) -> list[dict[str, Any]]:
+    """How each sub-kind was called, in the order of the classes."""
+    label, kind = truth.label[seen], truth.kind[seen]
+    rows = []
+    for number, name in enumerate(truth.classes):
+        for one in np.unique(kind[label == number]):
+            chosen = (kind == one) & (label == number)
+            called = {other: metrics.rate(best[chosen] == i) for i, other in enumerate(truth.classes)}
+            held_back = metrics.rate(accepted[chosen] == UNKNOWN)
+            declared = metrics.rate(accepted[chosen] == truth.classes.index("uav"))
+            row = {"kind": str(one), "class": name, "called": called}
+            rows.append({**row, "unknown": held_back, "declared_uav": declared})
+    return rows
+
+
+def _acceptance(truth: Truth, seen: NDArray[np.bool_], accepted: NDArray[np.intp]) -> dict[str, Any]:
+    """Coverage, and accuracy of what was accepted, over the records seen."""
+    label, given = truth.label[seen], accepted != UNKNOWN
+    hits = accepted == label
+    return {
+        "coverage": metrics.rate(given),
+        "accuracy": metrics.rate(hits[given]),
+        "precision": {name: metrics.rate(hits[accepted == i]) for i, name in enumerate(truth.classes)},
+        "unknown": {name: metrics.rate(~given[label == i]) for i, name in enumerate(truth.classes)},
+    }

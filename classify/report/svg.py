@@ -1,0 +1,130 @@
+"""Matplotlib figures as inline SVG: the same bytes for the same numbers, in the page's own colours.
+
+Figures are drawn in stand-in colours that become CSS variables, so that one drawing serves light and dark pages.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+# Stand-in colour -> what the page puts there. Series are the page's --s0, --s1, ...
+INK, GRID, MUTED, PAPER = "#010101", "#020202", "#030303", "#040404"
+SERIES = tuple(f"#0a00{number:02x}" for number in range(8))
+_CSS = {INK: "currentColor", GRID: "var(--grid)", MUTED: "var(--muted)", PAPER: "var(--paper)"} | {
+    colour: f"var(--s{number})" for number, colour in enumerate(SERIES)
+}
+MARKERS = ("o", "s", "D", "^", "v", "P", "X", "*")
+
+# 96 CSS pixels an inch. One wide panel fills a phone and three fill a desk's width; four narrow ones do.
+WIDE_IN, NARROW_IN = 3.75, 3.0
+
+# Any: matplotlib types every one of its settings.
+_STYLE: Any = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "bladewing",
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 8.0,
+    "axes.titlesize": 8.5,
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.facecolor": "none",
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.unicode_minus": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "text.color": INK,
+    "figure.facecolor": "none",
+    "savefig.facecolor": "none",
+    "lines.linewidth": 1.4,
+    "lines.markersize": 4.0,
+}
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One drawing of the page.
+
+    Attributes
+    ----------
+    title : str
+        Shown above it.
+    alt : str
+        What it shows, in words.
+    svg : str
+        The drawing, an ``<svg>`` element with the alternative text as its label.
+    """
+
+    title: str
+    alt: str
+    svg: str
+
+
+@contextmanager
+def drawing(*, height_in: float, width_in: float = WIDE_IN) -> Iterator[tuple[Figure, Axes]]:
+    """Give a figure and one axes on it, in the page's style.
+
+    Parameters
+    ----------
+    height_in, width_in : float
+        Size [inch].
+    """
+    with rc_context(_STYLE):
+        figure = Figure(figsize=(width_in, height_in), layout="constrained")
+        yield figure, figure.add_subplot()
+
+
+def panel(figure: Figure, *, name: str, title: str, alt: str) -> Panel:
+    """Turn a figure into a panel.
+
+    Parameters
+    ----------
+    figure : Figure
+        Made within `drawing`, still inside its ``with``.
+    name : str
+        Unique on the page; letters, digits and hyphens.
+    title, alt : str
+        Plain text.
+
+    Returns
+    -------
+    Panel
+    """
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = _own_ids(text, name)
+    for stand_in, css in _CSS.items():
+        text = text.replace(stand_in, css)
+    label = f'<svg role="img" aria-label="{escape(alt, quote=True)}" '
+    return Panel(title=title, alt=alt, svg=text.replace("<svg ", label, 1).rstrip())
+
+
+def _own_ids(text: str, name: str) -> str:
+    """Drop the ids nothing points to, and prefix the others: ids are unique within a page, not within a drawing."""
+    used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
+
+    def renamed(match: re.Match[str]) -> str:
+        return f' id="{name}-{match[1]}"' if match[1] in used else ""
+
+    text = re.sub(r' id="([^"]+)"', renamed, text)
+    return re.sub(r'(url\(#|href="#)', rf"\g<1>{name}-", text)

@@ -1,0 +1,47 @@
+"""How the page writes numbers."""
+
+from __future__ import annotations
+
+MINUS = "\u2212"
+# A number and its unit stay on one line.
+NBSP = "\u00a0"
+
+
+def percent(value: float | None) -> str:
+    """Write a share: "93.4 %", or a dash where there is none."""
+    return "–" if value is None else f"{100 * value:.1f}{NBSP}%"
+
+
+def number(value: float) -> str:
+    """Write a number with three digits that count, and a true minus sign."""
+    text = f"{value:.3g}" if abs(value) < 1000 else f"{round(value, 2 - len(str(int(abs(value)))) + 1):.0f}"
+    return text.replace("-", MINUS)
+
+
+def count(value: int) -> str:
+    """Write a whole number in full, thousands apart from five digits on."""
+    return f"{value:,}".replace(",", "\u202f") if abs(value) >= 10_000 else str(value)
+
+
+def micros(value: float) -> str:
+    """Write a time [us]."""
+    return f"{number(value)}{NBSP}µs" if value < 1000 else f"{number(value / 1000)}{NBSP}ms"
+
+
+def size(value: float) -> str:
+    """Write a number of bytes, in powers of 1000."""
+    for unit in ("B", "kB", "MB"):
+        if value < 1000:
+            return f"{number(value)}{NBSP}{unit}"
+        value /= 1000
+    return f"{number(value)}{NBSP}GB"
+
+
+def spoken(name: str) -> str:
+    """Write a name of the code as words."""
+    return name.replace("_", " ")
+
+
+def batch_words(batch: int) -> str:
+    """Name a batch size."""
+    return "one record at a time" if batch == 1 else f"batches of {batch}"
