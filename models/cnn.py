@@ -192,7 +192,7 @@ class EvidenceNet(nn.Module):
 class SpectrumNet(EvidenceNet):
     """1-D network over the velocity spectrum ("spectrum") beside its measurements ("features").
 
-    About 39 000 parameters and 0.7 million multiplications a record of 3 x 256.
+    About 39 000 parameters and 0.8 million multiplications a record of 3 x 256.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ class SpectrumNet(EvidenceNet):
 class ImageNet(EvidenceNet):
     """2-D network over the joint image ("image") beside its measurements ("joint_features").
 
-    About 39 000 parameters and 1.5 million multiplications a record of 1 x 64 x 32.
+    About 39 000 parameters and 1.1 million multiplications a record of 1 x 64 x 32.
 
     Parameters
     ----------

@@ -77,12 +77,13 @@ def test_the_fit_is_a_minimum_of_the_likelihood():
 
 @settings(deadline=None)
 @given(factor=st.floats(0.1, 100), seed=st.integers(0, 1000))
-def test_separable_scores_stay_finite(factor, seed):
+def test_separable_scores_give_no_certainty_whatever_their_unit(factor, seed):
     labels = np.random.default_rng(seed).integers(0, 3, 30)
-    fitted = fit_vector_scaling(factor * np.eye(3)[labels], labels)
-    probabilities = fitted.probabilities(factor * np.eye(3)[labels])
-    assert (probabilities.argmax(axis=1) == labels).all()
-    assert probabilities.max() < 1
+    scores = np.eye(3)[labels]
+    fitted, scaled = fit_vector_scaling(scores, labels), fit_vector_scaling(factor * scores, labels)
+    assert (scaled.probabilities(factor * scores).argmax(axis=1) == labels).all()
+    assert scaled.scale * factor == pytest.approx(fitted.scale, rel=0.01)
+    assert fitted.probabilities(scores).max() < 1 - 1e-4  # thirty right answers cannot tell 1 from 0.9999
 
 
 @settings(deadline=None)

@@ -7,6 +7,7 @@ import numpy as np
 import onnx
 import onnxruntime
 import pytest
+import torch
 from bladewing.models.calibration import Calibration
 from bladewing.models.cnn import ImageNet, SpectrumNet
 from bladewing.models.export import (
@@ -147,6 +148,13 @@ def test_wrong_shapes_are_refused():
     model = train_linear(x, np.arange(60) % 3, seed=0)
     with pytest.raises(ValueError, match="n_features is 3; the model was fitted on 2"):
         export_tabular(model, 3, "features", CALIBRATION)
+
+
+def test_an_export_with_a_fixed_batch_is_refused(monkeypatch):
+    export = torch.onnx.export
+    monkeypatch.setattr(torch.onnx, "export", lambda *a, **options: export(*a, **(options | {"dynamic_shapes": None})))
+    with pytest.raises(ValueError, match="only the batch free"):
+        export_network(SpectrumNet((3, 64), FEATURES, seed=0), {"spectrum": (3, 64), "features": (6,)}, CALIBRATION)
 
 
 @pytest.mark.parametrize("dims", [(2, 4), ("batch", "other"), ("batch", 5)])

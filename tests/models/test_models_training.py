@@ -111,6 +111,14 @@ def test_the_best_state_is_kept_when_the_last_epochs_are_ruined():
     assert not net.training
 
 
+def test_training_measures_its_records_and_not_those_of_the_validation():
+    net, _ = _trained(epochs=1)
+    fresh = SpectrumNet((2, BINS), FEATURES, seed=0)
+    fresh.measure(_spectra(300, 1)[0])
+    for name, values in fresh.standardise.state_dict().items():
+        assert torch.equal(net.standardise.state_dict()[name], values), name
+
+
 def test_a_training_that_never_gives_a_number_says_so():
     net = SpectrumNet((2, BINS), FEATURES, seed=0)
     inputs, y = _spectra(64, 1)
