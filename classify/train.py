@@ -1,0 +1,306 @@
+"""Training: synthetic records in, calibrated ONNX models and the account of the run out."""
+
+import json
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bladewing.features import INPUT_SHAPES, schema_hash
+from bladewing.models import LADDER
+from numpy.typing import NDArray
+
+from .envelope import Envelope
+from .errors import BadInput
+from .files import write_together
+from .gather import Gathered, gather
+from .labels import CLASSES
+from .report.progress import Progress
+from .training_config import TrainingConfig, training_config
+
+#: False-alarm probability at which the table quotes the detection of UAVs.
+FALSE_ALARM = 1e-2
+
+#: Name of the account beside the models.
+ACCOUNT = "train.json"
+
+OnFraction = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Sets:
+    """Records for each step; they share no stream, so no scene stands in two of them."""
+
+    train: Gathered
+    validate: Gathered
+    calibrate: Gathered
+    test: Gathered
+
+
+def run_training(
+    out: Path,
+    *,
+    records: int | None = None,
+    seed: int | None = None,
+    quick: bool = False,
+    config: Path | None = None,
+    progress: bool = True,
+) -> dict[str, Any]:
+    """Train the models of the ladder on synthetic records and write them to a folder.
+
+    Parameters
+    ----------
+    out : Path
+        Folder for `<name>.onnx` and `train.json`; made if it is missing. All files change together at the end.
+    records, seed, quick, config
+        See `training_config`.
+    progress : bool
+        Show progress and a table on the terminal.
+
+    Returns
+    -------
+    dict
+        The account, as in `train.json`.
+
+    Raises
+    ------
+    BadInput
+        If a setting is wrong or the folder cannot be written.
+    """
+    settings = training_config(config, records=records, seed=seed, quick=quick)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(f"{out}: cannot be made a folder: {error.strerror}: give another --out") from None
+    started = time.perf_counter()
+    with Progress(visible=progress) as bars:
+        sets = _gather(settings, bars)
+        gathered_s = time.perf_counter() - started
+        files: dict[str, bytes] = {}
+        models: dict[str, dict[str, Any]] = {}
+        for name in settings.models:
+            with bars.phase(f"train {name}", 1) as on_fraction:
+                files[f"{name}.onnx"], models[name] = _train_one(name, settings, sets, on_fraction)
+    account = {
+        "format": 1,
+        "settings": settings.model_dump(mode="json"),
+        "records": {
+            "train": settings.records,
+            **dict.fromkeys(("validate", "calibrate", "test"), settings.held_out),
+        },
+        "seconds": {"gather": round(gathered_s, 1), "all": round(time.perf_counter() - started, 1)},
+        "false_alarm": FALSE_ALARM,
+        "models": models,
+        "schema_sha256": schema_hash(),
+        "versions": _versions(),
+    }
+    files[ACCOUNT] = (json.dumps(account, indent=1, allow_nan=False) + "\n").encode()
+    write_together(out, files)
+    if progress:
+        _print_table(account, out)
+    return account
+
+
+def _gather(settings: TrainingConfig, bars: Progress) -> Sets:
+    """Draw the four sets, with only the inputs that the chosen models read."""
+    names = tuple(name for name in INPUT_SHAPES if any(name in LADDER[model] for model in settings.models))
+    counts = {"train": settings.records, **dict.fromkeys(("validate", "calibrate", "test"), settings.held_out)}
+    total, done = sum(counts.values()), 0
+    sets = {}
+    with bars.phase(f"draw {total} records", total) as on_done:
+        for purpose, count in counts.items():
+
+            def on_records(number: int) -> None:
+                nonlocal done
+                done += number
+                on_done(done)
+
+            sets[purpose] = gather(settings.seed, purpose, count, names=names, on_records=on_records)
+    return Sets(**sets)
+
+
+def _train_one(
+    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction
+) -> tuple[bytes, dict[str, Any]]:
+    """Train, calibrate, export and compare one model; give its sealed file and its account."""
+    from bladewing.models.calibration import (
+        acceptance_thresholds,
+        expected_calibration_error,
+        fit_vector_scaling,
+    )
+    from bladewing.models.export import TABULAR_TOLERANCE, attach_metadata, check_export
+    from bladewing.models.seal import seal
+
+    started = time.perf_counter()
+    network = name.endswith("cnn")
+    scores_of, export, detail = (_network if network else _tabular)(name, settings, sets, on_fraction)
+    calibration = fit_vector_scaling(scores_of(sets.calibrate), sets.calibrate.labels)
+    calibrated = calibration.probabilities(scores_of(sets.calibrate))
+    accept = acceptance_thresholds(calibrated, sets.calibrate.labels, settings.precision)
+    onnx_bytes = export(calibration)
+    probabilities = calibration.probabilities(scores_of(sets.test))
+    difference = check_export(
+        onnx_bytes, probabilities, sets.test.inputs, **({} if network else {"tolerance": TABULAR_TOLERANCE})
+    )
+    labels = sets.test.labels
+    account = {
+        "inputs": list(LADDER[name]),
+        "test": _figures(probabilities, labels, accept)
+        | {"expected_calibration_error": round(expected_calibration_error(probabilities, labels), 4)},
+        "calibration": {"scale": float(calibration.scale), "bias": [float(b) for b in calibration.bias]},
+        "accept": [float(limit) for limit in accept],
+        "export_difference": difference,
+        "seconds": round(time.perf_counter() - started, 1),
+        **detail,
+    }
+    metadata = {
+        "product": "bladewing",
+        "format": "1",
+        "name": name,
+        "version": version("bladewing"),
+        "classes": json.dumps(CLASSES),
+        "inputs": json.dumps({key: INPUT_SHAPES[key] for key in LADDER[name]}),
+        "schema_sha256": schema_hash(),
+        "envelope": Envelope().to_json(),
+        "calibration": json.dumps(account["calibration"]),
+        "accept": json.dumps(account["accept"]),
+        "training": settings.model_dump_json(),
+    }
+    sealed = seal(attach_metadata(onnx_bytes, metadata))
+    return sealed, account | {"bytes": len(sealed)}
+
+
+ScoresOf = Callable[[Gathered], NDArray[np.floating]]
+
+
+def _tabular(
+    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction
+) -> tuple[ScoresOf, Callable[[Any], bytes], dict[str, Any]]:
+    from bladewing.models.export import export_tabular
+    from bladewing.models.tabular import tabular_scores, train_boosted, train_linear
+
+    (column,) = LADDER[name]
+
+    def on_step(done: int, total: int) -> None:
+        on_fraction(done / total)
+
+    x, y = sets.train.inputs[column], sets.train.labels
+    if name.endswith("linear"):
+        model = train_linear(x, y, seed=settings.seed, progress=on_step)
+    else:
+        model = train_boosted(
+            x, y, seed=settings.seed, iterations=settings.iterations, leaves=settings.leaves, progress=on_step
+        )
+
+    def scores_of(part: Gathered) -> NDArray[np.floating]:
+        return tabular_scores(model, part.inputs[column])
+
+    return scores_of, lambda calibration: export_tabular(model, x.shape[1], column, calibration), {}
+
+
+def _network(
+    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction
+) -> tuple[ScoresOf, Callable[[Any], bytes], dict[str, Any]]:
+    from bladewing.models.augment import VelocityMirror
+    from bladewing.models.cnn import ImageNet, SpectrumNet
+    from bladewing.models.export import export_network
+    from bladewing.models.training import network_scores, train_network
+
+    signal, evidence = LADDER[name]
+    shapes = {key: INPUT_SHAPES[key] for key in (signal, evidence)}
+    network = {"spectrum": SpectrumNet, "image": ImageNet}[signal]
+    net = network(shapes[signal], shapes[evidence][0], seed=settings.seed)
+
+    def inputs(part: Gathered) -> dict[str, NDArray]:
+        return {key: part.inputs[key] for key in shapes}
+
+    result = train_network(
+        net,
+        inputs(sets.train),
+        sets.train.labels,
+        (inputs(sets.validate), sets.validate.labels),
+        seed=settings.seed,
+        epochs=settings.epochs,
+        batch=settings.batch,
+        learning_rate=settings.learning_rate,
+        weight_decay=settings.weight_decay,
+        # no measurement is signed, so only the picture is mirrored
+        augment=VelocityMirror(axes={signal: {"spectrum": -1, "image": -2}[signal]}, odd={}),
+        on_epoch=lambda epoch, epochs, _: on_fraction(epoch / epochs),
+    )
+    detail = {
+        "device": result.device,
+        "best_epoch": result.best_epoch,
+        "epochs": [{key: round(value, 4) for key, value in epoch.items()} for epoch in result.epochs],
+    }
+    return (
+        lambda part: network_scores(net, inputs(part)),
+        lambda calibration: export_network(net, shapes, calibration),
+        detail,
+    )
+
+
+def _figures(
+    probabilities: NDArray[np.floating], labels: NDArray[np.integer], accept: NDArray[np.floating]
+) -> dict[str, Any]:
+    """What the table quotes, on records that neither training nor calibration has seen."""
+    winner = probabilities.argmax(axis=1)
+    recall = [float(np.mean(winner[labels == index] == index)) for index in range(len(CLASSES))]
+    threshold = np.quantile(probabilities[labels != 0, 0], 1 - FALSE_ALARM, method="higher")
+    named = probabilities.max(axis=1) >= accept[winner]
+    return {
+        "balanced_accuracy": round(float(np.mean(recall)), 4),
+        "recall": {name: round(value, 4) for name, value in zip(CLASSES, recall, strict=True)},
+        "uav_detection": round(float(np.mean(probabilities[labels == 0, 0] > threshold)), 4),
+        "named_share": round(float(np.mean(named)), 4),
+        "named_accuracy": round(float(np.mean((winner == labels)[named])), 4) if named.any() else None,
+    }
+
+
+def _versions() -> dict[str, str]:
+    names = ("bladewing", "numpy", "scipy", "scikit-learn", "torch", "onnx", "onnxruntime", "skl2onnx")
+    return {"python": platform.python_version(), **{name: version(name) for name in names}}
+
+
+def _print_table(account: dict[str, Any], out: Path) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    test = account["records"]["test"]
+    table = Table(title=f"{test} test records, looked at once", title_justify="left")
+    columns = (
+        "model",
+        "accuracy",
+        f"UAV found at {FALSE_ALARM:.0%} false",
+        "named",
+        "right of these",
+        "ECE",
+        "kB",
+        "s",
+    )
+    for column in columns:
+        table.add_column(column, justify="left" if column == "model" else "right")
+    for name, model in account["models"].items():
+        figures = model["test"]
+        right = figures["named_accuracy"]
+        table.add_row(
+            name,
+            f"{figures['balanced_accuracy']:.3f}",
+            f"{figures['uav_detection']:.3f}",
+            f"{figures['named_share']:.0%}",
+            "-" if right is None else f"{right:.3f}",
+            f"{figures['expected_calibration_error']:.3f}",
+            f"{model['bytes'] / 1000:.0f}",
+            f"{model['seconds']:.0f}",
+        )
+    console = Console(highlight=False)
+    console.print(table)
+    console.print(
+        "accuracy: balanced over the three classes, radars from 2 to 100 GHz, dwells from 5 ms, SNR from -20 dB.\n"
+        "named: not answered 'unknown'. ECE: expected calibration error."
+    )
+    console.print(f"Models and {ACCOUNT} are in {out}; trained in {account['seconds']['all']:.0f} s.", soft_wrap=True)

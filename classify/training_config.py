@@ -1,0 +1,95 @@
+"""The settings of a training: one validated table, from defaults, a TOML file and the command line."""
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from .errors import BadInput
+
+#: What `--quick` changes: enough to see every step work, not a model to use.
+QUICK = {"records": 3000, "epochs": 3, "iterations": 20}
+
+
+class TrainingConfig(BaseModel):
+    """Settings of a training; every field has a default and unknown fields are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    records: Annotated[int, Field(ge=600, le=10_000_000)] = 24_000
+    seed: Annotated[int, Field(ge=0)] = 0
+    epochs: Annotated[int, Field(ge=1, le=1000)] = 10
+    batch: Annotated[int, Field(ge=2, le=8192)] = 256
+    learning_rate: Annotated[float, Field(gt=0, le=1)] = 6e-3
+    weight_decay: Annotated[float, Field(ge=0, le=10)] = 0.1
+    iterations: Annotated[int, Field(ge=1, le=1000)] = 80
+    leaves: Annotated[int, Field(ge=2, le=256)] = 15
+    precision: Annotated[float, Field(gt=1 / 3, le=1)] = 0.8
+    models: Annotated[tuple[str, ...], Field(min_length=1)] = (
+        "features-linear",
+        "features-boosted",
+        "spectrum-cnn",
+        "joint-boosted",
+        "image-cnn",
+    )
+
+    @property
+    def held_out(self) -> int:
+        """Records of each of the three sets that are not trained on: validation, calibration and test."""
+        return max(600, min(self.records // 6, 30_000))
+
+
+def training_config(
+    file: Path | None = None, *, records: int | None = None, seed: int | None = None, quick: bool = False
+) -> TrainingConfig:
+    """Put the settings together: defaults, then `--quick`, then the file, then the options.
+
+    Parameters
+    ----------
+    file : Path, optional
+        TOML file with fields of `TrainingConfig` at its top level.
+    records, seed : int, optional
+        Override the file.
+    quick : bool
+        Start from few records and epochs.
+
+    Returns
+    -------
+    TrainingConfig
+
+    Raises
+    ------
+    BadInput
+        If the file cannot be read, is not TOML, or a field is unknown or out of its range.
+    """
+    from bladewing.models import LADDER
+
+    values: dict[str, Any] = dict(QUICK) if quick else {}
+    if file is not None:
+        values |= _read(file)
+    values |= {name: value for name, value in (("records", records), ("seed", seed)) if value is not None}
+    where = str(file) if file is not None else "training settings"
+    try:
+        config = TrainingConfig(**values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(str(part) for part in first["loc"])
+        if first["type"] == "extra_forbidden":
+            known = ", ".join(TrainingConfig.model_fields)
+            raise BadInput(f"{where}: unknown field {field!r}: the fields are {known}") from None
+        rule = first["msg"].removeprefix("Input ")
+        raise BadInput(f"{where}: {field} is {first['input']!r}: it {rule}") from None
+    for name in config.models:
+        if name not in LADDER:
+            raise BadInput(f"{where}: models holds {name!r}: it may hold {', '.join(LADDER)}")
+    return config
+
+
+def _read(file: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadInput(f"{file}: cannot be read: {error.strerror}: give the path of a TOML file") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise BadInput(f"{file}: not TOML: {error}") from None

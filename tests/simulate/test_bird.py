@@ -1,0 +1,68 @@
+import numpy as np
+import pytest
+from bladewing.simulate import Radar, draw_records
+from bladewing.simulate.bird import MAX_WINGBEAT_HZ, stroke_angles_rad, wing_echo, wing_size, wingbeat_hz
+
+
+@pytest.mark.parametrize(
+    # Birds of known size (mass kg, span m, wing area m^2) and the wingbeat their flight shows [Hz].
+    ("mass_kg", "span_m", "area_m2", "expected_hz"),
+    [(9.9, 2.3, 0.65, 3.3), (0.26, 0.68, 0.063, 6.2), (0.08, 0.38, 0.0194, 9.9), (0.0055, 0.152, 0.0051, 14.0)],
+)
+def test_pennycuick_gives_known_wingbeats(mass_kg, span_m, area_m2, expected_hz):
+    assert wingbeat_hz(mass_kg, span_m, area_m2) == pytest.approx(expected_hz, rel=0.2)
+
+
+def test_wingbeat_falls_with_size():
+    mass = np.geomspace(0.008, 10, 50)
+    assert (np.diff(wingbeat_hz(mass, *wing_size(mass))) < 0).all()
+
+
+def test_every_drawn_bird_beats_below_18_hz():
+    truth = draw_records(Radar(9.85e9, 5e3, 64), 300, seed=3, kind="flock").truth
+    assert truth["wingbeat_hz"].max() <= MAX_WINGBEAT_HZ
+    assert truth["members"].min() >= 2
+
+
+SIGHT = np.array([0.6, 0.48, -0.64])
+
+
+def test_wing_echo_equals_a_dense_row_of_scatterers():
+    cycle = np.linspace(0, 2 * np.pi, 61)
+    wavelength_m, half_span_m = 0.03, 0.4
+    closed = wing_echo(
+        cycle, wavelength_m=wavelength_m, half_span_m=half_span_m, sight=SIGHT, feather_weight=0.0, down_stroke=0.0
+    )
+    inner, outer, sweep = stroke_angles_rad(cycle)
+    shares = (np.arange(4000) + 0.5) / 4000
+    brute = np.zeros(len(cycle), complex)
+    for side in (1, -1):
+        first = np.stack([0 * inner, side * np.cos(inner), np.sin(inner)], -1)
+        second = np.stack([np.sin(sweep), side * np.cos(sweep) * np.cos(outer), np.cos(sweep) * np.sin(outer)], -1)
+        towards_inner = half_span_m / 2 * (first @ SIGHT)[:, None] * shares
+        towards_outer = half_span_m / 2 * ((first @ SIGHT)[:, None] + (second @ SIGHT)[:, None] * shares)
+        for towards in (towards_inner, towards_outer):
+            brute += np.exp(4j * np.pi / wavelength_m * towards).mean(axis=1)
+    np.testing.assert_allclose(closed, brute, atol=2e-4)
+
+
+def test_wings_repeat_at_the_wingbeat_and_stand_still_in_a_glide():
+    period = 200
+    cycle = 2 * np.pi * np.arange(3 * period) / period
+    kwargs = {"wavelength_m": 0.03, "half_span_m": 0.5, "sight": SIGHT, "down_stroke": 0.5}
+    flapping = wing_echo(cycle, **kwargs)
+    np.testing.assert_allclose(flapping[:period], flapping[period : 2 * period], atol=2e-3)
+    assert np.ptp(abs(flapping)) > 0.1
+    glide = wing_echo(cycle, **(kwargs | {"stroke_scale": 0.0, "down_stroke": 0.0}))
+    np.testing.assert_allclose(glide, glide[0], atol=1e-6)
+
+
+def test_wing_tip_doppler_is_far_above_the_wingbeat():
+    # A wingbeat of 6 Hz sweeps the tip of a half-metre wing at several metres a second: hundreds of Hz at X band.
+    prf_hz, beat_hz = 4e3, 6.0
+    cycle = 2 * np.pi * beat_hz * np.arange(4000) / prf_hz
+    iq = wing_echo(cycle, wavelength_m=0.0304, half_span_m=0.5, sight=np.array([0.0, 0.0, -1.0]), feather_weight=1.0)
+    power = abs(np.fft.fft(iq * np.kaiser(4000, 12))) ** 2
+    frequency_hz = abs(np.fft.fftfreq(4000, 1 / prf_hz))
+    significant = frequency_hz[power > 1e-3 * power.max()].max()
+    assert 315 < significant < 1230

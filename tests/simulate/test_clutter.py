@@ -1,0 +1,67 @@
+import numpy as np
+import pytest
+from bladewing.simulate import Radar
+from bladewing.simulate.clutter import billingsley, draw_ground, process_velocities, shaped_noise
+from bladewing.simulate.receiver import NormalsOf
+
+RADAR = Radar(9.85e9, 2e3, 500)
+
+
+def normals(records: int, seed: int = 0):
+    generators = [np.random.default_rng([seed, i]) for i in range(records)]
+    return NormalsOf(generators)(np.arange(records))
+
+
+@pytest.mark.parametrize(
+    # Billingsley's numbers at 9.85 GHz: wind [mph], a [dB], b [s/m].
+    ("wind_mph", "a_db", "b_s_per_m"),
+    [(5, 4.0, 8.57), (10, -0.6, 6.74), (20, -5.3, 5.56), (30, -8.0, 5.04)],
+)
+def test_billingsley_gives_the_published_numbers(wind_mph, a_db, b_s_per_m):
+    a, b = billingsley(wind_mph, 9.85e9)
+    assert 10 * np.log10(a) == pytest.approx(a_db, abs=0.06)
+    assert b == pytest.approx(b_s_per_m, abs=0.01)
+
+
+def test_shaped_noise_has_the_spectrum_asked_for():
+    records = 400
+    v = process_velocities(RADAR)
+    mean_mps, width_mps = 3.0, 1.0
+    psd = np.tile(np.exp(-0.5 * ((v - mean_mps) / width_mps) ** 2), (records, 1))
+    iq = shaped_noise(normals(records), RADAR, psd, v)
+    power = np.mean(abs(iq) ** 2)
+    # Correlated over about wavelength / (2 width) = 15 ms: some 16 independent values a record.
+    assert power == pytest.approx(1, abs=4 / np.sqrt(16 * records))
+    measured = abs(np.fft.fft(iq * np.kaiser(RADAR.pulses, 8), axis=1)) ** 2
+    measured = measured.mean(axis=0)
+    axis = -np.fft.fftfreq(RADAR.pulses, 1 / RADAR.prf_hz) * RADAR.wavelength_m / 2
+    centre = np.sum(axis * measured) / measured.sum()
+    spread = np.sqrt(np.sum((axis - centre) ** 2 * measured) / measured.sum())
+    assert centre == pytest.approx(mean_mps, abs=0.05)
+    assert spread == pytest.approx(width_mps, abs=0.05)
+
+
+def test_ground_rests_and_moves_in_billingsleys_shares():
+    records, wind = 600, 20.0
+    iq = draw_ground(normals(records), RADAR, np.full(records, wind), np.zeros(records))
+    a, b = billingsley(wind, RADAR.carrier_hz)
+    rest = a / (a + 1)
+    assert np.mean(iq).real == pytest.approx(np.sqrt(rest), abs=0.05)
+    moving = iq - np.sqrt(rest)
+    assert np.mean(abs(moving) ** 2) == pytest.approx(1 - rest, rel=0.15)
+    # exp(-b|v|) falls to half its power within v = ln(2) / b
+    v = process_velocities(RADAR)
+    spectrum = abs(np.fft.fft(moving, n=len(v), axis=1)) ** 2
+    inside = spectrum[:, abs(v) <= np.log(2) / b].sum() / spectrum.sum()
+    assert inside == pytest.approx(0.5, abs=0.06)
+
+
+def test_the_ends_of_a_process_do_not_meet():
+    # A periodic process would hide leakage: first and last sample must be as unlike as distant ones.
+    v = process_velocities(RADAR)
+    psd = np.tile(np.exp(-0.5 * (v / 0.3) ** 2), (400, 1))
+    iq = shaped_noise(normals(400), RADAR, psd, v)
+    near = np.mean(iq[:, 0] * iq[:, 1].conj()).real
+    ends = np.mean(iq[:, 0] * iq[:, -1].conj()).real
+    assert near > 0.8
+    assert abs(ends) < 0.3

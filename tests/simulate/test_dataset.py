@@ -1,0 +1,135 @@
+import numpy as np
+import pytest
+from bladewing.simulate import CLASSES, KIND_CLASS, KINDS, TRUTH_UNITS, Radar, draw_radar, draw_records, stream
+from bladewing.simulate import dataset as dataset_module
+from bladewing.simulate.laws import LAWS, WIDTH, Draws
+from bladewing.simulate.target import Target
+
+RADAR = Radar(9.85e9, 12e3, 257)
+
+
+def test_same_seed_same_bits_whatever_the_batch(monkeypatch):
+    whole = draw_records(RADAR, 60, seed=7)
+    parts = [draw_records(RADAR, n, seed=7, start=s) for s, n in ((0, 1), (1, 22), (23, 37))]
+    np.testing.assert_array_equal(whole.iq, np.concatenate([p.iq for p in parts]))
+    np.testing.assert_array_equal(whole.labels, np.concatenate([p.labels for p in parts]))
+    for name in whole.truth:
+        np.testing.assert_array_equal(whole.truth[name], np.concatenate([p.truth[name] for p in parts]))
+    monkeypatch.setattr(dataset_module, "_CHUNK_SAMPLES", 3 * RADAR.pulses)
+    np.testing.assert_array_equal(whole.iq, draw_records(RADAR, 60, seed=7).iq)
+
+
+@pytest.mark.parametrize("kind", list(KIND_CLASS))
+def test_each_kind_alone_renders_the_same_bits_in_any_batch(kind):
+    whole = draw_records(RADAR, 9, seed=5, kind=kind)
+    assert np.isfinite(whole.iq).all()
+    assert set(whole.labels) == {KIND_CLASS[kind]}
+    for i in range(9):
+        np.testing.assert_array_equal(whole.iq[i], draw_records(RADAR, 1, seed=5, start=i, kind=kind).iq[0])
+
+
+def test_other_seeds_and_purposes_are_other_records():
+    base = draw_records(RADAR, 6, seed=1)
+    for other in (draw_records(RADAR, 6, seed=2), draw_records(RADAR, 6, seed=1, purpose="test")):
+        assert not (base.iq == other.iq).any()
+
+
+def test_classes_are_balanced_and_kinds_follow_their_shares():
+    records = draw_records(Radar(9.85e9, 5e3, 16), 3000, seed=0)
+    for label in CLASSES:
+        assert (records.labels == label).sum() == 1000
+    for label, kinds in KINDS.items():
+        total = sum(kinds.values())
+        for kind, weight in kinds.items():
+            share = weight / total
+            count = (records.truth["kind"] == kind).sum()
+            assert abs(count - 1000 * share) < 4.5 * np.sqrt(1000 * share * (1 - share)), (label, kind)
+
+
+def test_truth_has_every_column_and_says_nothing_where_there_is_nothing():
+    records = draw_records(RADAR, 60, seed=0)
+    assert set(records.truth) == {"kind", *TRUTH_UNITS}
+    uav = records.labels == "uav"
+    assert np.isfinite(records.truth["chopping_hz"][uav]).all()
+    assert np.isnan(records.truth["wingbeat_hz"][uav]).all()
+    assert np.isnan(records.truth["snr_db"][records.truth["kind"] == "noise"]).all()
+
+
+def test_truth_of_a_uav_is_consistent():
+    truth = draw_records(RADAR, 200, seed=0, kind="quadcopter").truth
+    ratio = truth["chopping_hz"] / truth["rotation_hz"]
+    assert (np.isclose(ratio, truth["blades"]) | np.isclose(ratio, 1)).all()
+    np.testing.assert_array_equal(truth["rotors"], 4)
+    assert (truth["tip_mps"] > 20).all()
+    assert (truth["tip_mps"] < 210).all()
+
+
+def test_receiver_and_background_do_not_depend_on_the_target():
+    # What gives the label away must not: the same record with another target has the same surroundings.
+    with_uav = draw_records(RADAR, 40, seed=9, kind="quadcopter").truth
+    with_noise = draw_records(RADAR, 40, seed=9, kind="noise").truth
+    np.testing.assert_array_equal(with_uav["background_db"], with_noise["background_db"])
+
+
+def test_gain_tells_nothing_about_the_class():
+    records = draw_records(Radar(9.85e9, 5e3, 64), 1500, seed=4)
+    level_db = 10 * np.log10(np.mean(abs(records.iq) ** 2, axis=1))
+    means = [level_db[records.labels == label].mean() for label in CLASSES]
+    spread = level_db.std() / np.sqrt(500)
+    assert np.ptp(means) < 5 * spread  # five standard errors; the gain itself spreads over 160 dB
+
+
+def test_powers_are_those_drawn():
+    rng = np.random.default_rng(0)
+    micro, body = (rng.normal(size=(5, 999)) + 1j * rng.normal(size=(5, 999)) for _ in range(2))
+    snr_db = np.array([-20.0, -3, 0, 10, 30])
+    target = Target(micro.astype(np.complex64), body_db=np.full(5, 12.0), body=0 * body.astype(np.complex64))
+    power = np.mean(abs(dataset_module._powered(target, snr_db)) ** 2, axis=1)
+    np.testing.assert_allclose(10 * np.log10(power), snr_db, atol=1e-3)
+    target = Target(0 * micro.astype(np.complex64), body.astype(np.complex64), np.full(5, 12.0))
+    power = np.mean(abs(dataset_module._powered(target, snr_db)) ** 2, axis=1)
+    np.testing.assert_allclose(10 * np.log10(power), snr_db + 12, atol=1e-3)
+
+
+def test_a_stream_is_its_groups():
+    together = list(stream(3, "train", 60, start=5))
+    assert sum(len(r) for r in together) == 60
+    at = 5
+    for records in together:
+        group = at // dataset_module.RADAR_GROUP
+        assert records.radar == draw_radar(3, "train", group)
+        alone = draw_records(records.radar, len(records), 3, start=at)
+        np.testing.assert_array_equal(records.iq, alone.iq)
+        at += len(records)
+
+
+def test_radars_stay_inside_the_envelope():
+    radars = [draw_radar(0, "train", g) for g in range(400)]
+    assert all(2e9 <= r.carrier_hz <= 100e9 for r in radars)
+    assert all(1e3 <= r.prf_hz <= 1e5 for r in radars)
+    assert all(64 <= r.pulses <= 8192 for r in radars)
+    assert all(r.unambiguous_mps > 9.99 for r in radars)
+    assert all(r.dwell_s > 0.00499 for r in radars)
+
+
+@pytest.mark.parametrize("call", [{"purpose": "holiday"}, {"kind": "ufo"}, {"start": -1}, {"seed": -2}])
+def test_wrong_arguments_are_named(call):
+    with pytest.raises(ValueError, match=next(iter(call))):
+        draw_records(RADAR, 1, **({"seed": 0} | call))
+
+
+def test_every_law_is_a_range_with_a_source():
+    for name, law in LAWS.items():
+        assert law.low < law.high, name
+        assert law.kind in ("uniform", "log")
+        assert law.kind == "uniform" or law.low > 0, name
+        assert law.source, name
+        ends = law(np.array([0.0, 1.0]))
+        np.testing.assert_allclose(ends, [law.low, law.high])
+
+
+def test_drawing_more_than_a_record_owns_is_an_error():
+    draws = Draws(np.zeros((2, WIDTH)))
+    draws.uniform(WIDTH)
+    with pytest.raises(RuntimeError, match="WIDTH"):
+        draws.uniform()
