@@ -38,7 +38,7 @@ def examples(report: Mapping[str, Any]) -> list[Panel]:
             left.set_xlabel("time [ms]")
             left.set_ylabel("radial velocity [m/s]")
             right.plot(spectrum["level_db"], spectrum["velocity_mps"], color=SERIES[2], linewidth=0.7)
-            right.set_xlabel("spectrum [dB over noise]")
+            right.set_xlabel("dB over noise")
             right.set_ylim(*picture["velocity_mps"])
             right.grid(visible=True)
             snr = "no micro-motion" if one["snr_db"] is None else f"SNR {one['snr_db']:.0f} dB"

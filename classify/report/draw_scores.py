@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, PercentFormatter
 
 from .series import looks
-from .svg import INK, MUTED, NARROW_IN, Panel, drawing, panel
+from .svg import MUTED, NARROW_IN, Panel, drawing, panel
 from .words import percent, spoken
 
 GROUPS = ("all", "uav", "bird", "clutter")
@@ -114,46 +114,45 @@ def _worst_bin(bins: Sequence[Mapping[str, Any]]) -> str:
 
 def called_uav(report: Mapping[str, Any]) -> list[Panel]:
     """Share of each kind that is called UAV: false drones in one panel, found drones in the other."""
-    panels = []
-    for wanted, title in (
-        (False, "Birds and clutter called UAV (should be 0)"),
-        (True, "UAVs called UAV (should be 100 %)"),
-    ):
-        names = [model["name"] for model in report["models"]]
-        rows = {name: {r["kind"]: r for r in report["scores"][name]["by_kind"]} for name in names}
-        first = report["scores"][names[0]]["by_kind"]
-        kinds = [row["kind"] for row in first if (row["class"] == "uav") is wanted]
-        with drawing(height_in=1.0 + 0.34 * max(len(kinds), 1)) as (figure, axes):
-            words = []
-            for place, (name, look) in enumerate(looks(names).items()):
-                shift = (place - (len(names) - 1) / 2) * 0.72 / max(len(names), 1)
-                rates = [(i, rows[name][kind]["called"]["uav"]) for i, kind in enumerate(kinds) if kind in rows[name]]
-                for i, one in rates:
-                    axes.plot([one["low"], one["high"]], [i + shift] * 2, color=look.colour, linewidth=0.9)
-                axes.plot(
-                    [one["value"] for _, one in rates],
-                    [i + shift for i, _ in rates],
-                    color=look.colour,
-                    marker=look.marker,
-                    linestyle="none",
-                    markersize=3.4,
-                )
-                if rates:
-                    pick = min if wanted else max
-                    at, end = pick(rates, key=lambda pair: pair[1]["value"])
-                    words.append(f"{name}: worst {spoken(kinds[at])}, {percent(end['value'])}.")
-            for line in range(1, len(kinds)):
-                axes.axhline(line - 0.5, color=MUTED, linewidth=0.3)
-            axes.grid(visible=False, axis="y")
-            axes.set_ylim(max(len(kinds), 1) - 0.5, -0.5)
-            axes.set_yticks(range(len(kinds)), [spoken(kind) for kind in kinds])
-            axes.tick_params(axis="y", length=0)
-            axes.set_xlim(-0.02, 1.02)
-            axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
-            axes.set_xlabel("called UAV", color=INK)
-            slug = "found" if wanted else "false"
-            panels.append(panel(figure, name=f"kinds-{slug}", title=title, alt=f"{title}. {' '.join(words)}"))
-    return panels
+    return [
+        _called_uav(report, "false", "Birds and clutter called UAV (should be 0)", wanted=False),
+        _called_uav(report, "found", "UAVs called UAV (should be 100 %)", wanted=True),
+    ]
+
+
+def _called_uav(report: Mapping[str, Any], slug: str, title: str, *, wanted: bool) -> Panel:
+    """Draw one row a kind and one point a model; ``wanted`` chooses the kinds of UAV, else all others."""
+    names = [model["name"] for model in report["models"]]
+    rates = {
+        name: {
+            row["kind"]: row["called"]["uav"]
+            for row in report["scores"][name]["by_kind"]
+            if (row["class"] == "uav") is wanted
+        }
+        for name in names
+    }
+    kinds = list(dict.fromkeys(kind for name in names for kind in rates[name]))
+    words = []
+    with drawing(height_in=1.0 + 0.34 * max(len(kinds), 1)) as (figure, axes):
+        for place, (name, look) in enumerate(looks(names).items()):
+            shift = (place - (len(names) - 1) / 2) * 0.72 / len(names)
+            for kind, one in rates[name].items():
+                y = kinds.index(kind) + shift
+                axes.plot([one["low"], one["high"]], [y, y], color=look.colour, linewidth=0.9)
+                axes.plot([one["value"]], [y], color=look.colour, marker=look.marker, markersize=3.4)
+            if rates[name]:
+                worst = (min if wanted else max)(rates[name].items(), key=lambda pair: pair[1]["value"])
+                words.append(f"{name}: worst {spoken(worst[0])}, {percent(worst[1]['value'])}.")
+        for line in range(1, len(kinds)):
+            axes.axhline(line - 0.5, color=MUTED, linewidth=0.3)
+        axes.grid(visible=False, axis="y")
+        axes.set_ylim(max(len(kinds), 1) - 0.5, -0.5)
+        axes.set_yticks(range(len(kinds)), [spoken(kind) for kind in kinds])
+        axes.tick_params(axis="y", length=0)
+        axes.set_xlim(-0.02, 1.02)
+        axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+        axes.set_xlabel("called UAV")
+        return panel(figure, name=f"kinds-{slug}", title=title, alt=f"{title}. {' '.join(words)}")
 
 
 def _slug(name: str) -> str:

@@ -49,9 +49,9 @@ class Effort:
     reference_records : int
         Records that are timed and weighed, >= 64.
     chain_s : float
-        Time to spend on the timings, for each batch size [s].
+        Time to spend on the timings, for each batch size [s], > 0.
     stft_s : float
-        Time to spend on FFT against STFT, for each record length [s].
+        Time to spend on FFT against STFT, for each record length [s], > 0.
     least_rounds : int
         Rounds of every timing, however long they take.
     """

@@ -62,7 +62,7 @@ def time_in_turns(
     works : mapping to callable
         Called without arguments; each is called twice unmeasured first. It must work in the calling thread alone.
     seconds : float
-        Time to spend [s]; kept to unless ``least_rounds`` take longer.
+        Time to spend [s], > 0; kept to unless ``least_rounds`` take longer.
     least_rounds, most_rounds : int
         Bounds on the number of rounds, 1 <= least <= most.
     on_share : callable, optional

@@ -1,0 +1,234 @@
+"""The whole report on few records with tiny models, and what is drawn from it."""
+
+import copy
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bladewing.classify import BadInput
+from bladewing.classify.report import run, run_report, scores
+from bladewing.classify.report.page import draw_page
+from bladewing.features.schema import INPUT_SHAPES
+
+TINY = run.Effort(records=120, reference_records=64, chain_s=1e-3, stft_s=1e-3, least_rounds=2)
+
+
+@pytest.fixture(scope="module")
+def models(tmp_path_factory: pytest.TempPathFactory, make_model: Callable[..., bytes]) -> Path:
+    folder = tmp_path_factory.mktemp("models")
+    (folder / "spectrum-cnn.onnx").write_bytes(make_model(slope=0.05))
+    (folder / "always-uav.onnx").write_bytes(make_model(bias=np.log([0.8, 0.15, 0.05])))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory, models: Path) -> Path:
+    folder = tmp_path_factory.mktemp("report") / "new"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run, "QUICK", TINY)
+        run_report(folder, models=models, quick=True, progress=False)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def report(out: Path) -> dict[str, Any]:
+    def refuse(name: str) -> None:
+        raise AssertionError(f"{name} is not JSON")
+
+    found: dict[str, Any] = json.loads((out / "report.json").read_text(encoding="utf-8"), parse_constant=refuse)
+    return found
+
+
+def test_report_holds_the_data_of_every_figure(report: dict[str, Any]) -> None:
+    assert set(report) == {
+        *("schema_version", "made", "machine", "classes", "records", "models", "scores", "reference", "cost"),
+        *("trade", "fft_against_stft", "storage", "examples"),
+    }
+    assert [model["name"] for model in report["models"]] == ["spectrum-cnn", "always-uav"]
+    for found in report["scores"].values():
+        assert set(found) == {
+            *("refused", "accuracy", "design_effect", "balanced_accuracy", "recall", "confusion", "uav_at_pfa"),
+            *("false_uav", "reliability", "by_snr", "by_dwell", "by_kind", "acceptance"),
+        }
+    for part in report["cost"]["batches"]:
+        assert {(row["stage"], row["name"]) for row in part["stages"]} == {
+            *(("fft", "fft"), ("input", "features")),
+            *((stage, name) for stage in ("model", "chain") for name in ("spectrum-cnn", "always-uav")),
+        }
+        assert all(row["ratio_to_fft"] > 0 for row in part["stages"])
+        assert part["stages"][0]["ratio_to_fft"] == 1.0
+    assert [part["pulses"] for part in report["fft_against_stft"]] == [2000, 10_000]
+    assert [one["class"] for one in report["examples"]] == report["classes"]
+    assert {"cpu", "cores", "python", "packages"} <= set(report["machine"])
+    assert {"date", "command", "seed", "quick"} <= set(report["made"])
+
+
+def test_weights_are_those_of_the_schema(report: dict[str, Any]) -> None:
+    weights = {row["form"]: row for row in report["storage"]}
+    assert weights["raw IQ"]["bytes"] == 8 * report["reference"]["pulses"]
+    for name, shape in INPUT_SHAPES.items():
+        assert weights[name]["bytes"] == 4 * math.prod(shape)
+        assert weights[name]["bytes_per_million"] == 4_000_000 * math.prod(shape)
+
+
+def test_a_model_that_always_says_uav_is_scored_as_such(report: dict[str, Any]) -> None:
+    found = report["scores"]["always-uav"]
+    assert found["accuracy"]["right"] == report["records"]["by_class"]["uav"] == 40
+    assert found["false_uav"]["best"]["value"] == 1.0
+    assert found["balanced_accuracy"]["value"] == pytest.approx(1 / 3)
+    assert found["uav_at_pfa"]["detection"]["value"] == 0.0  # all scores are equal: no threshold parts them
+    assert found["reliability"]["ece"] == pytest.approx(0.8 - 1 / 3, abs=1e-6)
+    assert found["acceptance"]["coverage"]["value"] == 1.0
+
+
+def test_examples_show_the_body_line_at_one_velocity_in_both_pictures(report: dict[str, Any]) -> None:
+    for one in report["examples"]:
+        spectrum, picture = one["spectrum"], np.array(one["picture"]["level_db"])
+        line = spectrum["velocity_mps"][int(np.argmax(spectrum["level_db"]))]
+        first, last = one["picture"]["velocity_mps"]
+        row = int(np.argmax(picture.max(axis=1)))
+        shown = first + (row + 0.5) * (last - first) / picture.shape[0]
+        assert shown == pytest.approx(line, abs=0.06 * (last - first))
+
+
+def test_page_is_drawn_from_the_stored_json_alone_to_the_same_bytes(out: Path) -> None:
+    redraw = (
+        "import json, sys; from bladewing.classify.report.page import draw_page; "
+        "sys.stdout.buffer.write(draw_page(json.load(open(sys.argv[1], encoding='utf-8'))).encode())"
+    )
+    for hash_seed in ("1", "2"):
+        environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
+        drawn = subprocess.run(
+            [sys.executable, "-c", redraw, str(out / "report.json")], env=environment, capture_output=True, check=True
+        )
+        assert drawn.stdout == (out / "report.html").read_bytes()
+
+
+class Reader(HTMLParser):
+    """Collects what a page must not have: requests, repeated ids, tags left open."""
+
+    VOID = frozenset({"meta", "link", "br", "img", "input", "hr"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.unlabelled = 0
+        self.pictures = 0
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in self.VOID:
+            self.open.append(tag)
+        self.note(tag, dict(attrs))
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.note(tag, dict(attrs))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def note(self, tag: str, attrs: dict[str, str | None]) -> None:
+        self.ids += [value for key, value in attrs.items() if key == "id" and value]
+        self.links += [value for key, value in attrs.items() if key in ("src", "href", "xlink:href") and value]
+        if tag == "svg":
+            self.pictures += 1
+            self.unlabelled += not (attrs.get("aria-label") or attrs.get("aria-hidden"))
+
+
+def read(page: str) -> Reader:
+    reader = Reader()
+    reader.feed(page)
+    reader.close()
+    assert reader.open == []
+    return reader
+
+
+def test_page_is_whole_asks_for_nothing_and_names_its_pictures(out: Path) -> None:
+    page = (out / "report.html").read_text(encoding="utf-8")
+    reader = read(page)
+    assert all(link.startswith(("#", "data:")) for link in reader.links)
+    assert "@import" not in page
+    assert re.search(r"url\((?!#)", page) is None
+    assert len(reader.ids) == len(set(reader.ids))
+    assert {link[1:] for link in reader.links if link.startswith("#")} <= set(reader.ids)
+    assert reader.pictures > 15
+    assert reader.unlabelled == 0
+    assert not re.search(
+        r"\bnan\b|\bNone\b", re.sub(r"<style>.*?</style>|<script>.*?</script>", "", page, flags=re.DOTALL)
+    )
+
+
+def test_page_copes_with_one_model_without_answers(report: dict[str, Any]) -> None:
+    lean = copy.deepcopy(report)
+    name = "features-linear"
+    lean["models"] = [{**lean["models"][0], "name": name}]
+    truth = scores.Truth(
+        classes=("uav", "bird", "clutter"),
+        label=np.arange(120) % 3,
+        kind=np.array(["quadcopter", "flock", "rain"] * 40),
+        snr_db=np.full(120, np.nan),
+        dwell_s=np.full(120, 0.08),
+        radar=np.zeros(120, int),
+    )
+    refused = scores.Answers(np.full((120, 3), 1 / 3), np.full(120, scores.UNKNOWN), np.zeros(120, bool))
+    lean["scores"] = {name: scores.score(truth, refused)}
+    lean["records"] = scores.describe_records(truth)
+    for part in lean["cost"]["batches"]:
+        part["stages"] = [row for row in part["stages"] if row["stage"] in ("fft", "input")]
+    for part in lean["trade"]:
+        budgets = [
+            {**b, "model": None, "cost_us": None, "balanced_accuracy": None, "cheapest": None} for b in part["budgets"]
+        ]
+        part.update(points=[], budgets=budgets)
+    page = draw_page(lean)
+    read(page)
+    assert "120 records were refused" in page
+
+
+def test_page_of_another_schema_is_refused(report: dict[str, Any]) -> None:
+    with pytest.raises(BadInput, match="schema_version is '0'"):
+        draw_page({**report, "schema_version": "0"})
+
+
+@pytest.mark.parametrize("where", ["scores.score", "draw_page", "write_whole"])
+def test_interrupted_run_leaves_the_old_files_whole(
+    where: str, out: Path, models: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    old = {name: (out / name).read_bytes() for name in ("report.json", "report.html")}
+    for name, content in old.items():
+        (tmp_path / name).write_bytes(content)
+    monkeypatch.setattr(
+        run, "QUICK", run.Effort(records=12, reference_records=64, chain_s=1e-3, stft_s=1e-3, least_rounds=1)
+    )
+    monkeypatch.setattr(f"bladewing.classify.report.run.{where}", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        run_report(tmp_path, models=models, quick=True, seed=1, progress=False)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == old
+
+
+def test_no_models_is_one_clear_line(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"holds no \.onnx file: run `bladewing train"):
+        run_report(tmp_path, models=tmp_path, quick=True, progress=False)
+    with pytest.raises(BadInput, match="not a folder"):
+        run_report(tmp_path, models=tmp_path / "missing", quick=True, progress=False)
+    with pytest.raises(BadInput, match="seed=-1"):
+        run_report(tmp_path, models=None, quick=True, seed=-1, progress=False)
+
+
+def test_a_foreign_model_is_refused_before_anything_is_measured(tmp_path: Path) -> None:
+    (tmp_path / "foreign.onnx").write_bytes(b"not a model")
+    with pytest.raises(BadInput, match="foreign"):
+        run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
