@@ -1,6 +1,22 @@
 """The report: what the models get right, what an answer costs, what a record weighs, drawn as one page.
 
-Everything heavy is imported when a report is made.
+Everything heavy is imported when a report is made. ``report.json`` holds every number of the page:
+
+==================== ==============================================================================================
+``schema_version``   "1"; a page is drawn from this version alone
+``made``             date, command, quick, seed, seconds
+``machine``          cpu, cores, system, python, packages (name to version), load
+``classes``          the order of every table
+``records``          what the test set holds: total, by class, by kind, radars, extremes of SNR [dB] and dwell [s]
+``models``           one a model: name, bytes, sha256, version, inputs, input_bytes, accept, envelope
+``scores``           by model: see `scores.score`; a rate is value, low, high (95 % Wilson), right, count
+``reference``        the radar of the records that are timed, weighed and shown
+``cost``             threads, and one entry a batch size: see `cost.time_chain`
+``trade``            accuracy against cost, the front and the budgets: see `trade.weigh_up`
+``fft_against_stft`` one a record length: see `stft.time_fft_against_stft`
+``storage``          one a form of a record: see `storage.weigh`
+``examples``         one a class: see `examples.show_examples`
+==================== ==============================================================================================
 """
 
 from __future__ import annotations

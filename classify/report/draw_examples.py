@@ -11,9 +11,6 @@ from matplotlib import rcParams
 from .svg import SERIES, Panel, drawing, panel
 from .words import number, spoken
 
-# Levels shown in the picture, above its median [dB]; a body line may stand far higher.
-_SHOWN_DB = 40.0
-
 
 def examples(report: Mapping[str, Any]) -> list[Panel]:
     """One panel a class: the STFT picture left, the spectrum right."""
@@ -31,7 +28,6 @@ def examples(report: Mapping[str, Any]) -> list[Panel]:
                 aspect="auto",
                 cmap="cividis",
                 vmin=0.0,
-                vmax=_SHOWN_DB,
                 extent=(first_ms, last_ms, *picture["velocity_mps"]),
                 interpolation="nearest",
             )

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import scipy.fft
+from bladewing.features.spectrum import doppler_spectrum
 from bladewing.simulate import Radar, Records
 from numpy.typing import NDArray
 
@@ -17,6 +18,8 @@ WINDOW, OVERLAP = 80, 0.9
 SNR_SHOWN_DB = (5.0, 20.0)
 # Shown resolution: neighbouring values are pooled by their maximum, so that no line is lost.
 POINTS, ROWS, COLUMNS = 400, 128, 90
+# The velocities shown reach past the fastest line this strong [dB over the noise], and at least so far [m/s].
+LINE_DB, MARGIN, LEAST_SPAN_MPS = 10.0, 1.4, 15.0
 
 
 def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, Any]]:
@@ -33,7 +36,8 @@ def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, 
     list of dict
         One a class present: ``class``, ``kind``, ``snr_db`` (or None), ``dwell_s``, ``spectrum`` (``velocity_mps``,
         ``level_db`` above the noise floor) and ``picture`` (``velocity_mps`` [first, last], ``time_s`` [first, last],
-        ``level_db`` rows of whole numbers, one a velocity, above the picture's median).
+        ``level_db`` rows of whole numbers, one a velocity, above the median
+        over all velocities). Velocities are cut where nothing is left to see.
     """
     radar, shown = records.radar, []
     for name in classes:
@@ -45,50 +49,69 @@ def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, 
         fitting = where[(snr_db[where] >= low) & (snr_db[where] <= high)]
         index = int(fitting[0] if fitting.size else where[0])
         known = float(snr_db[index]) if np.isfinite(snr_db[index]) else None
+        velocity, level = _spectrum(radar, records.iq[index])
+        span = _span_mps(radar, velocity, level)
+        inside = np.abs(velocity) <= span
         shown.append(
             {
                 "class": name,
                 "kind": str(records.truth["kind"][index]),
                 "snr_db": known,
                 "dwell_s": radar.dwell_s,
-                "spectrum": _spectrum(radar, records.iq[index]),
-                "picture": _picture(radar, records.iq[index]),
+                "spectrum": _curve(velocity[inside], level[inside]),
+                "picture": _picture(radar, records.iq[index], span),
             }
         )
     return shown
 
 
-def _spectrum(radar: Radar, iq: NDArray[np.complex64]) -> dict[str, Any]:
-    """Level above the noise floor against velocity, pooled."""
-    from bladewing.features.spectrum import doppler_spectrum
-
+def _spectrum(radar: Radar, iq: NDArray[np.complex64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Velocities, rising, and the level over the noise floor [dB] at each."""
     spectrum = doppler_spectrum(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
     order = np.argsort(spectrum.velocity_mps)
-    velocity, level = spectrum.velocity_mps[order], spectrum.level_db[order]
-    pooled = _pool(level[:, None], POINTS)[:, 0]
-    middle = np.array([float(part.mean()) for part in np.array_split(velocity, pooled.size)])
-    return {"velocity_mps": np.round(middle, 3).tolist(), "level_db": np.round(pooled.astype(np.float64), 1).tolist()}
+    return spectrum.velocity_mps[order], spectrum.level_db[order].astype(np.float64)
 
 
-def _picture(radar: Radar, iq: NDArray[np.complex64]) -> dict[str, Any]:
+def _span_mps(radar: Radar, velocity: NDArray[np.float64], level: NDArray[np.float64]) -> float:
+    """How far the velocity axis reaches to either side [m/s]."""
+    lines = np.abs(velocity[level > LINE_DB])
+    return min(radar.unambiguous_mps, max(LEAST_SPAN_MPS, MARGIN * float(lines.max(initial=0.0))))
+
+
+def _curve(velocity: NDArray[np.float64], level: NDArray[np.float64]) -> dict[str, Any]:
+    """Pooled spectrum for JSON."""
+    middle, highest = _pools(velocity, POINTS).mean(axis=1), _pools(level, POINTS).max(axis=1)
+    return {"velocity_mps": np.round(middle, 3).tolist(), "level_db": np.round(highest, 1).tolist()}
+
+
+def _picture(radar: Radar, iq: NDArray[np.complex64], span_mps: float) -> dict[str, Any]:
     """STFT power [dB] with velocity down the rows, rising, and time across."""
     power = np.abs(scipy.fft.fftshift(stft(iq, window=WINDOW, overlap=OVERLAP), axes=-1)) ** 2
     level_db = 10.0 * np.log10(power + power.max() * 1e-12)
     # Doppler is -2 v / wavelength: rising velocity is falling frequency.
     rising = level_db.T[::-1]
-    pooled = _pool(_pool(rising, ROWS).T, COLUMNS).T
-    edge = radar.unambiguous_mps
-    step = 2.0 * edge / STFT_BINS
-    half_s = WINDOW / radar.prf_hz / 2.0
+    step = 2.0 * radar.unambiguous_mps / STFT_BINS
+    velocity = -step * (np.arange(STFT_BINS) - STFT_BINS // 2)[::-1]
+    inside = np.abs(velocity) <= span_mps
+    time_s = (WINDOW / 2.0 + round(WINDOW * (1.0 - OVERLAP)) * np.arange(rising.shape[1])) / radar.prf_hz
+    rows = _pools(rising[inside], ROWS).max(axis=1)
+    pooled = _pools(rows.T, COLUMNS).max(axis=1).T
     return {
-        "velocity_mps": [-edge + step / 2.0, edge + step / 2.0],
-        "time_s": [half_s, radar.dwell_s - half_s],
-        "level_db": np.round(pooled - np.median(pooled)).astype(int).tolist(),
+        "velocity_mps": _outer_edges(_pools(velocity[inside], ROWS)),
+        "time_s": _outer_edges(_pools(time_s, COLUMNS)),
+        "level_db": np.round(pooled - np.median(rising)).astype(int).tolist(),
     }
 
 
-def _pool(values: NDArray[np.floating], rows: int) -> NDArray[np.floating]:
-    """Largest value of each of ``rows`` runs of neighbouring rows; unchanged where there are no more than that."""
-    if values.shape[0] <= rows:
-        return values
-    return np.stack([part.max(axis=0) for part in np.array_split(values, rows)])
+def _pools(values: NDArray[np.floating], most: int) -> NDArray[np.floating]:
+    """Group neighbours along the first axis into at most so many pools of equal size; a rest at the end is dropped."""
+    size = -(-values.shape[0] // most)
+    count = values.shape[0] // size
+    return values[: count * size].reshape(count, size, *values.shape[1:])
+
+
+def _outer_edges(pools: NDArray[np.floating]) -> list[float]:
+    """Where the first pool of an evenly spaced axis begins and the last one ends."""
+    axis = pools.ravel()
+    half = (axis[1] - axis[0]) / 2.0
+    return [float(axis[0] - half), float(axis[-1] + half)]

@@ -35,6 +35,11 @@ class Progress:
     ) -> None:
         self._bars.stop()
 
+    def say(self, text: str) -> None:
+        """Write a line below the bars."""
+        if not self._bars.disable:
+            self._bars.console.print(text, markup=False, highlight=False, soft_wrap=True)
+
     @contextmanager
     def phase(self, title: str, total: float) -> Iterator[Callable[[float], None]]:
         """Show a bar, and give the function to call with how much of the total is done."""

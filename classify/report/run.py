@@ -7,7 +7,6 @@ import json
 import re
 import time
 from collections.abc import Mapping
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import resources
@@ -209,22 +208,22 @@ def run_report(out: Path, *, models: Path | None, quick: bool, seed: int = 0, pr
     found = load_models(models)
     out.mkdir(parents=True, exist_ok=True)
     started, clock = datetime.now(UTC), time.perf_counter()
-    shown: AbstractContextManager[Progress] = Progress(visible=progress)
-    with shown as bars:
+    with Progress(visible=progress) as bars:
         body = measure(found, QUICK if quick else FULL, seed=seed, progress=bars)
-    made = {
-        "date": started.isoformat(timespec="seconds"),
-        "command": _command(out, models, quick=quick, seed=seed),
-        "quick": quick,
-        "seed": seed,
-        "seconds": round(time.perf_counter() - clock, 1),
-    }
-    text = _json({"schema_version": SCHEMA_VERSION, "made": made, **body})
-    # The page is drawn from the very text that is stored, so that whoever has the file can draw it again.
-    report: dict[str, Any] = json.loads(text)
-    page = draw_page(report)
-    write_whole(out / "report.json", text)
-    write_whole(out / "report.html", page)
+        made = {
+            "date": started.isoformat(timespec="seconds"),
+            "command": _command(out, models, quick=quick, seed=seed),
+            "quick": quick,
+            "seed": seed,
+            "seconds": round(time.perf_counter() - clock, 1),
+        }
+        text = _json({"schema_version": SCHEMA_VERSION, "made": made, **body})
+        # The page is drawn from the very text that is stored, so that whoever has the file can draw it again.
+        report: dict[str, Any] = json.loads(text)
+        page = draw_page(report)
+        write_whole(out / "report.json", text)
+        write_whole(out / "report.html", page)
+        bars.say(f"Wrote {out / 'report.html'} and {out / 'report.json'}")
     return report
 
 

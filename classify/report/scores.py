@@ -102,7 +102,12 @@ def score(truth: Truth, answers: Answers) -> dict[str, Any]:
     Returns
     -------
     dict
-        Plain numbers, lists and dictionaries, ready for JSON; see `run_report` for the keys.
+        Plain numbers, lists and dictionaries, ready for JSON. ``refused`` (records), ``accuracy``, ``recall`` by class
+        and ``balanced_accuracy`` (rates); ``design_effect``; ``confusion`` (counts, true class down; "accepted" has
+        "unknown" as its last column); ``uav_at_pfa`` (see `metrics.detection_at`); ``false_uav`` (rates over the
+        records that are no UAV: by the most probable class, and after acceptance); ``reliability``; ``by_snr`` [dB]
+        and ``by_dwell`` [s] (slices [from, to) with the rate of "all" and of each class); ``by_kind``;
+        ``acceptance`` (coverage, accuracy of what is accepted, precision and share declined by class).
     """
     seen = answers.answered
     label, probabilities = truth.label[seen], np.asarray(answers.probabilities[seen], np.float64)
