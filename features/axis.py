@@ -98,9 +98,11 @@ def pooling(spectrum_bins: int, carrier_hz: float, prf_hz: float, bins: int) -> 
     edges = -axis_edges_mps(bins)[::-1] * 2 / wavelength  # Doppler [Hz], rising
     low, high = edges[:-1], edges[1:]
     centre = (low + high) / 2
-    inside = np.flatnonzero(np.abs(centre) <= prf_hz / 2)  # never empty: the innermost bins hold frequency 0
-    first = np.searchsorted(frequency, low[inside] - step / 2)
-    stop = np.searchsorted(frequency, high[inside] - step / 2)
+    within = np.abs(centre) <= prf_hz / 2
+    within[bins // 2 - 1 : bins // 2 + 1] = True  # the innermost bins hold frequency 0, however slow the radar
+    inside = np.flatnonzero(within)
+    first = np.searchsorted(frequency, low[inside])
+    stop = np.searchsorted(frequency, high[inside])
     nearest = np.clip(np.rint((centre[inside] - frequency[0]) / step).astype(np.intp), 0, spectrum_bins - 1)
     starts = np.minimum(np.where(stop > first, first, nearest), spectrum_bins - 1)
     starts = np.maximum.accumulate(starts)

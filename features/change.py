@@ -57,7 +57,7 @@ def frames(iq: NDArray[np.complex64], length: int, count: int) -> NDArray[np.com
 def frame_power(iq: NDArray[np.complex64], spectrum: Spectrum, length: int, count: int) -> NDArray[np.float32]:
     """Power spectra of frames in units of the dwell's noise floor, shape (..., count, bins)."""
     parts = frames(iq, length, count) * spectrum.scale[..., None, :]
-    floor = (spectrum.floor.astype(np.float64) * spectrum.scale[..., 0].astype(np.float64) ** 2).astype(np.float32)
+    floor = (spectrum.floor * spectrum.scale[..., 0].astype(np.float64) ** 2).astype(np.float32)
     power = centred_power(parts)
     return (power / np.where(floor > 0, floor, 1)[..., None, None]).astype(np.float32, copy=False)
 

@@ -1,12 +1,13 @@
 """The chopping frequency from the cepstrum: lines a chopping frequency apart are one peak at its period."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .spectrum import Spectrum
+from .spectrum import KAISER_BETA, Spectrum
 
 #: Range in which a chopping frequency is sought [Hz]: a slow main rotor to a small propeller of four blades.
 CHOPPING_RANGE_HZ = (18.0, 1600.0)
@@ -14,8 +15,9 @@ CHOPPING_RANGE_HZ = (18.0, 1600.0)
 #: Lines nearer than this cannot be told apart behind the window [bins].
 MIN_SPACING_BINS = 3.5
 
-#: A peak at a multiple of the period is passed over for one at the period itself if that has this share of it.
-FUNDAMENTAL_SHARE = 0.6
+#: A peak at a multiple of the period is passed over for one at the period itself if that has this share of it (unlike
+#: rotor rates blur the high orders, and with them the first peak) and is no accident of noise.
+FUNDAMENTAL_SHARE, FUNDAMENTAL_STRENGTH = 0.35, 3.5
 
 #: Lines stand out of the spectrum by no more than this [dB], so that one strong line does not become the cepstrum.
 CLIP_DB = 30.0
@@ -30,7 +32,7 @@ class Chopping:
     frequency_hz : ndarray of float32, shape (...)
         Chopping frequency [Hz]; NaN where the dwell holds no range to search.
     strength : ndarray of float32, shape (...)
-        Height of its peak over the rms of the cepstrum in the range searched [1]; about 3 for noise.
+        Prominence of its peak over the rms of the cepstrum of noise [1]; below 4 in noise.
     repeats : ndarray of float32, shape (...)
         Mean height at two and three times the period over the height at the period [1]: a comb of narrow lines repeats.
     """
@@ -40,10 +42,32 @@ class Chopping:
     repeats: NDArray[np.float32]
 
 
+@lru_cache(maxsize=64)
+def noise_shape(pulses: int, bins: int) -> NDArray[np.float32]:
+    """RMS of the cepstrum of white noise, up to a factor, shape (bins // 2 + 1,): what makes all periods comparable.
+
+    The window couples neighbouring bins, so the log spectrum of noise is coloured. Two bins whose amplitudes correlate
+    by r have log powers of covariance Li2(|r|^2); its transform is the variance of the cepstrum.
+
+    Parameters
+    ----------
+    pulses : int
+        Pulses of the dwell.
+    bins : int
+        Length of the spectrum.
+    """
+    squared = np.kaiser(pulses, KAISER_BETA) ** 2
+    correlation = np.abs(fft.fft(squared / squared.sum(), n=bins)) ** 2
+    dilogarithm = sum(correlation**n / n**2 for n in range(1, 40))
+    variance = fft.rfft(dilogarithm).real
+    return np.sqrt(np.maximum(variance, 1e-3 * variance.max())).astype(np.float32)
+
+
 def cepstrum(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Magnitude of the cepstrum of the notched, floored log spectrum, shape (..., bins // 2 + 1).
 
     Index k is a period of k / PRF. Both signs of Doppler count, and a one-sided comb is one too, hence the magnitude.
+    Each period is divided by what noise gives there (`noise_shape`).
 
     Parameters
     ----------
@@ -55,14 +79,43 @@ def cepstrum(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.float32]
     Returns
     -------
     ndarray of float32
-        In dB of ripple amplitude.
+        Any scale, the same for all periods.
     """
     level = np.clip(spectrum.level_db, 0, np.float32(CLIP_DB))
     count = np.maximum(mask.sum(axis=-1, keepdims=True), 1)
     mean = np.where(mask, level, np.float32(0)).sum(axis=-1, keepdims=True) / count
     ripple = np.where(mask, level - mean.astype(np.float32), np.float32(0))
     transform = fft.rfft(ripple, axis=-1)
-    return np.hypot(transform.real, transform.imag) * np.float32(2 / spectrum.bins)
+    magnitude = np.sqrt(transform.real**2 + transform.imag**2)
+    return magnitude / noise_shape(spectrum.pulses, spectrum.bins)
+
+
+def prominence(heights: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Height of each period over its surroundings: a band's envelope falls smoothly with the period, a comb does not.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (..., periods)
+        From `cepstrum`.
+
+    Returns
+    -------
+    ndarray of float32, same shape
+        Height less the larger of the means over 0.6-0.85 and 1.15-1.4 times the period, plus the mean of all, so that
+        noise keeps its level; 0 at periods too short to have surroundings.
+    """
+    count = heights.shape[-1]
+    period = np.arange(count)
+    total = np.concatenate([np.zeros((*heights.shape[:-1], 1)), np.cumsum(heights, axis=-1, dtype=np.float64)], axis=-1)
+
+    def mean_over(low: float, high: float) -> NDArray[np.float64]:
+        start = np.minimum((low * period).astype(np.intp), count - 1)
+        stop = np.minimum(np.maximum((high * period).astype(np.intp), start + 1), count)
+        return (total[..., stop] - total[..., start]) / (stop - start)
+
+    around = np.maximum(mean_over(0.6, 0.85), mean_over(1.15, 1.4))
+    out = heights - around + heights.mean(axis=-1, keepdims=True)
+    return np.where(period >= 2, np.maximum(out, 0), 0).astype(np.float32)
 
 
 def cepstral_chopping(spectrum: Spectrum, mask: NDArray[np.bool_]) -> Chopping:
@@ -88,17 +141,19 @@ def cepstral_chopping(spectrum: Spectrum, mask: NDArray[np.bool_]) -> Chopping:
     if last - first < 4:
         nothing = np.zeros(shape, np.float32)
         return Chopping(np.full(shape, np.nan, np.float32), nothing, nothing)
-    flat = heights.reshape(-1, heights.shape[-1])
+    flat = prominence(heights.reshape(-1, heights.shape[-1]))
     rows = np.arange(len(flat))
     window = flat[:, first : last + 1]
-    rms = np.sqrt(np.mean(window**2, axis=-1))
+    # the median of Rayleigh heights is 0.83 of their rms; a comb's own peaks do not move it
+    rms = np.median(heights.reshape(flat.shape)[:, first : last + 1], axis=-1) / np.float32(0.8326)
     peak = window.max(axis=-1)
     top = first + window.argmax(axis=-1)
+    least = np.maximum(FUNDAMENTAL_SHARE * peak, FUNDAMENTAL_STRENGTH * rms)
     best = top.copy()
     for divisor in (2, 3, 4):  # the smallest strong one wins, so later divisors overrule
         near = np.rint(top / divisor).astype(np.intp)
         around = np.stack([flat[rows, np.clip(near + shift, 0, flat.shape[1] - 1)] for shift in (-1, 0, 1)])
-        ok = (near >= first) & (around.max(axis=0) >= FUNDAMENTAL_SHARE * peak)
+        ok = (near >= first) & (around.max(axis=0) >= least)
         best = np.where(ok, near - 1 + around.argmax(axis=0), best)
     best = np.clip(best, 1, flat.shape[1] - 2)
     left, middle, right = (flat[rows, best + shift] for shift in (-1, 0, 1))

@@ -75,7 +75,7 @@ FEATURES: tuple[Feature, ...] = (
     Feature("symmetry", "1", -1, 1, "correlation of the two sides about the body line"),
     Feature("chopping_log", "log10 Hz", 0, 4, "cepstral chopping frequency (eq. 25); 0 where none can be sought"),
     Feature("chopping_step_mps", "m/s", 0, 400, "the same as a velocity"),
-    Feature("chopping_strength", "1", 0, 60, "cepstral peak over the rms of the cepstrum"),
+    Feature("chopping_strength", "1", 0, 60, "prominence of the cepstral peak over the rms of noise"),
     Feature("chopping_repeats", "1", 0, 2, "cepstral peaks at twice and three times the period, over the first"),
     Feature("chopping_turns", "log10", -2, 4, "chopping periods in the dwell"),
     Feature("chopping_orders", "1", 0, 400, "bandwidth over chopping frequency: lines in the comb"),

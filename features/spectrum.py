@@ -22,6 +22,7 @@ LOWEST_DB = -20.0
 _FLOOR_QUANTILE = 0.25
 _FLOOR_QUANTILE_NORMAL = -0.6744897501960817  # standard normal quantile of 0.25
 _FLOOR_BLOCKS = 64  # a side of the spectrum
+_EMPTY_RATIO = 4.0  # a side this much below the other holds no noise of its own
 
 
 @dataclass(frozen=True)
@@ -32,8 +33,9 @@ class Spectrum:
     ----------
     relative_power : ndarray of float32, shape (..., bins)
         Power over the noise floor [1], centred (fftshift): noise alone has mean 1.
-    floor : ndarray of float32, shape (...)
-        Noise power a sample, in the square of the input's unit; 0 for an all-zero record.
+    floor : ndarray of float64, shape (...)
+        Noise power a sample, in the square of the input's unit; 0 for an all-zero record. float64, because the square
+        of a sample may leave float32.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz].
     pulses : int
@@ -43,7 +45,7 @@ class Spectrum:
     """
 
     relative_power: NDArray[np.float32]
-    floor: NDArray[np.float32]
+    floor: NDArray[np.float64]
     carrier_hz: float
     prf_hz: float
     pulses: int
@@ -128,8 +130,8 @@ def noise_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
     """Noise floor of centred power spectra, robust to lines, bands and an empty side.
 
     Each side is averaged in blocks of neighbouring bins; the lower quartile of the blocks, corrected for its bias on
-    white noise, is that side's floor. The larger of both counts: recordings made analytic from a single real channel
-    have nothing on one side.
+    white noise, is that side's floor. Their mean counts, or the larger one where the other side is empty, as it is in
+    recordings made analytic from a single real channel.
 
     Parameters
     ----------
@@ -152,10 +154,12 @@ def noise_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
         means = side.reshape(shape).mean(axis=-1) if size > 1 else side
         rank = round(_FLOOR_QUANTILE * (blocks - 1))
         sides.append(np.partition(means, rank, axis=-1)[..., rank])
+    least, most = np.minimum(*sides), np.maximum(*sides)
+    level = np.where(most > _EMPTY_RATIO * least, most, (least + most) / 2)
     # Wilson and Hilferty's normal approximation to the quantile of a gamma of that many degrees of freedom
     shape_k = max(1.0, size / NOISE_BANDWIDTH_BINS)
     bias = (1 - 1 / (9 * shape_k) + _FLOOR_QUANTILE_NORMAL / (3 * np.sqrt(shape_k))) ** 3
-    return np.maximum(*sides) / np.float32(bias)
+    return (level / bias).astype(np.float32)
 
 
 def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spectrum:
@@ -190,7 +194,6 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spec
     # Without any noise (a synthetic line) the floor is what arithmetic leaves, not zero: -140 dB under the record.
     floor = np.maximum(floor, power.mean(axis=-1) * np.float32(1e-14))
     safe = np.where(floor > 0, floor, np.float32(1))
-    with np.errstate(over="ignore", under="ignore"):
-        natural = (floor / scale[..., 0].astype(np.float64) ** 2).astype(np.float32)
+    natural = floor / scale[..., 0].astype(np.float64) ** 2
     relative = (power / safe[..., None]).astype(np.float32, copy=False)
     return Spectrum(relative, natural, float(carrier_hz), float(prf_hz), samples.shape[-1], scale)

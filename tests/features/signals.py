@@ -1,0 +1,31 @@
+"""Signals of known spectra for the tests of this folder."""
+
+import numpy as np
+from bladewing.simulate import RotorMotion, rotor_echo
+
+CARRIER_HZ, PRF_HZ, PULSES = 9.85e9, 35e3, 3000
+WAVELENGTH_M = 299_792_458.0 / CARRIER_HZ
+
+
+def tone(frequency_hz, pulses: int = PULSES, prf_hz: float = PRF_HZ) -> np.ndarray:
+    return np.exp(2j * np.pi * np.asarray(frequency_hz)[..., None] * np.arange(pulses) / prf_hz)
+
+
+def white(rng: np.random.Generator, *shape: int) -> np.ndarray:
+    """Complex noise of unit power a sample."""
+    return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) * np.sqrt(0.5)
+
+
+def rotors(rates_hz, *, length_m: float = 0.15, blades: int = 2, velocity_mps: float = 0.0, body: float = 3.0):
+    """Body line and rotors of unit blade power as the paper's radar sees them."""
+    times_s = np.arange(PULSES) / PRF_HZ
+    iq = np.zeros(PULSES, complex)
+    for number, rate_hz in enumerate(rates_hz):
+        iq += rotor_echo(
+            RotorMotion(rate_hz, 0.3 + 1.7 * number).angle_rad(times_s),
+            wavelength_m=WAVELENGTH_M,
+            blade_length_m=length_m,
+            blade_amplitudes=np.ones(blades),
+        )
+    iq /= np.sqrt(np.mean(abs(iq) ** 2))
+    return (iq + body) * np.exp(-4j * np.pi * velocity_mps * times_s / WAVELENGTH_M)

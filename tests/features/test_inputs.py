@@ -1,0 +1,170 @@
+import numpy as np
+import pytest
+from bladewing.features import FEATURES, INPUT_SHAPES, JOINT_FEATURES, doppler_spectrum, model_inputs, schema_hash
+from bladewing.features.change import frames
+from bladewing.features.joint import frame_length, stft_image
+from bladewing.features.schema import IMAGE_FRAMES
+from bladewing.features.vector import lay_out
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
+from scipy.signal import ShortTimeFFT
+
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, rotors, white
+
+RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+ALL = tuple(INPUT_SHAPES)
+
+
+def scene(seed: int = 0) -> np.ndarray:
+    return rotors([58.6, 60.1], velocity_mps=-7.0) + 0.3 * white(np.random.default_rng(seed), PULSES)
+
+
+def features(iq, radar=RADAR) -> dict[str, float]:
+    return dict(zip([f.name for f in FEATURES], model_inputs(iq, **radar)["features"], strict=True))
+
+
+def test_shapes_types_and_ranges():
+    iq = np.stack([scene(), white(np.random.default_rng(1), PULSES)]).reshape(2, 1, PULSES)
+    inputs = model_inputs(iq, **RADAR, names=ALL)
+    for name, shape in INPUT_SHAPES.items():
+        assert inputs[name].shape == (2, 1, *shape)
+        assert inputs[name].dtype == np.float32
+        assert np.isfinite(inputs[name]).all()
+    for name, table in (("features", FEATURES), ("joint_features", JOINT_FEATURES)):
+        for number, feature in enumerate(table):
+            values = inputs[name][..., number]
+            assert (values >= np.float32(feature.low)).all(), feature
+            assert (values <= np.float32(feature.high)).all(), feature
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    parts=npst.arrays(
+        np.float32,
+        st.tuples(st.integers(1, 2), st.integers(16, 90), st.just(2)),
+        elements=st.floats(-(2.0**100), 2.0**100, width=32),
+    ),
+    carrier_hz=st.floats(1e8, 3e11),
+    prf_hz=st.floats(100, 1e6),
+)
+def test_any_finite_samples_give_finite_inputs(parts, carrier_hz, prf_hz):
+    iq = parts.view(np.complex64)[..., 0]
+    for values in model_inputs(iq, carrier_hz=carrier_hz, prf_hz=prf_hz, names=ALL).values():
+        assert np.isfinite(values).all()
+
+
+def test_batch_equals_loop():
+    iq = np.stack([scene(seed) * 10.0**seed for seed in range(5)])
+    batch = model_inputs(iq, **RADAR, names=ALL)
+    for i in range(5):
+        one = model_inputs(iq[i], **RADAR, names=ALL)
+        for name in ALL:
+            np.testing.assert_allclose(batch[name][i], one[name], rtol=1e-4, atol=1e-3)
+
+
+def test_only_what_is_asked_for_is_computed():
+    assert set(model_inputs(scene(), **RADAR, names=("image",))) == {"image"}
+    with pytest.raises(ValueError, match="'cepstrogram' is unknown"):
+        model_inputs(scene(), **RADAR, names=("cepstrogram",))
+    with pytest.raises(ValueError, match="at least 16 pulses"):
+        model_inputs(np.ones(15), **RADAR)
+
+
+@pytest.mark.parametrize("gain", [1e-25, 3.7, -1.0, 1j, 1e25])
+def test_gain_and_phase_do_not_matter(gain):
+    reference, changed = (model_inputs(scene() * g, **RADAR, names=ALL) for g in (1.0, gain))
+    for name in ALL:
+        np.testing.assert_allclose(changed[name], reference[name], rtol=1e-3, atol=5e-3)
+
+
+def test_conjugation_mirrors_the_velocity_axis_and_leaves_the_measurements():
+    # A receding copy of an approaching target: an odd number of pulses has a bin for every mirror.
+    iq = scene()[:2999]
+    one, other = (model_inputs(x, **RADAR, names=ALL) for x in (iq, iq.conj()))
+    np.testing.assert_allclose(other["spectrum"][0], one["spectrum"][0][::-1], atol=1.5)
+    # the blocks of the noise floor fall differently on the mirrored bins: 0.1 dB for all levels alike
+    assert np.median(abs(other["spectrum"][0] - one["spectrum"][0][::-1])) < 0.1
+    assert np.median(abs(other["image"][0] - one["image"][0][::-1])) < 0.15
+    a, b = features(iq), features(iq.conj())
+    for name in ("body_speed_mps", "chopping_log", "notch_residual_db", "energy_width_mps", "symmetry", "ripple_db"):
+        assert a[name] == pytest.approx(b[name], rel=0.02, abs=0.02), name
+
+
+def test_carrier_and_prf_scaled_together_give_the_same_velocities():
+    iq = scene()
+    reference = model_inputs(iq, **RADAR, names=("spectrum", "image"))
+    scaled = model_inputs(iq, carrier_hz=2.5 * CARRIER_HZ, prf_hz=2.5 * PRF_HZ, names=("spectrum", "image"))
+    for name in reference:
+        np.testing.assert_allclose(scaled[name], reference[name], atol=1e-3)
+
+
+def test_features_of_a_quadcopter_say_what_it_is():
+    values = features(scene())
+    assert values["body_speed_mps"] == pytest.approx(7.0, abs=0.1)
+    assert 10 ** values["chopping_log"] == pytest.approx(2 * 59.35, rel=0.02)
+    assert values["chopping_strength"] > 5
+    assert values["notch_residual_share"] < 0.2  # the body holds nine tenths of the power
+    assert values["symmetry"] > 0.5
+
+
+def test_features_of_noise_say_nothing():
+    rng = np.random.default_rng(0)
+    rows = model_inputs(white(rng, 100, 2048), carrier_hz=10e9, prf_hz=25e3)["features"]
+    table = dict(zip([f.name for f in FEATURES], rows.T, strict=True))
+    assert np.median(abs(table["notch_residual_db"])) < 0.5
+    assert np.median(table["ripple_db"]) == pytest.approx(5.57, abs=0.3)  # of the log of an exponential
+    assert np.quantile(table["bandwidth_speed_mps"], 0.9) == 0
+    assert abs(np.median(table["symmetry"])) < 0.1
+
+
+def test_image_equals_scipys_short_time_fft():
+    iq = scene().astype(np.complex64)
+    spectrum = doppler_spectrum(iq, **RADAR)
+    length = frame_length(PULSES)
+    starts = np.rint(np.linspace(0, PULSES - length, IMAGE_FRAMES)).astype(int)
+    hop = int(np.gcd.reduce(starts[1:]))
+    window = np.kaiser(length, 12.5)
+    window /= np.sqrt(np.sum(window**2))
+    stft = ShortTimeFFT(window, hop, PRF_HZ, fft_mode="centered", mfft=length, phase_shift=None)
+    slices = stft.stft(iq.astype(complex), p0=0)
+    from bladewing.features.change import frame_power
+
+    ours = frame_power(iq, spectrum, length, IMAGE_FRAMES) * float(spectrum.floor)
+    first = length // 2  # scipy centres its slice p at sample p * hop
+    for number, start in enumerate(starts):
+        position, rest = divmod(start + first, hop)
+        if rest or position >= slices.shape[1]:
+            continue
+        theirs = abs(slices[:, position]) ** 2
+        np.testing.assert_allclose(ours[number], theirs, rtol=2e-3, atol=2e-6 * theirs.max())
+    assert stft_image(iq, spectrum).shape == INPUT_SHAPES["image"][1:]
+
+
+@given(pulses=st.integers(16, 500), count=st.integers(2, 40), share=st.floats(0.01, 1))
+def test_frames_cover_the_record_from_end_to_end(pulses, count, share):
+    length = max(1, int(pulses * share))
+    iq = np.arange(pulses).astype(np.complex64)
+    cut = frames(iq, length, count)
+    assert cut.shape == (count, length)
+    assert cut[0, 0] == 0
+    assert cut[-1, -1] == pulses - 1
+    assert (np.diff(cut.real, axis=-1) == 1).all()
+    assert np.ptp(np.diff(cut[:, 0].real)) <= 1
+
+
+def test_lay_out_holds_values_in_their_ranges():
+    columns = {f.name: np.array([np.nan, np.inf, -np.inf]) for f in FEATURES}
+    out = lay_out(columns, FEATURES, (3,))
+    for number, feature in enumerate(FEATURES):
+        assert out[0, number] == np.clip(0, np.float32(feature.low), np.float32(feature.high))
+        assert out[1, number] == np.float32(feature.high)
+        assert out[2, number] == np.float32(feature.low)
+
+
+def test_schema_names_are_unique_and_its_hash_is_stable():
+    names = [f.name for f in FEATURES + JOINT_FEATURES]
+    radar = {"velocity_step_log", "unambiguous_log", "dwell_log", "pulses_log"}
+    assert len([n for n in names if n not in radar]) == len(set(names) - radar)
+    assert len(schema_hash()) == 64
+    assert schema_hash() == schema_hash()
