@@ -92,7 +92,9 @@ def train(
     records: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Synthetic records to train on.", show_default=False)
     ] = None,
-    seed: Annotated[int, typer.Option(metavar="S", min=0, help="Root of all randomness.")] = 0,
+    seed: Annotated[
+        int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")
+    ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Few records and epochs: a try, not a model to use.")] = False,
 ) -> None:
     """Train all models on synthetic records and write them as ONNX."""

@@ -206,20 +206,10 @@ class Classifier:
         step = max(1, min(_STEP_RECORDS, _STEP_SAMPLES // records.shape[-1]))
         out = np.empty((len(rows), len(CLASSES)), dtype=np.float32)
         for start in range(0, len(rows), step):
-            chunk = _unit_gain(records[rows[start : start + step]])
+            chunk = records[rows[start : start + step]]
             feed = model_inputs(chunk, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs)
             (out[start : start + step],) = self._session.run(["probabilities"], feed)
         return out
-
-
-def _unit_gain(records: NDArray[np.complex64]) -> NDArray[np.complex64]:
-    """Scale each record by a power of two to a largest component of 0.5 to 1.
-
-    Exact, so that it changes no answer, and it keeps the squares of very strong or very weak samples within float32.
-    """
-    parts = np.ascontiguousarray(records).view(np.float32)
-    _, exponent = np.frexp(np.abs(parts).max(axis=-1, keepdims=True))
-    return np.ldexp(parts, -exponent).view(np.complex64)
 
 
 def _open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.InferenceSession:

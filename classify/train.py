@@ -19,7 +19,7 @@ from .errors import BadInput
 from .files import write_together
 from .gather import Gathered, gather
 from .labels import CLASSES
-from .report.progress import Progress
+from .progress import Progress
 from .training_config import TrainingConfig, training_config
 
 #: False-alarm probability at which the table quotes the detection of UAVs.
