@@ -22,14 +22,12 @@ from ..errors import BadInput
 from ..files import write_whole
 from ..inference import Classifier
 from ..labels import CLASSES
+from ..progress import Progress
 from . import cost, evaluate, scores, stft, storage, trade
 from .examples import OVERLAP, WINDOW, show_examples
 from .machine import describe_machine
 from .page import SCHEMA_VERSION, draw_page
-from .progress import Progress
-
-# From cheap to dear, as the tables list them; other models follow by name.
-LADDER = ("features-linear", "features-boosted", "spectrum-cnn", "joint-boosted", "image-cnn")
+from .series import LADDER
 
 # The paper's measured radar: X band, PRF 20 to 30 kHz, 80 ms.
 REFERENCE = Radar(carrier_hz=9.85e9, prf_hz=25e3, pulses=2000)
@@ -152,7 +150,7 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
     Returns
     -------
     dict of str to bytes
-        File stem to content, from cheap to dear.
+        File stem to content: the known ones from cheap to dear, then others by name.
 
     Raises
     ------

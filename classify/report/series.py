@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from bladewing.models import LADDER as _KNOWN
+
 from .svg import MARKERS, SERIES
 
-# A known model keeps its look whatever else is on the page.
-_KNOWN = ("features-linear", "features-boosted", "spectrum-cnn", "joint-boosted", "image-cnn")
+# From cheap to dear, as the tables list them. A known model keeps its look whatever else is on the page.
+LADDER = tuple(_KNOWN)
 
 
 @dataclass(frozen=True)
@@ -31,9 +33,9 @@ def looks(models: Sequence[str]) -> dict[str, Look]:
     -------
     dict of str to Look
     """
-    strangers = [name for name in models if name not in _KNOWN]
-    spare = len(SERIES) - len(_KNOWN)
+    strangers = [name for name in models if name not in LADDER]
+    spare = len(SERIES) - len(LADDER)
     number = {
-        name: _KNOWN.index(name) if name in _KNOWN else len(_KNOWN) + strangers.index(name) % spare for name in models
+        name: LADDER.index(name) if name in LADDER else len(LADDER) + strangers.index(name) % spare for name in models
     }
     return {name: Look(number[name], SERIES[number[name]], MARKERS[number[name]]) for name in models}

@@ -67,6 +67,10 @@ def _failures(report: Mapping[str, Any], name: str, found: Mapping[str, Any]) ->
         yield f"Its commonest mistake: {percent(mistake[2])} of the {mistake[0]} records are called {mistake[1]}."
     yield from _weak_end(found["by_snr"], "At the lowest SNR", 1.0, "dB")
     yield from _weak_end(found["by_dwell"], "In the shortest dwells", 1e3, "ms")
+    coverage = found["acceptance"]["coverage"]["value"]
+    if coverage is not None and coverage < 0.5:
+        yield f"Allowed to say \u201cunknown\u201d, it says so to {percent(1 - coverage)} of the records."
+    yield from _best_other(report, name, clearly=True)
     effect = found["design_effect"]
     if effect is not None and effect > 1.5:
         yield (
@@ -94,10 +98,7 @@ def _merits(report: Mapping[str, Any], name: str, found: Mapping[str, Any]) -> I
     ece = found["reliability"]["ece"]
     if ece is not None:
         yield f"Its probabilities are off by {percent(ece)} on average (expected calibration error)."
-    best = max(report["scores"], key=lambda one: report["scores"][one]["balanced_accuracy"]["value"] or 0.0)
-    if best != name:
-        rate = report["scores"][best]["balanced_accuracy"]
-        yield f"The most accurate model here is {best}: {_with_interval(rate)}."
+    yield from _best_other(report, name, clearly=False)
 
 
 def _costs(report: Mapping[str, Any]) -> Iterator[str]:
@@ -138,6 +139,16 @@ def _with_interval(rate: Mapping[str, Any]) -> str:
     if rate["value"] is None:
         return "–"
     return f"{percent(rate['value'])} ({100 * rate['low']:.1f} to {100 * rate['high']:.1f})"
+
+
+def _best_other(report: Mapping[str, Any], name: str, *, clearly: bool) -> Iterator[str]:
+    """Name the most accurate model, if it is another and does (or does not) lie clear of this one's interval."""
+    accuracy = {one: found["balanced_accuracy"] for one, found in report["scores"].items()}
+    best = max(accuracy, key=lambda one: accuracy[one]["value"] or 0.0)
+    if best == name or accuracy[name]["value"] is None:
+        return
+    if (accuracy[best]["low"] > accuracy[name]["high"]) is clearly:
+        yield f"The most accurate model here is {best}: {_with_interval(accuracy[best])}."
 
 
 def _enough(rate: Mapping[str, Any]) -> bool:

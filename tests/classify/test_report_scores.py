@@ -55,6 +55,15 @@ def test_slices_share_out_every_record_that_has_the_quantity() -> None:
         assert one["all"]["right"] == sum(one[name]["right"] for name in CLASSES)
 
 
+def test_records_on_the_edges_between_slices_are_counted_once_and_above() -> None:
+    truth, answers = drawn(90)
+    edges_s, snr_db = np.tile([0.01, 0.02, 0.05], 30), np.tile([-5.0, 0.0, 5.0], 30)
+    found = score(Truth(**{**vars(truth), "dwell_s": edges_s, "snr_db": snr_db}), answers)
+    for by, values in (("by_dwell", edges_s), ("by_snr", snr_db)):
+        counts = {one["from"]: one["all"]["count"] for one in found[by]}
+        assert counts == {value: np.sum(answers.answered & (values == value)) for value in np.unique(values)}
+
+
 @pytest.mark.parametrize("dwell_s", [1e-3, 2e-3, 5e-3, 0.1, 1.0])
 def test_a_dwell_on_an_edge_falls_into_one_slice(dwell_s: float) -> None:
     truth, answers = drawn(30)
