@@ -221,7 +221,7 @@ def run_report(out: Path, *, models: Path | None, quick: bool, seed: int = 0, pr
         page = draw_page(report)
         write_whole(out / "report.json", text)
         write_whole(out / "report.html", page)
-        bars.say(f"Wrote {out / 'report.html'} and {out / 'report.json'}")
+    bars.say(f"Wrote {out / 'report.html'} and {out / 'report.json'}")
     return report
 
 
