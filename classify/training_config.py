@@ -17,15 +17,15 @@ class TrainingConfig(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    records: Annotated[int, Field(ge=600, le=10_000_000)] = 24_000
+    records: Annotated[int, Field(ge=600, le=10_000_000)] = 36_000
     seed: Annotated[int, Field(ge=0)] = 0
-    epochs: Annotated[int, Field(ge=1, le=1000)] = 10
+    epochs: Annotated[int, Field(ge=1, le=1000)] = 15
     batch: Annotated[int, Field(ge=2, le=8192)] = 256
     learning_rate: Annotated[float, Field(gt=0, le=1)] = 6e-3
     weight_decay: Annotated[float, Field(ge=0, le=10)] = 0.1
     iterations: Annotated[int, Field(ge=1, le=1000)] = 80
     leaves: Annotated[int, Field(ge=2, le=256)] = 15
-    precision: Annotated[float, Field(gt=1 / 3, le=1)] = 0.8
+    precision: Annotated[float, Field(gt=1 / 3, le=1)] = 0.9
     models: Annotated[tuple[str, ...], Field(min_length=1)] = (
         "features-linear",
         "features-boosted",

@@ -22,6 +22,10 @@ LIMBS = (
 )
 
 
+#: Scatterers of a vehicle's body and of its wheels.
+BODY_POINTS, WHEEL_POINTS = 9, 8
+
+
 def draw_person(draws: Draws, radar: Radar) -> Target:
     """Draw a walker: a torso that sways and limbs whose speed swings about the torso's at the gait."""
     t = radar.times_s
@@ -48,16 +52,16 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
     t = radar.times_s
     speed = draws.value("vehicle_mps") * draws.sign()
     acceleration = draws.value("vehicle_acceleration_mps2")
-    spread = 0.15 * draws.uniform() ** 2  # close to the road each part has its own aspect
+    spread = draws.value("aspect_spread")  # close to the road each part has its own aspect
     body = np.zeros((len(draws), radar.pulses), np.complex64)
-    for _ in range(6):
+    for _ in range(BODY_POINTS):
         own = speed * (1 - spread * draws.uniform())
         level = np.exp(0.6 * draws.normal() + 1j * draws.value("phase_rad")).astype(np.complex64)
         body += level[:, None] * range_phasor(straight_path(t, own, acceleration), radar.wavelength_m)
     radius = draws.value("wheel_radius_m")
     turn = speed / (TWO_PI * radius)
     wheels = np.zeros_like(body)
-    for _ in range(8):
+    for _ in range(WHEEL_POINTS):
         # a scatterer on the rim rolls: its speed along the road runs from 0 at the ground to 2 v at the top
         rim = radius * (0.5 + 0.5 * draws.uniform())
         phase = draws.value("phase_rad")

@@ -18,7 +18,7 @@ FAULT_CHANCE = {
     "flicker": 0.25,
     "phase_noise": 0.25,
     "mains": 0.25,
-    "tilt": 0.2,
+    "colour": 0.35,
     "image": 0.3,
     "real_only": 0.03,
     "analytic": 0.1,
@@ -44,6 +44,9 @@ class Receiver:
         self.mains_slope = 1 + 2 * draws.uniform()
         self.mains_phase = draws.value("phase_rad", 12)
         self.tilt_db = draws.value("tilt_db")
+        self.hump_db = draws.value("hump_db")
+        self.hump_turns = 3 * draws.uniform()
+        self.hump_phase = draws.value("phase_rad")
         self.image_db = draws.value("image_db")
         self.conjugate = draws.chance(0.5)
         self.full_scale_db = draws.value("full_scale_db")
@@ -91,7 +94,7 @@ class Receiver:
         rows = np.flatnonzero(self.on["mains"])
         if len(rows):
             iq[rows] += self._mains(radar, rows)
-        self._shape(iq, np.flatnonzero(self.on["tilt"]), radar)
+        self._colour(iq, np.flatnonzero(self.on["colour"]))
         rows = np.flatnonzero(self.on["image"])
         iq[rows] += (10 ** (self.image_db[rows] / 20)).astype(np.float32)[:, None] * iq[rows].conj()
         rows = np.flatnonzero(self.on["real_only"])
@@ -112,11 +115,15 @@ class Receiver:
             out += amplitude[:, n - 1, None].astype(np.float32) * tone
         return out
 
-    def _shape(self, iq: NDArray[np.complex64], rows: NDArray[np.intp], radar: Radar) -> None:
-        """Let the receiver's band fall towards its edges."""
-        edge = np.abs(fft.fftfreq(radar.pulses)) * 2
+    def _colour(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:
+        """A band that is not flat: it falls towards its edges, and a smooth hump lies anywhere in it.
+
+        A hump of noise must not pass for a rotor's band.
+        """
+        share = fft.fftfreq(iq.shape[-1]) * 2
         for row in rows:
-            response = 10 ** (self.tilt_db[row] * edge**2 / 20)
+            hump = np.cos(TWO_PI * self.hump_turns[row] * share + self.hump_phase[row])
+            response = 10 ** ((self.tilt_db[row] * share**2 + self.hump_db[row] * hump) / 20)
             iq[row] = fft.ifft(fft.fft(iq[row]) * response.astype(np.float32))
 
     def _one_sided(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:

@@ -19,7 +19,7 @@ from bladewing.features.schema import INPUT_SHAPES
 from bladewing.simulate import Radar, draw_records
 
 from ..errors import BadInput
-from ..files import write_whole
+from ..files import settle, write_together
 from ..inference import Classifier
 from ..labels import CLASSES
 from ..progress import Progress
@@ -163,6 +163,7 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
     elif not folder.is_dir():
         raise BadInput(f"{folder}: not a folder: give the one that `bladewing train --out` wrote")
     else:
+        settle(folder)
         found = {path.stem: path.read_bytes() for path in folder.glob("*.onnx")}
     if not found:
         where = folder if folder is not None else "the installed package"
@@ -174,8 +175,8 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
 def run_report(out: Path, *, models: Path | None, quick: bool, seed: int = 0, progress: bool = True) -> dict[str, Any]:
     """Measure the models on fresh synthetic records and write ``report.json`` and ``report.html``.
 
-    Each file is replaced in one step after everything is measured and drawn: interrupted at any moment, the old ones
-    or the new ones stand whole.
+    Both files change together after everything is measured and drawn: interrupted at any moment, the old ones or the
+    new ones stand whole.
 
     Parameters
     ----------
@@ -219,8 +220,7 @@ def run_report(out: Path, *, models: Path | None, quick: bool, seed: int = 0, pr
         # The page is drawn from the very text that is stored, so that whoever has the file can draw it again.
         report: dict[str, Any] = json.loads(text)
         page = draw_page(report)
-        write_whole(out / "report.json", text)
-        write_whole(out / "report.html", page)
+        write_together(out, {"report.json": text, "report.html": page})
     bars.say(f"Wrote {out / 'report.html'} and {out / 'report.json'}")
     return report
 

@@ -1,0 +1,38 @@
+import numpy as np
+from bladewing.classify import gather as gather_module
+from bladewing.classify.gather import gather
+from bladewing.features import INPUT_SHAPES
+
+
+def test_inputs_do_not_depend_on_the_workers(monkeypatch):
+    monkeypatch.setattr(gather_module, "TASK_RECORDS", gather_module.RADAR_GROUP)
+    one = gather(5, "train", 60, workers=1)
+    two = gather(5, "train", 60, workers=2)
+    assert len(one) == len(two) == 60
+    for name, shape in INPUT_SHAPES.items():
+        assert one.inputs[name].shape == (60, *shape)
+        np.testing.assert_array_equal(one.inputs[name], two.inputs[name])
+    np.testing.assert_array_equal(one.labels, np.arange(60) % 3)
+    np.testing.assert_array_equal(one.truth["kind"], two.truth["kind"])
+
+
+def test_a_longer_set_begins_with_the_shorter_one():
+    short, long = (gather(1, "validate", count, names=("features",), workers=1) for count in (30, 70))
+    np.testing.assert_array_equal(long.inputs["features"][:30], short.inputs["features"])
+
+
+def test_sets_of_different_purposes_share_no_scene():
+    # Records of one scene never stand on both sides of a split: no row, and no radar, appears twice.
+    sets = [
+        gather(0, purpose, 96, names=("features",), workers=1) for purpose in ("train", "validate", "calibrate", "test")
+    ]
+    rows = np.concatenate([s.inputs["features"] for s in sets])
+    assert len(np.unique(rows, axis=0)) == len(rows)
+    radars = [set(s.truth["carrier_hz"]) for s in sets]
+    assert len(set.union(*radars)) == sum(map(len, radars))
+
+
+def test_progress_counts_every_record():
+    seen = []
+    gather(0, "test", 50, names=("features",), workers=1, on_records=seen.append)
+    assert sum(seen) == 50

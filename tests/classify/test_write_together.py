@@ -1,0 +1,82 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from bladewing.classify import files
+from bladewing.classify.files import settle, write_together
+
+OLD, NEW = {"a": b"old a", "b": b"old b"}, {"a": b"new a", "b": b"new b", "c": b"new c"}
+
+
+def content(folder):
+    return {p.name: p.read_bytes() for p in folder.iterdir() if not p.name.startswith(".bladewing")}
+
+
+def test_all_files_change_and_nothing_else_stays(tmp_path):
+    (tmp_path / "other").write_bytes(b"mine")
+    write_together(tmp_path, OLD)
+    write_together(tmp_path, NEW)
+    assert content(tmp_path) == NEW | {"other": b"mine"}
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+@pytest.mark.parametrize("call", range(1, 12))
+def test_a_fault_at_any_rename_leaves_all_old_or_all_new(tmp_path, monkeypatch, call):
+    write_together(tmp_path, OLD)
+    count = 0
+    replace = os.replace
+
+    def failing(source, target):
+        nonlocal count
+        count += 1
+        if count == call:
+            raise OSError("pulled the plug")
+        replace(source, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(files.os, "replace", failing)
+        try:
+            write_together(tmp_path, NEW)
+        except OSError:
+            assert count == call
+    settle(tmp_path)
+    assert content(tmp_path) in (OLD, NEW)
+    assert len(list(tmp_path.iterdir())) == len(content(tmp_path))
+
+
+def test_a_journal_moves_nothing_out_of_its_folder(tmp_path):
+    folder = tmp_path / "models"
+    folder.mkdir()
+    (folder / "x").write_bytes(b"x")
+    (folder / ".bladewing-pending.json").write_text(json.dumps({"x": "../escaped"}))
+    settle(folder)
+    assert not (tmp_path / "escaped").exists()
+
+
+KILL = """
+import sys
+from pathlib import Path
+from bladewing.classify.files import write_together
+place = Path(sys.argv[1])
+number = 0
+while True:
+    number += 1
+    write_together(place, {name: str(number).encode() * 50_000 for name in "abcdef"})
+"""
+
+
+def test_killed_at_any_moment_the_files_agree(tmp_path):
+    for delay_s in (0.02, 0.05, 0.09, 0.14):
+        process = subprocess.Popen([sys.executable, "-c", KILL, str(tmp_path)])
+        deadline = time.monotonic() + 20
+        while not (tmp_path / "f").exists() and time.monotonic() < deadline:
+            time.sleep(0.01)
+        time.sleep(delay_s)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        settle(tmp_path)
+        assert len({(tmp_path / name).read_bytes() for name in "abcdef"}) == 1
