@@ -270,20 +270,10 @@ def _print_table(account: dict[str, Any], out: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    test = account["records"]["test"]
-    table = Table(title=f"{test} test records, looked at once", title_justify="left")
-    columns = (
-        "model",
-        "accuracy",
-        f"UAV found at {FALSE_ALARM:.0%} false",
-        "named",
-        "right of these",
-        "ECE",
-        "kB",
-        "s",
-    )
-    for column in columns:
-        table.add_column(column, justify="left" if column == "model" else "right")
+    table = Table(title=f"{account['records']['test']} test records, looked at once", title_justify="left")
+    table.add_column("model", no_wrap=True)
+    for column in ("accuracy", "UAV found", "named", "right", "ECE", "kB", "s"):
+        table.add_column(column, justify="right", no_wrap=True)
     for name, model in account["models"].items():
         figures = model["test"]
         right = figures["named_accuracy"]
@@ -300,7 +290,10 @@ def _print_table(account: dict[str, Any], out: Path) -> None:
     console = Console(highlight=False)
     console.print(table)
     console.print(
-        "accuracy: balanced over the three classes, radars from 2 to 100 GHz, dwells from 5 ms, SNR from -20 dB.\n"
-        "named: not answered 'unknown'. ECE: expected calibration error."
+        "accuracy: balanced over the three classes; radars from 2 to 100 GHz, dwells from 5 ms,\n"
+        "  SNR from -20 dB, so that many records hold nothing to see\n"
+        f"UAV found: at {account['false_alarm']:.0%} of birds and clutter called UAV\n"
+        "named, right: share not answered 'unknown', and how many of these are right\n"
+        "ECE: expected calibration error of the probabilities"
     )
     console.print(f"Models and {ACCOUNT} are in {out}; trained in {account['seconds']['all']:.0f} s.", soft_wrap=True)

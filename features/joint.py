@@ -95,8 +95,9 @@ def joint_vector(image: NDArray[np.float32], spectrum: Spectrum) -> NDArray[np.f
 
 def _flashes(fast: NDArray[np.float32], spectrum: Spectrum) -> tuple[NDArray, NDArray, NDArray]:
     """Rate and strength of the strongest cadence of the fast bins' power, and the power's peakedness."""
+    # Relative to its mean: a strong target's power to the fourth would leave float32, and nothing here has a scale.
     mean = fast.mean(axis=-1, keepdims=True)
-    swing = fast - mean
+    swing = fast / np.where(mean > 0, mean, 1) - (mean > 0)
     frames = fast.shape[-1]
     cadence = np.abs(np.fft.rfft(swing * np.hanning(frames + 2)[1:-1].astype(np.float32), axis=-1))[..., 2:]
     rms = np.sqrt(np.mean(cadence**2, axis=-1))

@@ -1,5 +1,7 @@
 """The feature vector: every measurement of the spectrum, in the order of the schema."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,9 +48,16 @@ def lay_out(columns: dict[str, NDArray], table: tuple[Feature, ...], shape: tupl
     """
     out = np.empty((*shape, len(table)), np.float32)
     for number, feature in enumerate(table):
-        value = np.nan_to_num(np.asarray(columns[feature.name]), nan=0.0)
-        out[..., number] = np.clip(value, feature.low, feature.high)
-    return out
+        out[..., number] = columns[feature.name]
+    low, high = _ranges(table)
+    # fmax and fmin would take a bound for NaN; "no value" is 0
+    return np.clip(np.where(np.isnan(out), np.float32(0), out), low, high)
+
+
+@lru_cache(maxsize=4)
+def _ranges(table: tuple[Feature, ...]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Lower and upper bounds of a table's features."""
+    return np.array([f.low for f in table], np.float32), np.array([f.high for f in table], np.float32)
 
 
 def feature_vector(

@@ -190,7 +190,7 @@ def test_page_of_another_schema_is_refused(report: dict[str, Any]) -> None:
         draw_page({**report, "schema_version": "0"})
 
 
-@pytest.mark.parametrize("where", ["scores.score", "draw_page", "write_whole"])
+@pytest.mark.parametrize("where", ["scores.score", "draw_page", "write_together"])
 def test_interrupted_run_leaves_the_old_files_whole(
     where: str, out: Path, models: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
