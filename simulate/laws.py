@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 #: Uniform numbers a record owns; the widest target (an octocopter) uses about two thirds of them.
-WIDTH = 192
+WIDTH = 224
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Law:
 LAWS: dict[str, Law] = {
     # radars
     "carrier_hz": Law("log", 2e9, 100e9, "Hz", "envelope"),
-    "dwell_s": Law("log", 5e-3, 0.32, "s", "envelope; dwells of 2.7-89 ms in Gong 2022"),
+    "dwell_s": Law("log", 5e-3, 1.0, "s", "envelope; dwells of 2.7-89 ms in Gong 2022"),
     "unambiguous_mps": Law("log", 10.0, 260.0, "m/s", "from slow-body radars to tips of 200 m/s and a margin"),
     # every scene
     "snr_db": Law("uniform", -20.0, 32.0, "dB", "micro-motion power over noise, a sample"),
@@ -106,6 +106,10 @@ LAWS: dict[str, Law] = {
         "log", 1e-4, 0.1, "rad", "rms over the dwell, from good synthesisers to free-running CW modules"
     ),
     "flicker_db": Law("uniform", -20.0, 30.0, "dB", "1/f noise at 1 % of the PRF over the thermal floor"),
+    "fading_db": Law("uniform", 0.0, 12.0, "dB", "swing of glint and multipath"),
+    "fading_hz": Law("log", 0.3, 25.0, "Hz", "lines decorrelate in tens to hundreds of ms (IET RSN 2022)"),
+    "impulse_db": Law("uniform", 10.0, 45.0, "dB", "a spoilt pulse over noise"),
+    "high_pass_hz": Law("log", 3.0, 150.0, "Hz", "capacitor-coupled audio front ends; clutter cancellers"),
     "mains_db": Law("uniform", -25.0, 15.0, "dB", "mains lines together over noise"),
     "tilt_db": Law("uniform", -25.0, 0.0, "dB", "receiver band edges under its middle"),
     "hump_db": Law("uniform", 0.0, 8.0, "dB", "half the swing of a smooth hump in the receiver's band"),

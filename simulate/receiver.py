@@ -15,6 +15,9 @@ from .target import Normals
 
 #: How often each fault is present.
 FAULT_CHANCE = {
+    "fading": 0.4,
+    "impulses": 0.12,
+    "high_pass": 0.12,
     "flicker": 0.25,
     "phase_noise": 0.25,
     "mains": 0.25,
@@ -24,6 +27,9 @@ FAULT_CHANCE = {
     "analytic": 0.1,
     "converter": 0.4,
 }
+
+#: Most spoilt pulses of a record.
+MAX_IMPULSES = 4
 
 
 class Receiver:
@@ -37,6 +43,14 @@ class Receiver:
 
     def __init__(self, draws: Draws) -> None:
         self.on = {name: draws.chance(chance) for name, chance in FAULT_CHANCE.items()}
+        self.fading_db = draws.value("fading_db")
+        self.fading_hz = draws.value("fading_hz", 2)
+        self.fading_phase = draws.value("phase_rad", 2)
+        self.impulse_db = draws.value("impulse_db", MAX_IMPULSES)
+        self.impulse_at = draws.uniform(MAX_IMPULSES)
+        self.impulse_phase = draws.value("phase_rad", MAX_IMPULSES)
+        self.impulse_count = 1 + np.floor(MAX_IMPULSES * draws.uniform())
+        self.high_pass_hz = draws.value("high_pass_hz")
         self.flicker_db = draws.value("flicker_db")
         self.phase_noise_rad = draws.value("phase_noise_rad")
         self.mains_hz = np.where(draws.chance(0.5), 50.0, 60.0)
@@ -76,6 +90,8 @@ class Receiver:
         v = process_velocities(radar)
         colour = 1 / np.maximum(np.abs(v), np.abs(v[1])) if len(v) > 1 else np.ones(1)
         iq = signal
+        rows = np.flatnonzero(self.on["fading"])
+        iq[rows] *= self._fading(radar, rows)
         rows = np.flatnonzero(self.on["phase_noise"])
         if len(rows):
             # an oscillator's close-in noise falls as 1/f^2; small angles, so a real process of that spectrum will do
@@ -84,6 +100,7 @@ class Receiver:
             angle = self.phase_noise_rad[rows].astype(np.float32)[:, None] * wander
             iq[rows] *= np.cos(angle) + 1j * np.sin(angle)
         iq = iq + noise
+        self._strike(iq, np.flatnonzero(self.on["impulses"]))
         rows = np.flatnonzero(self.on["flicker"])
         if len(rows):
             psd = np.broadcast_to(colour, (len(rows), len(v)))
@@ -95,6 +112,7 @@ class Receiver:
         if len(rows):
             iq[rows] += self._mains(radar, rows)
         self._colour(iq, np.flatnonzero(self.on["colour"]))
+        self._block_rest(iq, np.flatnonzero(self.on["high_pass"]), radar)
         rows = np.flatnonzero(self.on["image"])
         iq[rows] += (10 ** (self.image_db[rows] / 20)).astype(np.float32)[:, None] * iq[rows].conj()
         rows = np.flatnonzero(self.on["real_only"])
@@ -102,6 +120,27 @@ class Receiver:
         self._one_sided(iq, np.flatnonzero(self.on["analytic"]))
         self._convert(iq, np.flatnonzero(self.on["converter"]))
         return iq * (10 ** (self.gain_db / 20)).astype(np.float32)[:, None]
+
+    def _fading(self, radar: Radar, rows: NDArray[np.intp]) -> NDArray[np.float32]:
+        """Slow rise and fall of everything the antenna sees: glint, multipath, a beam that moves on."""
+        log_gain = np.zeros((len(rows), radar.pulses))
+        for rate_hz, phase in zip(self.fading_hz[rows].T, self.fading_phase[rows].T, strict=True):
+            log_gain += np.sin(TWO_PI * rate_hz[:, None] * radar.times_s + phase[:, None])
+        return (10 ** (self.fading_db[rows, None] / 40 * log_gain)).astype(np.float32)
+
+    def _strike(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:
+        """Single pulses spoilt by another emitter: broadband like a flash, but not periodic."""
+        for row in rows:
+            for n in range(int(self.impulse_count[row])):
+                amplitude = 10 ** (self.impulse_db[row, n] / 20) * np.exp(1j * self.impulse_phase[row, n])
+                iq[row, int(self.impulse_at[row, n] * iq.shape[-1])] += np.complex64(amplitude)
+
+    def _block_rest(self, iq: NDArray[np.complex64], rows: NDArray[np.intp], radar: Radar) -> None:
+        """A receiver coupled by capacitors, or a clutter canceller: nothing near velocity zero comes through."""
+        square = fft.fftfreq(iq.shape[-1], 1 / radar.prf_hz) ** 2
+        for row in rows:
+            response = square / (square + self.high_pass_hz[row] ** 2)
+            iq[row] = fft.ifft(fft.fft(iq[row]) * response.astype(np.float32))
 
     def _mains(self, radar: Radar, rows: NDArray[np.intp]) -> NDArray[np.float32]:
         """Harmonics of the mains, real and so on both sides of the spectrum alike."""
