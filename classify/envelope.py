@@ -25,6 +25,8 @@ class Envelope:
         Number of pulses of a dwell.
     dwell_min_s
         Shortest dwell, pulses / PRF [s].
+    dwell_max_s
+        Longest dwell [s].
     unambiguous_min_mps
         Smallest unambiguous velocity to one side, wavelength x PRF / 4 [m/s].
     """
@@ -36,6 +38,7 @@ class Envelope:
     pulses_min: int = 64
     pulses_max: int = 65536
     dwell_min_s: float = 5e-3
+    dwell_max_s: float = 2.0
     unambiguous_min_mps: float = 10.0
 
     def to_json(self) -> str:
@@ -111,12 +114,12 @@ class Envelope:
         cure = f"take {pulses_needed} pulses, {_up(pulses_needed / prf_hz)} s, or more (dwell = pulses / PRF)"
         if pulses < self.pulses_min:
             return f"{pulses} pulses are fewer than {self.pulses_min}: {cure}"
+        longest_s = min(self.pulses_max / prf_hz, self.dwell_max_s)
+        shorten = f"take dwells of {longest_s:.4g} s or less (dwell = pulses / PRF)"
         if pulses > self.pulses_max:
-            longest_s = self.pulses_max / prf_hz
-            return (
-                f"{pulses} pulses are more than {self.pulses_max}: "
-                f"take dwells of {longest_s:.4g} s or less (dwell = pulses / PRF)"
-            )
+            return f"{pulses} pulses are more than {self.pulses_max}: {shorten}"
+        if dwell_s > self.dwell_max_s * (1 + _ROUNDING):
+            return f"dwell {dwell_s:.7g} s is above {self.dwell_max_s:g} s: {shorten}"
         if dwell_s < self.dwell_min_s * (1 - _ROUNDING):
             shortest_ms = self.dwell_min_s * 1e3
             return f"dwell {_under(dwell_s * 1e3, shortest_ms)} ms is below {shortest_ms:g} ms: {cure}"

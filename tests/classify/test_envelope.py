@@ -27,7 +27,10 @@ C_MPS = 299_792_458.0
         (10e9, 5e3, 63, "63 pulses are fewer than 64: take 64 pulses, 0.0128 s, or more (dwell = pulses / PRF)"),
         (10e9, 50e3, 63, "63 pulses are fewer than 64: take 250 pulses, 0.005 s, or more (dwell = pulses / PRF)"),
         (10e9, 20e3, 99, "dwell 4.95 ms is below 5 ms: take 100 pulses, 0.005 s, or more (dwell = pulses / PRF)"),
-        (10e9, 20e3, 70_000, "70000 pulses are more than 65536: take dwells of 3.277 s or less (dwell = pulses / PRF)"),
+        (10e9, 20e3, 70_000, "70000 pulses are more than 65536: take dwells of 2 s or less (dwell = pulses / PRF)"),
+        (3e9, 90e3, 70_000, "70000 pulses are more than 65536: "
+                            "take dwells of 0.7282 s or less (dwell = pulses / PRF)"),
+        (10e9, 20e3, 50_000, "dwell 2.5 s is above 2 s: take dwells of 2 s or less (dwell = pulses / PRF)"),
     ],
 )  # fmt: skip
 def test_the_reason_names_value_rule_and_cure(carrier_hz, prf_hz, pulses, said):
@@ -40,7 +43,8 @@ def test_the_reason_names_value_rule_and_cure(carrier_hz, prf_hz, pulses, said):
         (2e9, 1e3, 64),
         (100e9, 100e3, 500),
         (10e9, 25e3, 125),
-        (10e9, 20e3, 65536),
+        (10e9, 50e3, 65536),
+        (10e9, 20e3, 40_000),
     ],
 )
 def test_the_limits_themselves_are_inside(carrier_hz, prf_hz, pulses):
@@ -57,7 +61,13 @@ def test_the_smallest_unambiguous_velocity_is_inside_whatever_the_last_bit_says(
 def test_inside_exactly_where_every_rule_holds(carrier_hz, prf_hz, pulses):
     unambiguous_mps = C_MPS / carrier_hz * prf_hz / 4
     margin = min(
-        prf_hz / 1e3, 100e3 / prf_hz, pulses / 64, 65536 / pulses, pulses / prf_hz / 5e-3, unambiguous_mps / 10
+        prf_hz / 1e3,
+        100e3 / prf_hz,
+        pulses / 64,
+        65536 / pulses,
+        pulses / prf_hz / 5e-3,
+        2 * prf_hz / pulses,
+        unambiguous_mps / 10,
     )
     reason = ENVELOPE.reason(carrier_hz, prf_hz, pulses)
     if margin > 1 + 1e-6:
