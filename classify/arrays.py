@@ -6,6 +6,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
+from tokenize import TokenError
 from typing import IO
 
 import numpy as np
@@ -68,7 +69,8 @@ def read_array(path: Path, variable: str | None = None) -> NDArray[np.generic]:
 def _parse_npy(file: IO[bytes], name: str) -> NDArray[np.generic]:
     try:
         return np.lib.format.read_array(file, allow_pickle=False)
-    except (ValueError, EOFError, MemoryError, OverflowError, TypeError) as error:
+    # numpy reads an old header as Python text, so that a damaged one raises the tokeniser's errors too
+    except (ValueError, EOFError, MemoryError, OverflowError, TypeError, SyntaxError, TokenError) as error:
         if "Object arrays" in str(error):
             raise _PickledError(name) from None
         raise BadInput(_damaged(name, error)) from None

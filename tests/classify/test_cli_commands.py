@@ -23,7 +23,7 @@ def test_train_hands_its_options_on(calls):
     assert main(["train"]) == 0
     assert main(["train", "--out", "m", "--config", "c.toml", "--records", "50", "--seed", "7", "--quick"]) == 0
     assert calls == [
-        (Path("out"), {"records": None, "seed": 0, "quick": False, "config": None, "progress": True}),
+        (Path("out"), {"records": None, "seed": None, "quick": False, "config": None, "progress": True}),
         (Path("m"), {"records": 50, "seed": 7, "quick": True, "config": Path("c.toml"), "progress": True}),
     ]
 

@@ -14,7 +14,7 @@ from bladewing.simulate import Radar, draw_records
 def trained(tmp_path_factory):
     out = tmp_path_factory.mktemp("trained")
     config = out / "tiny.toml"
-    config.write_text("records = 1200\nepochs = 2\niterations = 10\n")
+    config.write_text("records = 2400\nepochs = 5\nbatch = 64\niterations = 20\n")
     return out, run_training(out, config=config, progress=False)
 
 
@@ -33,7 +33,7 @@ def test_training_writes_every_model_and_its_account(trained):
 def test_trained_models_answer_through_the_classifier(trained, name):
     out, account = trained
     clf = Classifier.load(out / f"{name}.onnx")
-    assert json.loads(clf.metadata["training"])["records"] == 1200
+    assert json.loads(clf.metadata["training"])["records"] == 2400
     assert list(clf.accept) == account["models"][name]["accept"]
     radar = Radar(9.85e9, 25e3, 2000)
     loud = draw_records(radar, 90, 0, purpose="test", kind="quadcopter")
