@@ -130,7 +130,8 @@ class BirdPart(TargetPart):
     """A bird, or a small flock of `members`: a `species` of the catalogue, or mass (and span, area).
 
     `wing_db` is the level of both wings with all their parts in phase, `body_db` that of the body. `heading_deg` is the
-    direction of the radar in the bird's own plane (0: ahead), `elevation_deg` how far the radar looks up at it.
+    direction of the radar in the bird's own plane (0: ahead), `elevation_deg` how far the radar looks up at it. The
+    members of a flock differ in phase, wingbeat, place and speed (by `flock_velocity_mps` rms), drawn by `flock_seed`.
     """
 
     species: str | None = None
@@ -152,6 +153,7 @@ class BirdPart(TargetPart):
     rest_s: Positive = 1.0
     members: Annotated[int, Field(strict=True, ge=1, le=50)] = 1
     flock_velocity_mps: NotNegative = 1.0
+    flock_seed: Annotated[int, Field(strict=True, ge=0)] = 0
 
     @model_validator(mode="before")
     @classmethod

@@ -1,4 +1,4 @@
-"""From a scene to slow-time IQ."""
+"""From a scene to slow-time IQ, at the fidelity that a plan asks for or at the full one."""
 
 import zlib
 from dataclasses import dataclass, field
@@ -19,6 +19,7 @@ from .render_uav import Fidelity, full_fidelity, uav_echo, uav_truth
 from .target import mean_power
 
 if TYPE_CHECKING:
+    from .plan import Plan
     from .scene import Scene
 
 
@@ -44,8 +45,8 @@ class Rendering:
     warnings: list[str] = field(default_factory=list)
 
 
-def render(scene: "Scene", seed: int = 0) -> Rendering:
-    """Render a scene, everything in it at full fidelity.
+def render(scene: "Scene", seed: int = 0, *, plan: "Plan | None" = None) -> Rendering:
+    """Render a scene.
 
     Parameters
     ----------
@@ -53,6 +54,8 @@ def render(scene: "Scene", seed: int = 0) -> Rendering:
         What the radar looks at.
     seed : int
         Root of all randomness, >= 0. Every part has a stream of its own, so switching one off changes no other.
+    plan : Plan, optional
+        What to keep; by default everything, at full fidelity.
 
     Returns
     -------
@@ -72,12 +75,12 @@ def render(scene: "Scene", seed: int = 0) -> Rendering:
     signal = np.zeros(radar.pulses, np.complex128)
     truth: list[dict[str, Any]] = []
     for uav in scene.uavs:
-        how = full_fidelity(uav, radar)
+        how = plan.fidelity[uav.name] if plan else full_fidelity(uav, radar)
         signal += uav_echo(uav, radar, times, how)
         truth.append(uav_truth(uav))
     for bird in scene.birds:
-        how = Fidelity(frozenset(BIRD_EFFECTS), None)
-        signal += bird_echo(bird, radar, times, how, _stream(seed, bird.name))
+        how = plan.fidelity[bird.name] if plan else Fidelity(frozenset(BIRD_EFFECTS), None)
+        signal += bird_echo(bird, radar, times, how)
         truth.append(bird_truth(bird))
     for part in scene.clutters:
         iq, drawn = _clutter_echo(part, radar, _stream(seed, part.name))
@@ -115,8 +118,8 @@ def _clutter_echo(part: ClutterPart, radar: Radar, rng: Generator) -> tuple[NDAr
 
 def _unit(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
     power = mean_power(iq)
-    gain: NDArray[np.float32] = 1 / np.sqrt(np.where(power > 0, power, np.float32(1)))
-    return iq * gain[:, None]
+    gain = 1 / np.sqrt(np.where(power > 0, power, 1))
+    return iq * gain.astype(np.float32)[:, None]
 
 
 def _receive(scene: "Scene", radar: Radar, signal: NDArray[np.complex64], seed: int) -> NDArray[np.complex64]:

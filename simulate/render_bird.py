@@ -1,9 +1,10 @@
 """Rendering of a scene's birds: flapping, flap-gliding and bounding flight, accelerating bodies, small flocks."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.random import Generator
+from numpy.random import Generator, Philox, SeedSequence
 from numpy.typing import NDArray
 
 from .bird import wing_echo, wing_size, wingbeat_hz
@@ -25,9 +26,27 @@ def bird_wingbeat_hz(part: BirdPart) -> float:
     return float(wingbeat_hz(part.mass_kg, part.span_m or span, part.area_m2 or area))
 
 
-def bird_echo(
-    part: BirdPart, radar: Radar, times_s: NDArray[np.float64], how: Fidelity, rng: Generator
-) -> NDArray[np.complex128]:
+@dataclass(frozen=True)
+class Member:
+    """One bird of a flock: wingbeat over the species' [1], phase [rad], own velocity [m/s] and place [m]."""
+
+    beat: float
+    phase_rad: float
+    velocity_mps: float
+    place_m: float
+
+
+def members(part: BirdPart) -> list[Member]:
+    """Birds of a part: the first is as the part says, the others are drawn by its `flock_seed`."""
+    rng = Generator(Philox(SeedSequence(part.flock_seed)))
+    birds = [Member(1.0, float(np.deg2rad(part.phase_deg)), 0.0, 0.0)]
+    for _ in range(part.members - 1):
+        beat, phase, place = rng.uniform(0.95, 1.05), rng.uniform(-np.pi, np.pi), rng.uniform(0, 3)
+        birds.append(Member(beat, phase, part.flock_velocity_mps * rng.standard_normal(), place))
+    return birds
+
+
+def bird_echo(part: BirdPart, radar: Radar, times_s: NDArray[np.float64], how: Fidelity) -> NDArray[np.complex128]:
     """Echo of a bird or a small flock.
 
     Parameters
@@ -40,8 +59,6 @@ def bird_echo(
         Instants of the pulses [s].
     how : Fidelity
         What to keep.
-    rng : numpy.random.Generator
-        Draws what the members of a flock beyond the first do.
 
     Returns
     -------
@@ -49,29 +66,23 @@ def bird_echo(
     """
     centre = centre_range_m(part, times_s, "acceleration" in how.effects)
     out = np.zeros(len(times_s), np.complex128)
-    for member in range(part.members):
-        beat, phase, velocity = 1.0, np.deg2rad(part.phase_deg), 0.0
-        if member:
-            beat, phase = rng.uniform(0.95, 1.05), rng.uniform(-np.pi, np.pi)
-            velocity = part.flock_velocity_mps * rng.standard_normal()
-        place = centre + velocity * times_s + (rng.uniform(0, 3) if member else 0.0)
+    for bird in members(part):
+        place = centre + bird.velocity_mps * times_s + bird.place_m
         if "heave" in how.effects:
-            place = place + heave_range_m(part, times_s, beat, phase)
-        out += bird_parts_echo(part, radar, times_s, beat, phase) * range_echo(place, radar.wavelength_m)
+            place = place + heave_range_m(part, times_s, bird)
+        out += bird_parts_echo(part, radar, times_s, bird) * range_echo(place, radar.wavelength_m)
     return out
 
 
-def heave_range_m(part: BirdPart, times_s: NDArray[np.float64], beat: float, phase_rad: float) -> NDArray[np.float64]:
+def heave_range_m(part: BirdPart, times_s: NDArray[np.float64], bird: Member) -> NDArray[np.float64]:
     """Range by which the body rises and sinks against the wings [m]."""
-    cycle, _ = _cycle_rad(part, times_s, beat, phase_rad)
+    cycle, _ = _cycle_rad(part, times_s, bird)
     return part.heave_m * np.sin(np.deg2rad(part.elevation_deg)) * np.cos(cycle)
 
 
-def bird_parts_echo(
-    part: BirdPart, radar: Radar, times_s: NDArray[np.float64], beat: float, phase_rad: float
-) -> NDArray[np.complex128]:
+def bird_parts_echo(part: BirdPart, radar: Radar, times_s: NDArray[np.float64], bird: Member) -> NDArray[np.complex128]:
     """Body and wings of one bird about its centre, shape (pulses,)."""
-    cycle, wings_out = _cycle_rad(part, times_s, beat, phase_rad)
+    cycle, wings_out = _cycle_rad(part, times_s, bird)
     heading, elevation = np.deg2rad(part.heading_deg), np.deg2rad(part.elevation_deg)
     sight = np.array([np.cos(heading) * np.cos(elevation), np.sin(heading) * np.cos(elevation), -np.sin(elevation)])
     span = part.span_m or float(wing_size(part.mass_kg)[0])
@@ -90,7 +101,7 @@ def bird_parts_echo(
 
 
 def _cycle_rad(
-    part: BirdPart, times_s: NDArray[np.float64], beat: float, phase_rad: float
+    part: BirdPart, times_s: NDArray[np.float64], bird: Member
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Phase of the wingbeat [rad] and whether the wings are out, 0 or 1; resting birds hold the phase."""
     if part.flight == "flap":
@@ -101,7 +112,7 @@ def _cycle_rad(
         beating = bouts * part.flap_s + np.minimum(within, part.flap_s)
         folded = (within > part.flap_s) & (part.flight == "bound")
         out = np.where(folded, 0.0, 1.0)
-    return TWO_PI * bird_wingbeat_hz(part) * beat * beating + phase_rad, out
+    return TWO_PI * bird_wingbeat_hz(part) * bird.beat * beating + bird.phase_rad, out
 
 
 def bird_truth(part: BirdPart) -> dict[str, Any]:

@@ -114,10 +114,10 @@ def uav_echo(part: UavPart, radar: Radar, times_s: NDArray[np.float64], how: Fid
                 edge_asymmetry=rotor.edge_asymmetry,
                 far_field=straight_blades,
             )
-    return out + _body_echo(part, wavelength, centre, times_s, how, near_hubs)
+    return out + body_echo(part, wavelength, centre, times_s, how, near_hubs)
 
 
-def _body_echo(
+def body_echo(
     part: UavPart,
     wavelength_m: float,
     centre_m: NDArray[np.float64],

@@ -14,6 +14,7 @@ from .parts import BirdPart, BodyPart, ClutterPart, RadarPart, ReceiverPart, Rot
 from .radar import Radar
 
 if TYPE_CHECKING:
+    from .plan import Plan
     from .render import Rendering
 
 _SOUND_MPS = 340.0
@@ -184,11 +185,17 @@ class Scene(BaseModel):
                 )
         return said
 
-    def render(self, seed: int = 0) -> "Rendering":
+    def plan(self, *, tolerance_db: float = -10.0) -> "Plan":
+        """Decide what this scene requires (see `plan.make_plan`)."""
+        from .plan import make_plan
+
+        return make_plan(self, tolerance_db=tolerance_db)
+
+    def render(self, seed: int = 0, *, tolerance_db: float = -10.0, full: bool = False) -> "Rendering":
         """Render to slow-time IQ (see `render.render`)."""
         from .render import render
 
-        return render(self, seed)
+        return render(self, seed, plan=None if full else self.plan(tolerance_db=tolerance_db))
 
 
 def shipped() -> list[str]:
