@@ -77,7 +77,7 @@ class Plan:
     fidelity : dict of str to Fidelity
         The renderer of each UAV and bird.
     notes : tuple of str
-        Renderers, costs and warnings in words.
+        Renderers and their costs in words.
     """
 
     tolerance_db: float
@@ -145,7 +145,7 @@ def make_plan(scene: "Scene", *, tolerance_db: float = -10.0) -> Plan:
         kept = frozenset(effect for effect in BIRD_EFFECTS if (bird.name, effect) not in dropped)
         fidelity[bird.name] = Fidelity(kept, None)
     decisions = tuple(Decision(*key, _db(energy), key not in dropped) for key, energy in energies.items())
-    return Plan(tolerance_db, _db(used**2), decisions, fidelity, (*notes, *scene.warnings()))
+    return Plan(tolerance_db, _db(used**2), decisions, fidelity, tuple(notes))
 
 
 def _strongest(scene: "Scene") -> float:
