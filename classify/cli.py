@@ -168,6 +168,17 @@ def simulate(
         print("\n".join(str(path) for path in written), flush=True)
 
 
+@app.command()
+def tables(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where tables.md and tables.json go.")] = Path("out"),
+    seed: Annotated[int, typer.Option(metavar="S", min=0, help="Root of the scenes' noise.")] = 0,
+) -> None:
+    """Make the paper's tables again: its theory and measurements beside those of this product."""
+    from .tables import markdown, run_tables
+
+    print(markdown(run_tables(out, seed)), flush=True)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 

@@ -24,7 +24,7 @@ class Entry:
     source: str
 
 
-def _tips(length_m: float, rates_rpm: tuple[float, ...], *, arm_m: float = 0.0, flash_db: float = 30.0) -> list[dict]:
+def _tips(length_m: float, rates_rpm: tuple[float, ...], *, arm_m: float = 0.0, flash_db: float = 17.0) -> list[dict]:
     """Rotors of point scatterers at the tip, as in the paper's model; neighbours turn against each other."""
     count = len(rates_rpm)
     return [
@@ -70,26 +70,28 @@ AIRFRAMES: dict[str, Entry] = {
     "type1": Entry({"body": _BODY, "rotors": _tips(0.15, (3500.0,))}, _TABLE_II.format(1)),
     "type2": Entry({"body": _BODY, "rotors": _tips(0.30, (3500.0,))}, _TABLE_II.format(2)),
     "type3": Entry({"body": _BODY, "rotors": _tips(0.15, (7000.0,))}, _TABLE_II.format(3)),
-    "type4": Entry({"body": _BODY, "rotors": _tips(0.15, _FOUR_RPM, arm_m=0.25)}, _TABLE_II.format(4)),
+    "type4": Entry({"body": _BODY, "rotors": _tips(0.15, _FOUR_RPM, arm_m=0.25, flash_db=14.0)}, _TABLE_II.format(4)),
     "type5": Entry(
-        {"body": _BODY, "rotors": _tips(0.15, _FOUR_RPM, arm_m=0.25), "velocity_mps": -20.0}, _TABLE_II.format(5)
+        {"body": _BODY, "rotors": _tips(0.15, _FOUR_RPM, arm_m=0.25, flash_db=14.0), "velocity_mps": -20.0},
+        _TABLE_II.format(5),
     ),
     "type6": Entry(
-        {"body": _BODY, "rotors": _tips(0.15, _FOUR_RPM, arm_m=0.25), "beta_deg": 60.0}, _TABLE_II.format(6)
+        {"body": _BODY, "rotors": _tips(0.15, _FOUR_RPM, arm_m=0.25, flash_db=14.0), "beta_deg": 60.0},
+        _TABLE_II.format(6),
     ),
     # Levels: the strongest blade lines stand 23-39, 26-45, 10-25 and 10-24 dB under the body (Table VII).
     "fixed_wing_15cm": Entry(
-        {"body": [{"level_db": 25.0}], "rotors": _blades(0.15, (47.0,), arm_m=0.3, flash_db=18.0)},
+        {"body": [{"level_db": 25.0}], "rotors": _blades(0.15, (47.0,), arm_m=0.3, flash_db=28.1)},
         _MEASURED.format(94),
     ),
     "quadcopter_12cm": Entry(
-        {"body": [{"level_db": 25.0}], "rotors": _blades(0.12, (69.0, 69.7, 70.3, 71.0), arm_m=0.2, flash_db=12.0)},
+        {"body": [{"level_db": 25.0}], "rotors": _blades(0.12, (69.0, 69.7, 70.3, 71.0), arm_m=0.2, flash_db=23.1)},
         _MEASURED.format(140),
     ),
     "hexacopter_30cm": Entry(
         {
             "body": [{"level_db": 25.0}],
-            "rotors": _blades(0.30, (34.6, 34.8, 34.9, 35.1, 35.2, 35.4), arm_m=0.5, flash_db=32.0),
+            "rotors": _blades(0.30, (34.6, 34.8, 34.9, 35.1, 35.2, 35.4), arm_m=0.5, flash_db=47.2),
         },
         _MEASURED.format(70),
     ),
@@ -97,9 +99,9 @@ AIRFRAMES: dict[str, Entry] = {
         {
             "body": [{"level_db": 25.0}],
             "rotors": [
-                *_blades(0.407, (41.0,), arm_m=0.0, flash_db=37.0),
+                *_blades(0.407, (41.0,), arm_m=0.0, flash_db=49.9),
                 # gear ratio 4.73 : 1 is the paper's, the tail blade's length is not given there
-                *_blades(0.08, (4.73 * 41.0,), arm_m=0.5, flash_db=18.0, bearing_deg=150.0),
+                *_blades(0.08, (4.73 * 41.0,), arm_m=0.5, flash_db=21.7, bearing_deg=150.0),
             ],
         },
         _MEASURED.format("82 (tail 397)"),
