@@ -1,8 +1,16 @@
-"""From a scene to slow-time IQ: radar, rotors, birds, clutter, receiver, and labelled records of them."""
+"""From a scene to slow-time IQ: radar, rotors, birds, clutter, receiver, and labelled records of them.
+
+`Scene` is fetched when it is first asked for, because checking one needs pydantic and drawing records does not.
+"""
+
+from typing import TYPE_CHECKING
 
 from .dataset import CLASSES, KIND_CLASS, KINDS, TRUTH_UNITS, Records, draw_radar, draw_records, stream
 from .radar import SPEED_OF_LIGHT_MPS, Radar
 from .rotor import RotorMotion, rotor_echo
+
+if TYPE_CHECKING:
+    from .scene import Scene, SceneError
 
 __all__ = [
     "CLASSES",
@@ -13,8 +21,18 @@ __all__ = [
     "Radar",
     "Records",
     "RotorMotion",
+    "Scene",
+    "SceneError",
     "draw_radar",
     "draw_records",
     "rotor_echo",
     "stream",
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name in ("Scene", "SceneError"):
+        from . import scene
+
+        return getattr(scene, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .bounds import UavBounds, bird_bound
+from .motion import TWO_PI
 from .parts import UavPart
 from .radar import Radar
 from .render_bird import BIRD_EFFECTS
-from .render_uav import UAV_EFFECTS, Fidelity, full_fidelity
+from .render_uav import UAV_EFFECTS, Fidelity, full_fidelity, rotor_beta_rad
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -140,7 +141,7 @@ def make_plan(scene: "Scene", *, tolerance_db: float = -10.0) -> Plan:
             points, missed = _points(bounds[uav.name], uav, radar, rest**2 * noise)
             used += np.sqrt(missed / noise)
         fidelity[uav.name] = Fidelity(kept, points)
-        notes.append(_renderer(uav, radar, points))
+        notes += [_renderer(uav, radar, points), _aliasing(uav, radar)]
     for bird in scene.birds:
         kept = frozenset(effect for effect in BIRD_EFFECTS if (bird.name, effect) not in dropped)
         fidelity[bird.name] = Fidelity(kept, None)
@@ -184,3 +185,14 @@ def _renderer(uav: UavPart, radar: Radar, points: int | None) -> str:
         f"{uav.name}: point scatterers at exact ranges, {points} a blade, {2 * points * blades} sines a pulse "
         f"(full fidelity: {2 * full})"
     )
+
+
+def _aliasing(uav: UavPart, radar: Radar) -> str:
+    """Whether the samples fold the blades' Doppler. They do so by themselves, at no cost: nothing is decided here."""
+    tips = [
+        TWO_PI * abs(rotor.rotation_hz) * rotor.blade_length_m * float(np.cos(rotor_beta_rad(uav, rotor)))
+        for rotor in uav.rotors
+    ]
+    fastest = max(tips, default=0.0) + abs(uav.velocity_mps) + abs(uav.acceleration_mps2) * radar.dwell_s
+    verdict = "none" if fastest <= radar.unambiguous_mps else "the samples fold it, as a radar's do"
+    return f"{uav.name}: aliasing: {verdict}; it shows {fastest:.1f} m/s of {radar.unambiguous_mps:.1f} m/s unambiguous"

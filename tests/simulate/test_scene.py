@@ -1,5 +1,8 @@
 """Scenes: what they refuse and in which words, what they warn of, and what rendering keeps to."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from bladewing.simulate.bird import wingbeat_hz
@@ -199,3 +202,11 @@ def test_the_papers_bird_sweeps_its_line_and_flashes_as_measured():
     lags = np.arange(int(0.2 * 4e3), int(0.4 * 4e3))
     correlation = [np.dot(envelope[:-lag], envelope[lag:]) / (len(envelope) - lag) for lag in lags]
     assert lags[int(np.argmax(correlation))] / 4e3 == pytest.approx(0.302, abs=0.002)
+
+
+def test_drawing_records_needs_no_pydantic_and_scenes_are_fetched_when_asked_for():
+    code = (
+        "import sys, bladewing.simulate as s; assert 'pydantic' not in sys.modules; "
+        "s.Scene; assert 'pydantic' in sys.modules; assert not hasattr(s, 'Scenery')"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
