@@ -118,6 +118,67 @@ def report(
     run_report(out, models=models, quick=quick, seed=seed, progress=True)
 
 
+@app.command()
+def simulate(
+    scene: Annotated[
+        str,
+        typer.Argument(metavar="SCENE.toml", help="A scene file, or the name of a shipped scene.", show_default=False),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(metavar="NAME", help="The recording: NAME.sigmf-data and NAME.sigmf-meta.")
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="S", min=0, help="Root of all randomness.")] = 0,
+    explain: Annotated[
+        bool,
+        typer.Option(
+            "--explain", help="Say what the scene requires, what is left out and why; without --out that is all."
+        ),
+    ] = False,
+    tolerance_db: Annotated[
+        float,
+        typer.Option(
+            metavar="DB", help="Error energy over the dwell, over a sample's noise [dB]; at -10 nobody can tell."
+        ),
+    ] = -10.0,
+    full: Annotated[bool, typer.Option("--full", help="Leave nothing out.")] = False,
+) -> None:
+    """Render a scene to a SigMF recording with the truth in its annotations."""
+    from bladewing.simulate.render import render
+    from bladewing.simulate.scene import Scene, SceneError
+
+    from .scene_recording import write_rendering
+
+    if out is None and not explain:
+        raise BadInput("nothing to do: give --out NAME for a recording, or --explain")
+    if tolerance_db != tolerance_db:
+        raise BadInput(f"--tolerance-db is {tolerance_db}: it must be a number [dB]")
+    try:
+        found = Scene.load(scene)
+    except SceneError as error:
+        for problem in error.problems[:-1]:
+            _complain(problem)
+        raise BadInput(error.problems[-1]) from None
+    for warning in found.warnings():
+        _complain(f"{scene}: {warning}", kind="warning")
+    plan = None if full else found.plan(tolerance_db=tolerance_db)
+    if explain:
+        print(plan.explain() if plan else "full fidelity: nothing is left out", flush=True)
+    if out is not None:
+        written = write_rendering(out, render(found, seed, plan=plan), found, seed)
+        print("\n".join(str(path) for path in written), flush=True)
+
+
+@app.command()
+def tables(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where tables.md and tables.json go.")] = Path("out"),
+    seed: Annotated[int, typer.Option(metavar="S", min=0, help="Root of the scenes' noise.")] = 0,
+) -> None:
+    """Make the paper's tables again: its theory and measurements beside those of this product."""
+    from .tables import markdown, run_tables
+
+    print(markdown(run_tables(out, seed)), flush=True)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 

@@ -1,9 +1,17 @@
-"""From a scene to slow-time IQ: radar, rotors, birds, clutter, receiver, and labelled records of them."""
+"""From a scene to slow-time IQ: radar, rotors, birds, clutter, receiver, and labelled records of them.
+
+`Scene` is fetched when it is first asked for, because checking one needs pydantic and drawing records does not.
+"""
+
+from typing import TYPE_CHECKING
 
 from .airframe import Rotor, body_echo, rotors_echo
 from .dataset import CLASSES, KIND_CLASS, KINDS, TRUTH_UNITS, Records, draw_radar, draw_records, stream
 from .radar import SPEED_OF_LIGHT_MPS, Radar
 from .rotor import RotorMotion, rotor_echo
+
+if TYPE_CHECKING:
+    from .scene import Scene, SceneError
 
 __all__ = [
     "CLASSES",
@@ -15,6 +23,8 @@ __all__ = [
     "Records",
     "Rotor",
     "RotorMotion",
+    "Scene",
+    "SceneError",
     "body_echo",
     "draw_radar",
     "draw_records",
@@ -22,3 +32,11 @@ __all__ = [
     "rotors_echo",
     "stream",
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name in ("Scene", "SceneError"):
+        from . import scene
+
+        return getattr(scene, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -66,6 +66,8 @@ for name in {packages!r}:
     module = importlib.import_module(name)
     assert "site-packages" in module.__path__[0], module.__path__
 from bladewing.classify import Classifier
+from bladewing.simulate.scene import Scene, shipped
+assert Scene.load("type1").radar.pulses == 3000, shipped()
 rng = np.random.default_rng(0)
 iq = rng.standard_normal((3, 2000)) + 1j * rng.standard_normal((3, 2000))
 answer = Classifier.load().predict(iq, carrier_hz=9.85e9, prf_hz=25e3)

@@ -1,0 +1,83 @@
+"""A rendered scene as a SigMF recording, with the truth in its annotations."""
+
+import hashlib
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .errors import BadInput
+from .files import write_together
+
+if TYPE_CHECKING:
+    from bladewing.simulate.render import Rendering
+    from bladewing.simulate.scene import Scene
+
+#: Version of the fields under "bladewing:".
+EXTENSION_VERSION = "1.0.0"
+
+
+def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: int) -> list[Path]:
+    """Write a rendering as NAME.sigmf-data and NAME.sigmf-meta, both or neither.
+
+    `core:sample_rate` is the PRF, the capture's `core:frequency` the carrier; each part of the scene is an annotation
+    over all samples with its name as the label and its truth under "bladewing:".
+
+    Parameters
+    ----------
+    stem
+        Path without the suffix; a .sigmf-meta or .sigmf-data at its end is taken off.
+    rendering, scene, seed
+        What was rendered, from what.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    BadInput
+        The folder is missing, or cannot be written to.
+    """
+    name = stem.name.removesuffix(".sigmf-meta").removesuffix(".sigmf-data")
+    if not name:
+        raise BadInput(f"{stem}: no name for the recording: give --out NAME")
+    data = rendering.iq.astype("<c8").tobytes()
+    meta = metadata(rendering, scene, seed, hashlib.sha512(data).hexdigest())
+    text = json.dumps(meta, indent=2, allow_nan=False) + "\n"
+    files: dict[str, bytes | str] = {f"{name}.sigmf-data": data, f"{name}.sigmf-meta": text}
+    try:
+        write_together(stem.parent, files)
+    except OSError as error:
+        raise BadInput(f"{stem}: cannot be written: {error.strerror or error}: give a folder that exists") from None
+    return [stem.parent / file for file in files]
+
+
+def metadata(rendering: "Rendering", scene: "Scene", seed: int, sha512: str) -> dict[str, Any]:
+    """SigMF metadata of a rendering, ready for JSON."""
+    radar = rendering.radar
+    span = {"core:sample_start": 0, "core:sample_count": radar.pulses}
+    return {
+        "global": {
+            "core:datatype": "cf32_le",
+            "core:sample_rate": radar.prf_hz,
+            "core:version": "1.2.0",
+            "core:sha512": sha512,
+            "core:description": scene.title or "simulated scene",
+            "core:recorder": "bladewing simulate",
+            "core:extensions": [{"name": "bladewing", "version": EXTENSION_VERSION, "optional": True}],
+            "bladewing:seed": seed,
+            "bladewing:scene": scene.model_dump(mode="json"),
+            "bladewing:warnings": rendering.warnings,
+        },
+        "captures": [{"core:sample_start": 0, "core:frequency": radar.carrier_hz}],
+        "annotations": [
+            {
+                **span,
+                "core:label": part["name"],
+                "core:comment": f"{part['label']}: {part['kind']}",
+                **{f"bladewing:{field}": value for field, value in part.items() if field != "name"},
+            }
+            for part in rendering.truth
+        ],
+    }

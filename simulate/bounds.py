@@ -1,0 +1,230 @@
+"""How wrong an echo is at most when an effect is left out: amplitudes, pulse by pulse, in the unit of a scene's levels.
+
+A blade is a mean over its radius, so all rests on moments of a phasor: |integral of x^n exp(j z x) over 0..1| is at
+most 1 / (n + 1), and by parts at most (1 + n M(n-1)) / |z|. Errors of blades and rotors are added as amplitudes.
+"""
+
+from functools import lru_cache
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln, spherical_jn
+
+from .exact import hub_range_m
+from .motion import TWO_PI
+from .parts import BirdPart, RotorPart, UavPart
+from .radar import Radar
+from .render_bird import bird_echo, bird_parts_echo, heave_range_m, members
+from .render_uav import (
+    UAV_EFFECTS,
+    Fidelity,
+    body_echo,
+    centre_range_m,
+    rotor_angle_rad,
+    rotor_beta_rad,
+    uav_echo,
+    vibration_rad,
+)
+
+Amplitude = NDArray[np.float64]
+
+_SPACING_BINS = 48  # a blade's angles to the line of sight are counted in so many classes
+
+
+def moment_envelope(order: int, z: Amplitude, root_share: float = 0.0) -> Amplitude:
+    """Most that the mean of (r / tip)^order exp(j phase) over a blade can be, shape of `z`.
+
+    Parameters
+    ----------
+    order : int
+        Power of the radius, >= 0.
+    z : ndarray
+        Phase between root and tip [rad].
+    root_share : float
+        Radius of the root over that of the tip, 0..1.
+    """
+    inverse = 1 / np.maximum(np.abs(z), 1e-9)
+    moments = [np.minimum(1.0, 2 * inverse)]
+    for n in range(1, order + 1):
+        moments.append(np.minimum(1 / (n + 1), (1 + n * moments[-1]) * inverse))
+    width = 1 - root_share
+    out = np.zeros_like(inverse)
+    for n, moment in enumerate(moments):
+        out += comb(order, n) * root_share ** (order - n) * width**n * moment
+    return out
+
+
+def chord(phase_rad: Amplitude) -> Amplitude:
+    """|exp(j phase) - 1|, held at 2 beyond half a turn: what a phase error of at most this size does."""
+    return 2 * np.sin(np.minimum(np.abs(phase_rad), np.pi) / 2)
+
+
+class UavBounds:
+    """Bounds of one UAV at every pulse; each is an ndarray of float64, shape (pulses,).
+
+    Parameters
+    ----------
+    part : UavPart
+        The UAV.
+    radar : Radar
+        The radar that looks.
+    """
+
+    def __init__(self, part: UavPart, radar: Radar) -> None:
+        self.part, self.radar, self.times_s = part, radar, radar.times_s
+        self.wavenumber = 2 * TWO_PI / radar.wavelength_m
+        self.centre_m = centre_range_m(part, self.times_s, True)
+
+    def of(self, effect: str) -> Amplitude:
+        """Bound of leaving out one of `render_uav.UAV_EFFECTS`."""
+        bounds = {
+            "blade_curvature": self.blade_curvature,
+            "hub_curvature": self.hub_curvature,
+            "acceleration": self.acceleration,
+            "vibration": self.vibration,
+            "wander": self.wander,
+        }
+        return bounds[effect]()
+
+    def _blades(self, rotor: RotorPart, wanders: bool = True) -> list[tuple[float, Amplitude]]:
+        """Amplitude and angle of each blade."""
+        angle = rotor_angle_rad(rotor, self.times_s, wanders)
+        level = 10 ** (rotor.flash_db / 20)
+        return [(level * a, angle + TWO_PI * n / rotor.blades) for n, a in enumerate(rotor.amplitudes)]
+
+    def _phase(self, rotor: RotorPart) -> float:
+        """Largest phase of the tip [rad], the paper's Gamma."""
+        return self.wavenumber * rotor.blade_length_m * float(np.cos(rotor_beta_rad(self.part, rotor)))
+
+    def blade_curvature(self) -> Amplitude:
+        """Eq. (4) in place of (3): the sphere's sag r^2 sin^2 / (2 R) along the blade, to the third order."""
+        out = np.zeros(len(self.times_s))
+        for rotor in self.part.rotors:
+            length, share = rotor.blade_length_m, rotor.root_m / rotor.blade_length_m
+            hub = hub_range_m(self.centre_m, rotor.offset_m, np.deg2rad(rotor.bearing_deg))
+            cos_beta = np.cos(rotor_beta_rad(self.part, rotor))
+            for amplitude, theta in self._blades(rotor):
+                c = cos_beta * np.cos(theta)
+                sag = self.wavenumber * length**2 * (1 - c**2) / (2 * hub)
+                z = self.wavenumber * length * (1 - share) * c
+                flat = moment_envelope(0, z, share)
+                error = sag * moment_envelope(2, z, share) + sag**2 / 2 * moment_envelope(4, z, share)
+                error += (sag**3 / 6 + sag * 2 * length / hub) * flat
+                edges = 1 + np.abs(rotor.edge_asymmetry * np.sin(theta))
+                out += amplitude * edges * np.minimum(error, 2.0)
+        return out
+
+    def hub_curvature(self) -> Amplitude:
+        """Eq. (2) in place of (1) for hubs and for the body's scatterers."""
+        out = np.zeros(len(self.times_s))
+        for rotor in self.part.rotors:
+            share = rotor.root_m / rotor.blade_length_m
+            flash = np.zeros(len(self.times_s))
+            for amplitude, theta in self._blades(rotor):
+                z = self._phase(rotor) * (1 - share) * np.cos(theta)
+                flash += amplitude * (1 + np.abs(rotor.edge_asymmetry * np.sin(theta))) * moment_envelope(0, z, share)
+            out += flash * self._hub_chord(rotor.offset_m, rotor.bearing_deg)
+        for point in self.part.body:
+            out += 10 ** (point.level_db / 20) * self._hub_chord(point.offset_m, point.bearing_deg)
+        return out
+
+    def _hub_chord(self, offset_m: float, bearing_deg: float) -> Amplitude:
+        near, far = (
+            hub_range_m(self.centre_m, offset_m, np.deg2rad(bearing_deg), far_field=flag) for flag in (False, True)
+        )
+        return chord(self.wavenumber * (near - far))
+
+    def acceleration(self) -> Amplitude:
+        """A constant velocity in place of an accelerated one: the whole echo turns by the path's own error."""
+        path = self.wavenumber * np.abs(self.part.acceleration_mps2) * self.times_s**2 / 2
+        if not path.any():
+            return path
+        straight = Fidelity(frozenset(UAV_EFFECTS) - {"blade_curvature"}, None)
+        echo = np.abs(uav_echo(self.part, self.radar, self.times_s, straight)) + self.blade_curvature()
+        # hubs off the line of sight move a little less than the centre does
+        reach = max([r.offset_m + r.blade_length_m for r in self.part.rotors] + [b.offset_m for b in self.part.body])
+        total = sum(10 ** (r.flash_db / 20) * 2 * sum(r.amplitudes) for r in self.part.rotors)
+        total += sum(10 ** (b.level_db / 20) for b in self.part.body)
+        return echo * chord(path) + total * np.minimum(2, path) * (reach / self.centre_m.min()) ** 2
+
+    def vibration(self) -> Amplitude:
+        """A body at rest in place of a shaken one."""
+        still = Fidelity(frozenset({"hub_curvature"}), None)
+        body = np.abs(body_echo(self.part, self.radar.wavelength_m, self.centre_m, self.times_s, still, True))
+        return body * chord(vibration_rad(self.part, self.times_s))
+
+    def wander(self) -> Amplitude:
+        """A constant rotation rate in place of one that drifts and wanders."""
+        out = np.zeros(len(self.times_s))
+        for rotor in self.part.rotors:
+            if not (rotor.drift_hz_per_s or rotor.wander_hz):
+                continue
+            share, phase = rotor.root_m / rotor.blade_length_m, self._phase(rotor)
+            for (amplitude, true), (_, steady) in zip(
+                self._blades(rotor), self._blades(rotor, wanders=False), strict=True
+            ):
+                away = np.abs(true - steady)
+                here, there = np.cos(true), np.cos(steady)
+                # the flash is where the cosine is smallest: at an end of the arc between both, or within it
+                least = np.where((here * there <= 0) | (away > 1), 0.0, np.minimum(np.abs(here), np.abs(there)))
+                z = phase * (1 - share)
+                slope = phase * np.sqrt(1 - least**2) * moment_envelope(1, z * least, share)
+                edges = 1 + np.abs(rotor.edge_asymmetry)
+                error = away * (edges * slope + np.abs(rotor.edge_asymmetry) * moment_envelope(0, z * least, share))
+                apart = edges * (moment_envelope(0, z * here, share) + moment_envelope(0, z * there, share))
+                out += amplitude * np.minimum(error, apart)
+        return out
+
+    def spacing(self, points: int) -> float:
+        """Energy of the error of so many Gauss points a blade in place of the continuous blade, over all pulses.
+
+        The rule is exact for polynomials of order 2 n - 1; what it misses of a phasor are its Legendre terms from order
+        2 n on, (2 l + 1) j_l(z / 2), of which it sees the first by a known share and the others by one at most.
+        """
+        total = np.zeros(len(self.times_s))
+        for rotor in self.part.rotors:
+            if rotor.root_m == rotor.blade_length_m:
+                continue
+            half = self._phase(rotor) * (1 - rotor.root_m / rotor.blade_length_m) / 2
+            missed = _gauss_errors(points, half)
+            for amplitude, theta in self._blades(rotor):
+                which = np.minimum((np.abs(np.cos(theta)) * _SPACING_BINS).astype(int), _SPACING_BINS - 1)
+                total += amplitude * (1 + np.abs(rotor.edge_asymmetry * np.sin(theta))) * missed[which]
+        return float(np.sum(total**2))
+
+
+@lru_cache(maxsize=256)
+def _gauss_errors(points: int, largest_half_phase_rad: float) -> Amplitude:
+    """`gauss_error` of each class of angles: the rotors of an airframe are often alike."""
+    return gauss_error(points, largest_half_phase_rad * np.linspace(0, 1, _SPACING_BINS + 1)[1:])
+
+
+def gauss_error(points: int, half_phase_rad: Amplitude) -> Amplitude:
+    """Most that the mean of exp(j z x / 2) over -1..1 is missed by by so many Gauss points.
+
+    z / 2 is `half_phase_rad`, rising; the bound grows with it, to 2.
+    """
+    first = 2 * points
+    # C(4n, 2n) / C(2n, n)^2: the leading coefficients of the Legendre polynomials of order 2n and n
+    share = np.exp(gammaln(4 * points + 1) - 4 * gammaln(2 * points + 1) + 4 * gammaln(points + 1)) / (2 * points + 1)
+    orders = np.arange(first, first + 24 + 6 * int(np.cbrt(first)), 2)
+    terms = (2 * orders + 1) * np.abs(spherical_jn(orders, half_phase_rad[:, None]))
+    terms[:, 0] *= share
+    # beyond the order the terms no longer fall: the rule misses the phasor altogether there
+    error = np.where(half_phase_rad > first, 2.0, np.minimum(terms.sum(axis=1), 2.0))
+    return np.maximum.accumulate(error)
+
+
+def bird_bound(part: BirdPart, radar: Radar, effect: str) -> Amplitude:
+    """Bound of leaving out one of `render_bird.BIRD_EFFECTS`, shape (pulses,)."""
+    times = radar.times_s
+    wavenumber = 2 * TWO_PI / radar.wavelength_m
+    if effect == "acceleration":
+        echo = bird_echo(part, radar, times, Fidelity(frozenset({"heave"}), None))
+        return np.abs(echo) * chord(wavenumber * part.acceleration_mps2 * times**2 / 2)
+    out = np.zeros(len(times))
+    for bird in members(part):
+        heave = heave_range_m(part, times, bird)
+        out += np.abs(bird_parts_echo(part, radar, times, bird)) * chord(wavenumber * heave)
+    return out

@@ -1,0 +1,223 @@
+"""The parts a scene is built from, each validated by itself: what it holds, its units, its ranges and its defaults.
+
+Levels are powers over the receiver's noise, a sample [dB]; angles are in degrees here, because people write them.
+"""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from .laws import LAWS
+from .receiver import FAULT_CHANCE
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
+NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+Level = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-200, le=200)]
+Aspect = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=90)]
+Share = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=60)]
+
+
+class Part(BaseModel):
+    """What all parts share: unknown fields are refused, nothing changes after it was made."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class RadarPart(Part):
+    """The radar: carrier [Hz], PRF [Hz], pulses."""
+
+    carrier_hz: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1e12)]
+    prf_hz: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1e9)]
+    pulses: Annotated[int, Field(strict=True, ge=1, le=100_000_000)]
+
+
+class BodyPart(Part):
+    """One scatterer of a body, at `offset_m` from its centre and `bearing_deg` from the line of sight (0: nearer)."""
+
+    level_db: Level
+    offset_m: NotNegative = 0.0
+    bearing_deg: Number = 0.0
+    phase_deg: Number = 0.0
+
+
+class RotorPart(Part):
+    """One rotor; the sign of `rotation_hz` is its sense.
+
+    `flash_db` is one blade's level at its flash, seen at a right angle, where all of it echoes in phase. `root_m` equal
+    to `blade_length_m` leaves the tip alone: the paper's point scatterer. `beta_deg` is the UAV's unless given here.
+    """
+
+    blade_length_m: Positive
+    rotation_hz: Number
+    flash_db: Level
+    blades: Annotated[int, Field(strict=True, ge=1, le=12)] = 2
+    root_m: NotNegative = 0.0
+    beta_deg: Aspect | None = None
+    phase_deg: Number = 0.0
+    offset_m: NotNegative = 0.0
+    bearing_deg: Number = 0.0
+    hub_phase_deg: Number = 0.0
+    blade_amplitudes: tuple[NotNegative, ...] | None = None
+    edge_asymmetry: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1, le=1)] = 0.0
+    drift_hz_per_s: Number = 0.0
+    wander_hz: NotNegative = 0.0
+    wander_rate_hz: Positive = 1.0
+    wander_phase_deg: Number = 0.0
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "RotorPart":
+        if self.root_m > self.blade_length_m:
+            raise ValueError(f"root_m is {self.root_m}: it must not exceed blade_length_m = {self.blade_length_m}")
+        if self.blade_amplitudes is not None and len(self.blade_amplitudes) != self.blades:
+            raise ValueError(
+                f"blade_amplitudes holds {len(self.blade_amplitudes)}: one a blade, blades = {self.blades}"
+            )
+        return self
+
+    @property
+    def amplitudes(self) -> tuple[float, ...]:
+        """Amplitude of each blade over that of `flash_db`."""
+        return self.blade_amplitudes or (1.0,) * self.blades
+
+
+class TargetPart(Part):
+    """What every target has: a name, a switch, a range [m] and a radial motion (positive when the range grows)."""
+
+    name: Name
+    on: bool = True
+    range_m: Positive = 1000.0
+    velocity_mps: Number = 0.0
+    acceleration_mps2: Number = 0.0
+
+
+class UavPart(TargetPart):
+    """A UAV: body scatterers and rotors, or the name of an `airframe` of the catalogue that brings both."""
+
+    airframe: str | None = None
+    beta_deg: Aspect = 0.0
+    vibration_rad: NotNegative = 0.0
+    vibration_hz: Positive = 50.0
+    body: tuple[BodyPart, ...] = ()
+    rotors: tuple[RotorPart, ...] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_catalogue(cls, values: Any) -> Any:
+        from .catalogue import AIRFRAMES
+
+        name = values.get("airframe") if isinstance(values, dict) else None
+        if name is None:
+            return values
+        if name not in AIRFRAMES:
+            raise ValueError(f"airframe is {name!r}: it must be one of {', '.join(AIRFRAMES)}")
+        return {**AIRFRAMES[name].fields, **values}
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "UavPart":
+        if not self.body and not self.rotors:
+            raise ValueError("it has neither body nor rotors: give one of them, or an airframe of the catalogue")
+        reach = max(
+            [r.offset_m + r.blade_length_m for r in self.rotors] + [b.offset_m for b in self.body],
+        )
+        if self.range_m <= reach:
+            raise ValueError(f"range_m is {self.range_m}: it must exceed the target's own reach of {reach:.6g} m")
+        return self
+
+
+class BirdPart(TargetPart):
+    """A bird, or a small flock of `members`: a `species` of the catalogue, or mass (and span, area).
+
+    `wing_db` is the level of both wings with all their parts in phase, `body_db` that of the body. `heading_deg` is the
+    direction of the radar in the bird's own plane (0: ahead), `elevation_deg` how far the radar looks up at it. The
+    members of a flock differ in phase, wingbeat, place and speed (by `flock_velocity_mps` rms), drawn by `flock_seed`.
+    """
+
+    species: str | None = None
+    mass_kg: Positive
+    span_m: Positive | None = None
+    area_m2: Positive | None = None
+    wingbeat_hz: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=100)] | None = None
+    wing_db: Level
+    body_db: Level
+    phase_deg: Number = 0.0
+    heading_deg: Number = 0.0
+    elevation_deg: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-90, le=90)] = 20.0
+    stroke_scale: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=2)] = 1.0
+    down_stroke: Share = 0.3
+    feather_weight: NotNegative = 0.3
+    heave_m: NotNegative = 0.0
+    flight: Literal["flap", "flap_glide", "bound"] = "flap"
+    flap_s: Positive = 1.0
+    rest_s: Positive = 1.0
+    members: Annotated[int, Field(strict=True, ge=1, le=50)] = 1
+    flock_velocity_mps: NotNegative = 1.0
+    flock_seed: Annotated[int, Field(strict=True, ge=0)] = 0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_catalogue(cls, values: Any) -> Any:
+        from .catalogue import BIRDS
+
+        name = values.get("species") if isinstance(values, dict) else None
+        if name is None:
+            return values
+        if name not in BIRDS:
+            raise ValueError(f"species is {name!r}: it must be one of {', '.join(BIRDS)}")
+        return {**BIRDS[name].fields, **values}
+
+
+class ClutterPart(Part):
+    """Clutter or a confuser of one kind, of mean power `level_db`.
+
+    Its parameters are drawn from the laws of the training records (`laws.LAWS`); `values` fixes any of them by name.
+    """
+
+    name: Name
+    on: bool = True
+    kind: Literal["ground", "rain", "sea", "person", "vehicle", "wind_turbine"]
+    level_db: Level
+    values: dict[str, Number] = {}
+
+    @field_validator("values")
+    @classmethod
+    def _known(cls, values: dict[str, float]) -> dict[str, float]:
+        return _known_laws(values)
+
+
+class ReceiverPart(Part):
+    """The receiver: thermal noise of unit power, and effects by name; `values` fixes their parameters.
+
+    `jitter_s` is the rms error of a pulse's instant, `dc_db` the level of an offset at velocity zero.
+    """
+
+    noise: bool = True
+    effects: tuple[str, ...] = ()
+    values: dict[str, Number] = {}
+    mains_hz: Positive | None = None
+    jitter_s: NotNegative = 0.0
+    dc_db: Level | None = None
+
+    @field_validator("effects")
+    @classmethod
+    def _effects(cls, effects: tuple[str, ...]) -> tuple[str, ...]:
+        for effect in effects:
+            if effect not in FAULT_CHANCE:
+                raise ValueError(f"{effect!r} is unknown: the effects are {', '.join(FAULT_CHANCE)}")
+        return effects
+
+    @field_validator("values")
+    @classmethod
+    def _known(cls, values: dict[str, float]) -> dict[str, float]:
+        return _known_laws(values)
+
+
+def _known_laws(values: dict[str, float]) -> dict[str, float]:
+    """Refuse a parameter that no law knows, or a value that its law's meaning forbids."""
+    for name, value in values.items():
+        if name not in LAWS:
+            raise ValueError(f"{name!r} is unknown: the parameters are {', '.join(LAWS)}")
+        if LAWS[name].kind == "log" and value <= 0:
+            raise ValueError(f"{name} is {value}: it must be above 0 [{LAWS[name].unit}]")
+    return values

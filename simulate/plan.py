@@ -1,0 +1,198 @@
+"""What a scene requires, and no more: every effect's bound against the noise, and the cheapest renderer that will do.
+
+The error of leaving an effect out is measured by its energy over the dwell, over the noise power of a sample. No line
+of the spectrum can then stand further over the noise floor than that, whatever the window; and no test at all, knowing
+both signals, can tell them apart once the energy is well below one (its deflection is twice the energy): hence the
+tolerance of -10 dB. Errors of several effects are added as amplitudes.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .bounds import UavBounds, bird_bound
+from .motion import TWO_PI
+from .parts import UavPart
+from .radar import Radar
+from .render_bird import BIRD_EFFECTS
+from .render_uav import UAV_EFFECTS, Fidelity, full_fidelity, rotor_beta_rad
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+#: Without receiver noise, what is compared with: the digits of complex64, this far under the strongest target.
+DIGITS_DB = -140.0
+
+#: What each effect is, and what stands in its place.
+WORDS = {
+    "blade_curvature": ("range curvature along the blades", "far field, eq. 4: blades in closed form"),
+    "hub_curvature": ("range curvature over the airframe", "far field, eq. 2: every part's path is the centre's"),
+    "acceleration": ("acceleration over the dwell", "constant radial velocity"),
+    "vibration": ("vibration of the body", "a rigid body"),
+    "wander": ("drift and wander of the rotor rates", "constant rates"),
+    "heave": ("heave of the body against the wings", "a steady body"),
+}
+
+
+@dataclass(frozen=True)
+class Decision:
+    """One effect of one part.
+
+    Parameters
+    ----------
+    part, effect : str
+        Names.
+    bound_db : float
+        Most energy of the error of leaving it out, over the noise power of a sample [dB]; -inf where it is not there.
+    kept : bool
+        Whether the renderer keeps it.
+    """
+
+    part: str
+    effect: str
+    bound_db: float
+    kept: bool
+
+    def line(self) -> str:
+        """The decision in words and numbers."""
+        what, instead = WORDS[self.effect]
+        if self.bound_db == -np.inf:
+            return f"{self.part}: {what}: not in this scene"
+        verdict = "kept" if self.kept else f"left out ({instead})"
+        return f"{self.part}: {what}: {verdict}; leaving it out changes at most {self.bound_db:+.1f} dB re noise"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a scene is rendered.
+
+    Parameters
+    ----------
+    tolerance_db : float
+        Most error energy over the noise power of a sample [dB].
+    error_db : float
+        Bound on that of all that is left out together [dB]; -inf where nothing is.
+    decisions : tuple of Decision
+        One an effect and part.
+    fidelity : dict of str to Fidelity
+        The renderer of each UAV and bird.
+    notes : tuple of str
+        Renderers and their costs in words.
+    """
+
+    tolerance_db: float
+    error_db: float
+    decisions: tuple[Decision, ...]
+    fidelity: dict[str, Fidelity]
+    notes: tuple[str, ...]
+
+    def explain(self) -> str:
+        """The plan in words and numbers, one line a decision."""
+        together = "nothing is left out" if self.error_db == -np.inf else f"at most {self.error_db:+.1f} dB re noise"
+        head = f"error of all that is left out, over the dwell: {together} (tolerance {self.tolerance_db:+.1f} dB)"
+        return "\n".join([head, *(decision.line() for decision in self.decisions), *self.notes])
+
+
+def make_plan(scene: "Scene", *, tolerance_db: float = -10.0) -> Plan:
+    """Decide for each effect whether the scene needs it.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    tolerance_db : float
+        Most error energy over the dwell, over the noise power of a sample [dB]. At -10 dB no receiver can tell.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    ValueError
+        If the tolerance is NaN.
+    """
+    if np.isnan(tolerance_db):
+        raise ValueError(f"tolerance_db is {tolerance_db}: it must be a number [dB]")
+    radar = scene.sight
+    noise = 1.0 if scene.noise else 10 ** (DIGITS_DB / 10) * _strongest(scene)
+    bounds = {uav.name: UavBounds(uav, radar) for uav in scene.uavs}
+    energies: dict[tuple[str, str], float] = {}
+    for uav in scene.uavs:
+        for effect in UAV_EFFECTS:
+            energies[uav.name, effect] = float(np.sum(bounds[uav.name].of(effect) ** 2)) / noise
+    for bird in scene.birds:
+        for effect in BIRD_EFFECTS:
+            energies[bird.name, effect] = float(np.sum(bird_bound(bird, radar, effect) ** 2)) / noise
+    # half of the amplitude tolerated is for the effects, the rest for the spacing of scatterers where they are needed
+    allowed, used, dropped = np.sqrt(10 ** (tolerance_db / 10)), 0.0, set()
+    for key, energy in sorted(energies.items(), key=lambda item: item[1]):
+        if energy == 0 or used + np.sqrt(energy) <= allowed / 2:
+            used += np.sqrt(energy)
+            dropped.add(key)
+    fidelity: dict[str, Fidelity] = {}
+    notes: list[str] = []
+    rest = (allowed - used) / max(1, len(scene.uavs))
+    for uav in scene.uavs:
+        kept = frozenset(effect for effect in UAV_EFFECTS if (uav.name, effect) not in dropped)
+        points = None
+        if "blade_curvature" in kept:
+            points, missed = _points(bounds[uav.name], uav, radar, rest**2 * noise)
+            used += np.sqrt(missed / noise)
+        fidelity[uav.name] = Fidelity(kept, points)
+        notes += [_renderer(uav, radar, points), _aliasing(uav, radar)]
+    for bird in scene.birds:
+        kept = frozenset(effect for effect in BIRD_EFFECTS if (bird.name, effect) not in dropped)
+        fidelity[bird.name] = Fidelity(kept, None)
+    decisions = tuple(Decision(*key, _db(energy), key not in dropped) for key, energy in energies.items())
+    return Plan(tolerance_db, _db(used**2), decisions, fidelity, tuple(notes))
+
+
+def _strongest(scene: "Scene") -> float:
+    """Power of the strongest part of the scene."""
+    levels = [point.level_db for uav in scene.uavs for point in uav.body]
+    levels += [rotor.flash_db for uav in scene.uavs for rotor in uav.rotors]
+    levels += [max(bird.wing_db, bird.body_db) for bird in scene.birds]
+    return float(10 ** (max(levels, default=0.0) / 10))
+
+
+def _db(energy: float) -> float:
+    return float(10 * np.log10(energy)) if energy > 0 else -np.inf
+
+
+def _points(bounds: UavBounds, uav: UavPart, radar: Radar, allowed: float) -> tuple[int, float]:
+    """Fewest Gauss points a blade whose error energy stays below what is allowed, and that energy."""
+    low, high = 1, full_fidelity(uav, radar).points or 1
+    if bounds.spacing(high) > allowed:
+        return high, bounds.spacing(high)
+    while low < high:
+        middle = (low + high) // 2
+        if bounds.spacing(middle) <= allowed:
+            high = middle
+        else:
+            low = middle + 1
+    return high, bounds.spacing(high)
+
+
+def _renderer(uav: UavPart, radar: Radar, points: int | None) -> str:
+    """The renderer chosen and its cost against full fidelity."""
+    blades = sum(rotor.blades for rotor in uav.rotors)
+    full = blades * (full_fidelity(uav, radar).points or 1)
+    if points is None:
+        return f"{uav.name}: closed form, 2 sines a blade and pulse, {2 * blades} in all (full fidelity: {2 * full})"
+    return (
+        f"{uav.name}: point scatterers at exact ranges, {points} a blade, {2 * points * blades} sines a pulse "
+        f"(full fidelity: {2 * full})"
+    )
+
+
+def _aliasing(uav: UavPart, radar: Radar) -> str:
+    """Whether the samples fold the blades' Doppler. They do so by themselves, at no cost: nothing is decided here."""
+    tips = [
+        TWO_PI * abs(rotor.rotation_hz) * rotor.blade_length_m * float(np.cos(rotor_beta_rad(uav, rotor)))
+        for rotor in uav.rotors
+    ]
+    fastest = max(tips, default=0.0) + abs(uav.velocity_mps) + abs(uav.acceleration_mps2) * radar.dwell_s
+    verdict = "none" if fastest <= radar.unambiguous_mps else "the samples fold it, as a radar's do"
+    return f"{uav.name}: aliasing: {verdict}; it shows {fastest:.1f} m/s of {radar.unambiguous_mps:.1f} m/s unambiguous"

@@ -1,0 +1,165 @@
+"""Rendering of a scene's UAVs: exact or far ranges, closed-form or dense blades, as a fidelity says."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .exact import blade_points, dense_rotor_echo, hub_range_m, range_echo
+from .motion import TWO_PI, range_phasor
+from .parts import BirdPart, RotorPart, UavPart
+from .radar import Radar
+from .rotor import RotorMotion, rotor_echo
+
+#: Effects that a plan may leave out of a UAV.
+UAV_EFFECTS = ("blade_curvature", "hub_curvature", "acceleration", "vibration", "wander")
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """How one target is rendered.
+
+    Parameters
+    ----------
+    effects : frozenset of str
+        Which of its effects are kept.
+    points : int or None
+        Point scatterers a blade, in float64; None for the closed form of a uniform blade, which has no range
+        curvature along it.
+    """
+
+    effects: frozenset[str]
+    points: int | None
+
+
+def full_fidelity(part: UavPart, radar: Radar) -> Fidelity:
+    """Every effect, and as many scatterers a blade as float64 can tell from a continuous one."""
+    longest = max((r.blade_length_m - r.root_m for r in part.rotors), default=0.0)
+    phase = 2 * TWO_PI * longest / radar.wavelength_m
+    return Fidelity(frozenset(UAV_EFFECTS), int(phase / 4 + 6 * np.cbrt(phase)) + 30)
+
+
+def centre_range_m(part: UavPart | BirdPart, times_s: NDArray[np.float64], accelerates: bool) -> NDArray[np.float64]:
+    """Range of a target's centre [m], shape (pulses,)."""
+    acceleration = part.acceleration_mps2 if accelerates else 0.0
+    return part.range_m + times_s * (part.velocity_mps + 0.5 * acceleration * times_s)
+
+
+def rotor_angle_rad(rotor: RotorPart, times_s: NDArray[np.float64], wanders: bool) -> NDArray[np.float64]:
+    """Angle of a rotor's first blade [rad], shape (pulses,), with or without drift and wander of its rate."""
+    motion = RotorMotion(
+        rotor.rotation_hz,
+        np.deg2rad(rotor.phase_deg),
+        drift_hz_per_s=rotor.drift_hz_per_s if wanders else 0.0,
+        wander_hz=rotor.wander_hz if wanders else 0.0,
+        wander_rate_hz=rotor.wander_rate_hz,
+        wander_phase_rad=np.deg2rad(rotor.wander_phase_deg),
+    )
+    return motion.angle_rad(times_s)
+
+
+def rotor_beta_rad(part: UavPart, rotor: RotorPart) -> float:
+    """Angle between the line of sight and this rotor's plane [rad]."""
+    return float(np.deg2rad(part.beta_deg if rotor.beta_deg is None else rotor.beta_deg))
+
+
+def uav_echo(part: UavPart, radar: Radar, times_s: NDArray[np.float64], how: Fidelity) -> NDArray[np.complex128]:
+    """Echo of a UAV, its absolute range included.
+
+    Parameters
+    ----------
+    part : UavPart
+        The UAV.
+    radar : Radar
+        The radar that looks.
+    times_s : ndarray of float64, shape (pulses,)
+        Instants of the pulses [s].
+    how : Fidelity
+        What to keep.
+
+    Returns
+    -------
+    ndarray of complex128, shape (pulses,)
+    """
+    wavelength = radar.wavelength_m
+    centre = centre_range_m(part, times_s, "acceleration" in how.effects)
+    straight_blades = "blade_curvature" not in how.effects
+    near_hubs = not straight_blades or "hub_curvature" in how.effects
+    out = np.zeros(len(times_s), np.complex128)
+    for rotor in part.rotors:
+        hub = hub_range_m(centre, rotor.offset_m, np.deg2rad(rotor.bearing_deg), far_field=not near_hubs)
+        angle = rotor_angle_rad(rotor, times_s, "wander" in how.effects)
+        level = 10 ** (rotor.flash_db / 20) * np.exp(1j * np.deg2rad(rotor.hub_phase_deg))
+        beta = rotor_beta_rad(part, rotor)
+        if how.points is None:
+            blades = rotor_echo(
+                angle,
+                wavelength_m=wavelength,
+                blade_length_m=rotor.blade_length_m,
+                beta_rad=beta,
+                root_m=rotor.root_m,
+                blade_amplitudes=rotor.amplitudes,
+                edge_asymmetry=rotor.edge_asymmetry,
+            )
+            out += level * blades * range_phasor(hub, wavelength)
+        else:
+            out += level * dense_rotor_echo(
+                hub,
+                angle,
+                blade_points(rotor.root_m, rotor.blade_length_m, how.points, "gauss"),
+                wavelength_m=wavelength,
+                beta_rad=beta,
+                blade_amplitudes=rotor.amplitudes,
+                edge_asymmetry=rotor.edge_asymmetry,
+                far_field=straight_blades,
+            )
+    return out + body_echo(part, wavelength, centre, times_s, how, near_hubs)
+
+
+def body_echo(
+    part: UavPart,
+    wavelength_m: float,
+    centre_m: NDArray[np.float64],
+    times_s: NDArray[np.float64],
+    how: Fidelity,
+    near: bool,
+) -> NDArray[np.complex128]:
+    """Echo of a UAV's body scatterers, shaken if it vibrates."""
+    body = np.zeros(len(times_s), np.complex128)
+    for point in part.body:
+        place = hub_range_m(centre_m, point.offset_m, np.deg2rad(point.bearing_deg), far_field=not near)
+        amplitude = 10 ** (point.level_db / 20) * np.exp(1j * np.deg2rad(point.phase_deg))
+        body += amplitude * range_echo(place, wavelength_m)
+    if "vibration" in how.effects and part.vibration_rad:
+        body *= np.exp(1j * vibration_rad(part, times_s))
+    return body
+
+
+def vibration_rad(part: UavPart, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Phase by which the body's vibration moves its echo [rad], shape (pulses,)."""
+    return part.vibration_rad * np.sin(TWO_PI * part.vibration_hz * times_s)
+
+
+def uav_truth(part: UavPart) -> dict[str, Any]:
+    """Numbers of a UAV; those of rotors are lists, one entry a rotor."""
+    return {
+        "name": part.name,
+        "label": "uav",
+        "kind": part.airframe or "uav",
+        "range_m": part.range_m,
+        "velocity_mps": part.velocity_mps,
+        "acceleration_mps2": part.acceleration_mps2,
+        "beta_deg": part.beta_deg,
+        "rotation_hz": [rotor.rotation_hz for rotor in part.rotors],
+        "blades": [rotor.blades for rotor in part.rotors],
+        "blade_length_m": [rotor.blade_length_m for rotor in part.rotors],
+        "chopping_hz": [abs(rotor.rotation_hz) * (rotor.blades if _equal(rotor) else 1) for rotor in part.rotors],
+        "flash_db": [rotor.flash_db for rotor in part.rotors],
+        "body_db": [point.level_db for point in part.body],
+    }
+
+
+def _equal(rotor: RotorPart) -> bool:
+    """Whether all blades echo alike: only then is the rotation rate's own comb missing."""
+    return len(set(rotor.amplitudes)) == 1

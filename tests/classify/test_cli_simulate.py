@@ -1,0 +1,123 @@
+"""`bladewing simulate`: a scene in, a SigMF recording with its truth out, or one line a problem and nothing."""
+
+import json
+
+import numpy as np
+import pytest
+import sigmf
+from bladewing.classify.cli import main
+from bladewing.classify.recording import load_recording
+from bladewing.simulate.scene import Scene
+
+SCENE = """
+title = "test"
+[radar]
+carrier_hz = 9.85e9
+prf_hz = 20e3
+pulses = 500
+[[uav]]
+name = "drone"
+airframe = "quadcopter_12cm"
+velocity_mps = -8.0
+[[bird]]
+name = "gull"
+species = "herring_gull"
+[[clutter]]
+name = "ground"
+kind = "ground"
+level_db = 10.0
+"""
+
+
+@pytest.fixture
+def scene_file(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    return path
+
+
+def test_a_scene_becomes_a_recording_that_sigmf_validates_and_predict_can_read(scene_file, tmp_path, capsys):
+    assert main(["simulate", str(scene_file), "--out", str(tmp_path / "rec"), "--seed", "7"]) == 0
+    assert capsys.readouterr().err == ""
+    recording = load_recording(tmp_path / "rec")
+    assert recording.carrier_hz == 9.85e9
+    assert recording.prf_hz == 20e3
+    np.testing.assert_array_equal(recording.iq, Scene.load(scene_file).render(7).iq)
+    found = sigmf.fromfile(str(tmp_path / "rec.sigmf-meta"))
+    found.validate()
+    assert found.get_global_info()["core:extensions"] == [{"name": "bladewing", "version": "1.0.0", "optional": True}]
+    truth = {entry["core:label"]: entry for entry in found.get_annotations()}
+    assert set(truth) == {"drone", "gull", "ground"}
+    assert truth["drone"]["bladewing:label"] == "uav"
+    assert truth["drone"]["bladewing:velocity_mps"] == -8.0
+    assert truth["drone"]["bladewing:chopping_hz"] == pytest.approx([138.0, 139.4, 140.6, 142.0])
+    assert truth["gull"]["bladewing:wingbeat_hz"] == pytest.approx(3.69, abs=0.01)
+    assert truth["ground"]["bladewing:wind_mph"] > 0
+    assert all(entry["core:sample_count"] == 500 for entry in truth.values())
+
+
+def test_the_recording_holds_the_scene_it_was_made_from(scene_file, tmp_path):
+    assert main(["simulate", str(scene_file), "--out", str(tmp_path / "rec.sigmf-meta"), "--seed", "3", "--full"]) == 0
+    info = json.loads((tmp_path / "rec.sigmf-meta").read_text())["global"]
+    again = Scene.build(info["bladewing:scene"]).render(info["bladewing:seed"], full=True)
+    np.testing.assert_array_equal(again.iq, load_recording(tmp_path / "rec").iq)
+
+
+def test_explain_says_what_is_left_out_and_writes_nothing(scene_file, tmp_path, capsys):
+    assert main(["simulate", str(scene_file), "--explain", "--tolerance-db", "20"]) == 0
+    said = capsys.readouterr().out
+    assert "tolerance +20.0 dB" in said
+    assert "drone: range curvature along the blades: left out (far field, eq. 4: blades in closed form)" in said
+    assert "drone: closed form" in said
+    assert main(["simulate", str(scene_file), "--explain", "--full"]) == 0
+    assert "nothing is left out" in capsys.readouterr().out
+    assert list(tmp_path.iterdir()) == [scene_file]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("pulses = 500", "pulses = 0"), "radar.pulses is 0: it should be greater than or equal to 1"),
+        (("velocity_mps = -8.0", "velocity_mps = nan"), "uav[0].velocity_mps is nan: it should be a finite number"),
+        (("[radar]", "[radar"), "not TOML"),
+        (("level_db = 10.0", "level_db = 10.0\nlevel = 3"), "unknown field clutter[0].level: the fields are"),
+    ],
+)
+def test_a_bad_scene_is_one_line_and_nothing_written(scene_file, tmp_path, capsys, change, said):
+    scene_file.write_text(SCENE.replace(*change))
+    assert main(["simulate", str(scene_file), "--out", str(tmp_path / "rec")]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert said in err
+    assert err.count("\n") == 1
+    assert err.startswith("bladewing: error: ")
+    assert list(tmp_path.iterdir()) == [scene_file]
+
+
+def test_several_problems_have_a_line_each(scene_file, tmp_path, capsys):
+    scene_file.write_text(SCENE.replace("pulses = 500", "pulses = 0").replace("-8.0", "inf"))
+    assert main(["simulate", str(scene_file), "--out", str(tmp_path / "rec")]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2
+    assert all(line.startswith("bladewing: error: ") for line in lines)
+
+
+def test_what_aliases_is_rendered_and_warned_of(scene_file, tmp_path, capsys):
+    scene_file.write_text(SCENE.replace("prf_hz = 20e3", "prf_hz = 4e3"))
+    assert main(["simulate", str(scene_file), "--out", str(tmp_path / "rec")]) == 0
+    warnings = capsys.readouterr().err.splitlines()
+    assert len(warnings) == 4  # one a rotor
+    assert all("warning" in line and "alias" in line for line in warnings)
+    assert (tmp_path / "rec.sigmf-data").is_file()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["type1"], ["nowhere.toml", "--explain"], ["type1", "--out", "missing/folder/rec"], ["type1", "--out", "."],
+     ["type1", "--explain", "--tolerance-db", "nan"]],
+)  # fmt: skip
+def test_wrong_arguments_are_one_line(arguments, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["simulate", *arguments]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []

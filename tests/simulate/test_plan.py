@@ -1,0 +1,212 @@
+"""The plan: every bound holds on random scenes and is not idle, and what is left out stays within the tolerance."""
+
+import numpy as np
+import pytest
+from bladewing.simulate.bounds import UavBounds, bird_bound, gauss_error, moment_envelope
+from bladewing.simulate.exact import blade_points
+from bladewing.simulate.parts import BirdPart, UavPart
+from bladewing.simulate.radar import Radar
+from bladewing.simulate.render import render
+from bladewing.simulate.render_bird import BIRD_EFFECTS, bird_echo
+from bladewing.simulate.render_uav import UAV_EFFECTS, Fidelity, full_fidelity, uav_echo
+from bladewing.simulate.scene import Scene, shipped
+
+SCENES = 40
+
+
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def random_uav(rng: np.random.Generator) -> tuple[UavPart, Radar]:
+    radar = Radar(log_uniform(rng, 2e9, 40e9), log_uniform(rng, 5e3, 40e3), 250)
+    rotors = []
+    for _ in range(rng.integers(1, 7)):
+        length, blades = log_uniform(rng, 0.05, 0.4), int(rng.integers(1, 5))
+        rate = float(rng.uniform(30, 180) / (2 * np.pi * length) * rng.choice([-1, 1]))
+        rotors.append(
+            {
+                "blade_length_m": length,
+                "root_m": length if rng.random() < 0.2 else float(length * rng.uniform(0, 0.6)),
+                "rotation_hz": rate,
+                "blades": blades,
+                "blade_amplitudes": [float(a) for a in rng.uniform(0.5, 1.5, blades)],
+                "edge_asymmetry": float(rng.uniform(-0.9, 0.9)),
+                "flash_db": float(rng.uniform(-10, 30)),
+                "phase_deg": float(rng.uniform(0, 360)),
+                "hub_phase_deg": float(rng.uniform(0, 360)),
+                "offset_m": float(rng.uniform(0, 0.5)),
+                "bearing_deg": float(rng.uniform(0, 360)),
+                "drift_hz_per_s": abs(rate) * log_uniform(rng, 1e-3, 0.3),
+                "wander_hz": abs(rate) * log_uniform(rng, 1e-4, 2e-2),
+                "wander_rate_hz": log_uniform(rng, 0.5, 20),
+                "wander_phase_deg": float(rng.uniform(0, 360)),
+            }
+        )
+    part = UavPart.model_validate(
+        {
+            "name": "x",
+            "range_m": log_uniform(rng, 20, 3000),
+            "velocity_mps": float(rng.uniform(-20, 20)),
+            "acceleration_mps2": float(rng.uniform(-4, 4)),
+            "beta_deg": float(rng.uniform(0, 80)),
+            "vibration_rad": log_uniform(rng, 1e-3, 0.6),
+            "vibration_hz": float(rng.uniform(20, 200)),
+            "body": [
+                {"level_db": float(rng.uniform(0, 30)), "offset_m": float(rng.uniform(0, 0.4)), "bearing_deg": 70.0}
+                for _ in range(rng.integers(0, 3))
+            ],
+            "rotors": rotors,
+        }
+    )
+    return part, radar
+
+
+def energy(samples: np.ndarray) -> float:
+    return float(np.sum(abs(samples) ** 2))
+
+
+@pytest.mark.parametrize("effect", UAV_EFFECTS)
+def test_every_bound_of_a_uav_holds_and_is_not_idle(effect):
+    ratios = []
+    for seed in range(SCENES):
+        part, radar = random_uav(np.random.default_rng(seed))
+        points = full_fidelity(part, radar).points
+        kept = set(UAV_EFFECTS) - ({"blade_curvature"} if effect == "hub_curvature" else set())
+        full, less = (
+            uav_echo(part, radar, radar.times_s, Fidelity(frozenset(effects), points))
+            for effects in (kept, kept - {effect})
+        )
+        true, bound = energy(full - less), energy(UavBounds(part, radar).of(effect))
+        digits = 1e-18 * energy(full) * part.range_m**2  # float64 phases of so many turns
+        assert true <= bound * (1 + 1e-9) + digits, (seed, true, bound)
+        if true > 100 * digits:
+            ratios.append(bound / true)
+    assert len(ratios) > SCENES / 3
+    assert np.median(ratios) <= 10
+
+
+def test_the_bound_of_the_scatterers_spacing_holds_and_is_not_idle():
+    ratios = []
+    for seed in range(0, SCENES, 2):
+        rng = np.random.default_rng(seed)
+        part, radar = random_uav(rng)
+        best = full_fidelity(part, radar).points
+        bounds = UavBounds(part, radar)
+        full = uav_echo(part, radar, radar.times_s, Fidelity(frozenset(UAV_EFFECTS), best))
+        points = next(n for n in range(1, best) if bounds.spacing(n) <= 10 ** rng.uniform(-3, 1))
+        less = uav_echo(part, radar, radar.times_s, Fidelity(frozenset(UAV_EFFECTS), points))
+        true, bound = energy(full - less), bounds.spacing(points)
+        assert true <= bound + 1e-12, (seed, points, true, bound)
+        if true > 1e-12:
+            ratios.append(bound / true)
+    assert np.median(ratios) <= 10
+
+
+@pytest.mark.parametrize("effect", BIRD_EFFECTS)
+def test_every_bound_of_a_bird_holds_and_is_not_idle(effect):
+    ratios = []
+    for seed in range(SCENES):
+        rng = np.random.default_rng(seed)
+        radar = Radar(log_uniform(rng, 2e9, 40e9), 2e3, 400)
+        values = {
+            "name": "b",
+            "mass_kg": log_uniform(rng, 0.01, 10),
+            "wing_db": float(rng.uniform(0, 20)),
+            "body_db": float(rng.uniform(0, 20)),
+            "acceleration_mps2": float(rng.uniform(-5, 5)),
+            "heave_m": log_uniform(rng, 1e-4, 0.05),
+            "members": int(rng.integers(1, 4)),
+            "elevation_deg": float(rng.uniform(-10, 60)),
+            "heading_deg": float(rng.uniform(0, 360)),
+        }
+        part = BirdPart.model_validate(values)
+        full, less = (
+            bird_echo(part, radar, radar.times_s, Fidelity(frozenset(effects), None))
+            for effects in (set(BIRD_EFFECTS), set(BIRD_EFFECTS) - {effect})
+        )
+        true, bound = energy(full - less), energy(bird_bound(part, radar, effect))
+        assert true <= bound * (1 + 1e-6), (seed, true, bound)  # float64 phases of so many turns
+        ratios.append(bound / true)
+    assert np.median(ratios) <= 10
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 4])
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_moments_stay_below_their_envelope(order, share):
+    z = np.linspace(-60, 60, 241)
+    x = np.linspace(0, 1, 20_001)
+    radius = share + (1 - share) * x
+    moments = np.array([np.trapezoid(radius**order * np.exp(1j * phase * x), x) for phase in z])
+    assert (abs(moments) <= moment_envelope(order, z, share) + 1e-6).all()
+
+
+@pytest.mark.parametrize("points", [1, 2, 5, 20, 60])
+def test_gauss_points_miss_no_more_than_said(points):
+    half = np.linspace(0.1, 3.0 * points + 1, 50)
+    nodes = blade_points(0.0, 1.0, points, "gauss")
+    sums = np.exp(2j * half[:, None] * nodes.radius_m) @ nodes.weight
+    true = abs(sums - np.exp(1j * half) * np.sinc(half / np.pi))
+    assert (true <= gauss_error(points, half) + 1e-13).all()
+
+
+@pytest.mark.parametrize("tolerance_db", [-30.0, -10.0, 20.0])
+def test_what_a_plan_leaves_out_stays_below_its_own_bound_and_the_tolerance(tolerance_db):
+    left_out = 0
+    for seed in range(12):
+        part, radar = random_uav(np.random.default_rng(seed))
+        radar_part = {"carrier_hz": radar.carrier_hz, "prf_hz": radar.prf_hz, "pulses": radar.pulses}
+        scene = Scene.build({"radar": radar_part, "uav": [part]})
+        plan = scene.plan(tolerance_db=tolerance_db)
+        assert plan.error_db <= tolerance_db + 1e-9
+        left_out += sum(not decision.kept for decision in plan.decisions)
+        quiet = scene.without("noise")
+        error = energy(render(quiet, plan=plan).iq.astype(complex) - render(quiet).iq)
+        # the closed form's float32 phases, of Gamma radians, and complex64 itself
+        gamma = max(4 * np.pi / radar.wavelength_m * r.blade_length_m for r in part.rotors)
+        digits = energy(render(quiet).iq) * (5e-7 * (gamma + 1)) ** 2
+        assert error <= 10 ** (plan.error_db / 10) + digits, seed
+    assert left_out > 0
+
+
+def test_a_far_slow_scene_is_rendered_in_closed_form_and_a_near_one_point_by_point():
+    radar = {"carrier_hz": 9.85e9, "prf_hz": 25e3, "pulses": 2000}
+    far, near = (
+        Scene.build({"radar": radar, "uav": [{"name": "x", "airframe": "quadcopter_12cm", "range_m": r}]})
+        for r in (30e3, 15.0)
+    )
+    assert far.plan().fidelity["x"].points is None
+    assert "closed form" in far.plan().explain()
+    points = near.plan().fidelity["x"].points
+    assert points is not None
+    assert points < full_fidelity(near.uav[0], near.sight).points
+    assert f"{points} a blade" in near.plan().explain()
+    # noise decides: without it nothing that is there may be missing
+    assert far.without("noise").plan().fidelity["x"].points is not None
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_every_shipped_scene_explains_itself(name):
+    scene = Scene.load(name)
+    short = Scene.build({**dict(scene), "radar": {**dict(scene.radar), "pulses": 300}})
+    lines = short.plan().explain().splitlines()
+    assert len(lines) >= 1 + len(UAV_EFFECTS) * len(short.uavs) + len(BIRD_EFFECTS) * len(short.birds)
+    assert "tolerance -10.0 dB" in lines[0]
+
+
+def test_a_plan_says_whether_the_samples_fold():
+    def said(prf_hz: float) -> str:
+        radar = {"carrier_hz": 9.85e9, "prf_hz": prf_hz, "pulses": 500}
+        scene = Scene.build(
+            {"radar": radar, "uav": [{"name": "x", "airframe": "quadcopter_12cm", "velocity_mps": 3.0}]}
+        )
+        return next(line for line in scene.plan().explain().splitlines() if "aliasing" in line)
+
+    # tips of 2 pi 71 Hz 0.12 m = 53.5 m/s and 3 m/s of the body
+    assert said(20e3) == "x: aliasing: none; it shows 56.5 m/s of 152.2 m/s unambiguous"
+    assert "the samples fold it" in said(4e3)
+
+
+def test_a_tolerance_that_is_no_number_is_refused():
+    with pytest.raises(ValueError, match="tolerance_db is nan"):
+        Scene.load("type1").plan(tolerance_db=float("nan"))

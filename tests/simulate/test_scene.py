@@ -1,0 +1,212 @@
+"""Scenes: what they refuse and in which words, what they warn of, and what rendering keeps to."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from bladewing.simulate.bird import wingbeat_hz
+from bladewing.simulate.catalogue import AIRFRAMES, BIRDS
+from bladewing.simulate.scene import Scene, SceneError, shipped
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+RADAR = {"carrier_hz": 9.85e9, "prf_hz": 25e3, "pulses": 1000}
+ROTOR = {"blade_length_m": 0.15, "rotation_hz": 50.0, "flash_db": 20.0}
+NOT_NUMBERS = [float("nan"), float("inf"), "5", True]
+
+
+def uav(**changes) -> dict:
+    return {"name": "drone", "body": [{"level_db": 10.0}], "rotors": [ROTOR], **changes}
+
+
+def scene(**changes) -> dict:
+    return {"radar": RADAR, "uav": [uav()], **changes}
+
+
+def power_spectrum(iq: np.ndarray) -> np.ndarray:
+    return abs(np.fft.fft(iq * np.kaiser(len(iq), 12.5))) ** 2
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"radar": {**RADAR, "pulses": 0}}, r"radar\.pulses is 0: it should be greater than or equal to 1"),
+        ({"radar": {**RADAR, "pulses": 2.5}}, r"radar\.pulses is 2\.5: it should be a valid integer"),
+        ({"radar": {**RADAR, "prf_hz": -1.0}}, r"radar\.prf_hz is -1\.0: it should be greater than 0"),
+        ({"radar": {"carrier_hz": 1e9, "prf_hz": 1e3}}, r"radar\.pulses is missing"),
+        (scene(uav=[uav(rotors=[{**ROTOR, "blade_length_m": -0.1}])]), r"\[0\]\.blade_length_m is -0\.1: .*than 0"),
+        (scene(uav=[uav(rotors=[{**ROTOR, "root_m": 0.2}])]), r"root_m is 0\.2: it must not exceed blade_length_m"),
+        (scene(uav=[uav(rotors=[{**ROTOR, "blade_amplitudes": [1.0]}])]), r"one a blade, blades = 2"),
+        (scene(uav=[uav(beta_deg=91.0)]), r"uav\[0\]\.beta_deg is 91\.0: it should be less than or equal to 90"),
+        (scene(uav=[uav(velocity=3.0)]), r"unknown field uav\[0\]\.velocity: the fields are .*velocity_mps"),
+        (scene(uav=[uav(rotors=[{**ROTOR, "rpm": 3.0}])]), r"unknown field .*rpm: the fields are blade_length_m"),
+        (scene(uav=[uav(range_m=0.1)]), r"range_m is 0\.1: it must exceed the target's own reach of 0\.15 m"),
+        (scene(uav=[{"name": "x", "airframe": "jumbo"}]), r"airframe is 'jumbo': it must be one of type1"),
+        (scene(uav=[{"name": "empty"}]), r"neither body nor rotors"),
+        (scene(uav=[uav(), uav()]), r"two parts are named 'drone'"),
+        (scene(off=["swan"]), r"off holds 'swan': it may hold drone, noise"),
+        (scene(bird=[{"name": "b", "species": "dodo"}]), r"species is 'dodo': it must be one of mute_swan"),
+        (scene(clutter=[{"name": "c", "kind": "lava", "level_db": 0.0}]), r"clutter\[0\]\.kind is 'lava'"),
+        (scene(clutter=[{"name": "c", "kind": "sea", "level_db": 0.0, "values": {"salt": 1.0}}]), r"'salt' is unknown"),
+        (scene(clutter=[{"name": "c", "kind": "ground", "level_db": 0.0, "values": {"wind_mph": -1.0}}]), r"above 0"),
+        (scene(receiver={"effects": ["rust"]}), r"'rust' is unknown: the effects are fading"),
+    ],
+)  # fmt: skip
+def test_a_bad_scene_gets_one_line_with_field_value_and_rule(values, said):
+    with pytest.raises(SceneError, match=said) as caught:
+        Scene.build(values, "my.toml")
+    assert len(caught.value.problems) == 1
+    assert caught.value.problems[0].startswith("my.toml: ")
+    assert "\n" not in caught.value.problems[0]
+
+
+@pytest.mark.parametrize("value", NOT_NUMBERS, ids=str)
+@pytest.mark.parametrize("field", ["range_m", "velocity_mps", "beta_deg", "vibration_rad"])
+def test_what_is_not_a_finite_number_is_refused(field, value):
+    with pytest.raises(SceneError, match=rf"uav\[0\]\.{field} is "):
+        Scene.build(scene(uav=[uav(**{field: value})]))
+
+
+def test_every_problem_has_its_line():
+    with pytest.raises(SceneError) as caught:
+        Scene.build({"radar": {**RADAR, "pulses": 0}, "uav": [uav(beta_deg=-1.0)], "colour": 1})
+    assert len(caught.value.problems) == 3
+
+
+@pytest.mark.parametrize("content", [b"radar = [", b"\xff\xfe", None])
+def test_a_file_that_is_no_scene_is_refused_in_one_line(tmp_path, content):
+    path = tmp_path / "scene.toml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(SceneError, match=r"not TOML|cannot be read: No such file") as caught:
+        Scene.load(path)
+    assert len(caught.value.problems) == 1
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_every_shipped_scene_renders(name):
+    found = Scene.load(name)
+    short = Scene.build({**dict(found), "radar": {**dict(found.radar), "pulses": 200}})
+    rendering = short.render(1)
+    assert rendering.iq.dtype == np.complex64
+    assert rendering.iq.shape == (200,)
+    assert np.isfinite(rendering.iq).all()
+    assert [part["name"] for part in rendering.truth]
+    assert found.title
+    assert found.source
+
+
+@pytest.mark.parametrize("name", list(AIRFRAMES))
+def test_every_airframe_has_a_source_and_flies(name):
+    assert AIRFRAMES[name].source
+    built = Scene.build({"radar": RADAR, "uav": [{"name": "x", "airframe": name}]})
+    for rotor in built.uav[0].rotors:
+        assert 20 < 2 * np.pi * abs(rotor.rotation_hz) * rotor.blade_length_m < 250  # tips, m/s
+
+
+def test_the_wingbeats_of_the_catalogue_are_those_computed_from_pennycuick():
+    computed_hz = {
+        "mute_swan": 3.3, "herring_gull": 4.0, "greylag_goose": 4.4, "cormorant": 5.1, "jackdaw": 6.3, "teal": 7.9,
+        "swallow": 8.3, "starling": 9.7, "siskin": 12.0, "goldcrest": 14.0,
+    }  # fmt: skip
+    assert set(computed_hz) < set(BIRDS)
+    for name, expected in computed_hz.items():
+        size = BIRDS[name].fields
+        assert wingbeat_hz(size["mass_kg"], size["span_m"], size["area_m2"]) == pytest.approx(expected, rel=0.15)
+
+
+def test_tips_beyond_the_unambiguous_velocity_alias_and_are_warned_of():
+    slow = Scene.build(scene(radar={**RADAR, "prf_hz": 4e3}))
+    (warning,) = slow.warnings()
+    assert "unambiguous" in warning
+    assert "a PRF of" in warning
+    # the samples are those that the fast radar takes now and then
+    fast = Scene.build(scene(radar={**RADAR, "prf_hz": 24e3, "pulses": 6000}))
+    assert fast.warnings() == []
+    ours, theirs = slow.without("noise").render().iq, fast.without("noise").render().iq[::6]
+    np.testing.assert_allclose(ours, theirs, atol=1e-4)
+
+
+def test_ninety_degrees_is_right_and_warned_of():
+    flat = Scene.build(scene(uav=[uav(beta_deg=90.0, range_m=1e5)])).without("noise")
+    assert any("90 degrees" in line for line in flat.warnings())
+    np.testing.assert_allclose(abs(flat.render().iq - flat.render().iq[0]), 0, atol=1e-3)
+
+
+def test_switching_a_part_off_changes_no_other():
+    both = Scene.load("gulls_and_drone")
+    short = Scene.build({**dict(both), "radar": {**dict(both.radar), "pulses": 300}})
+    quiet = short.without("noise", "phase_noise", "converter")
+    dc = Scene.build({**dict(quiet), "uav": (), "bird": (), "clutter": ()}).render(3).iq
+    parts = [
+        quiet.without(*(name for name in ("drone", "gulls", "sea") if name != kept)).render(3).iq - dc
+        for kept in ("drone", "gulls", "sea")
+    ]
+    np.testing.assert_allclose(sum(parts) + dc, quiet.render(3).iq, atol=2e-4)
+
+
+def test_a_part_is_off_by_its_switch_as_by_its_name():
+    by_switch = Scene.build(scene(uav=[uav(on=False)])).render(5).iq
+    np.testing.assert_array_equal(by_switch, Scene.build(scene()).without("drone").render(5).iq)
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 2**63))
+def test_noise_has_unit_power_for_any_seed(seed):
+    iq = Scene.build({"radar": {**RADAR, "pulses": 20_000}}).render(seed).iq
+    # the mean of n exponentials scatters by 1 / sqrt(n); 6 sigma
+    assert np.mean(abs(iq) ** 2) == pytest.approx(1, abs=6 / np.sqrt(20_000))
+
+
+def test_the_seed_decides_the_noise_and_a_negative_one_is_refused():
+    built = Scene.build(scene())
+    np.testing.assert_array_equal(built.render(4).iq, built.render(4).iq)
+    assert abs(built.render(4).iq - built.render(5).iq).max() > 0.1
+    with pytest.raises(ValueError, match="seed is -1"):
+        built.render(-1)
+
+
+def test_levels_are_those_of_the_scene():
+    body = Scene.build(scene(uav=[{"name": "x", "body": [{"level_db": 23.0}]}])).without("noise").render().iq
+    np.testing.assert_allclose(20 * np.log10(abs(body)), 23, atol=1e-3)
+    ground = {"name": "g", "kind": "ground", "level_db": 17.0}
+    clutter = Scene.build({"radar": RADAR, "clutter": [ground]}).without("noise").render(2).iq
+    assert 10 * np.log10(np.mean(abs(clutter) ** 2)) == pytest.approx(17, abs=1e-3)
+    turned = uav(rotors=[{**ROTOR, "blades": 1, "rotation_hz": 0.0, "phase_deg": 90.0}], body=[])
+    flash = Scene.build(scene(uav=[turned])).without("noise").render().iq  # a blade at rest at a right angle
+    np.testing.assert_allclose(20 * np.log10(abs(flash)), 20, atol=1e-3)
+
+
+def test_a_bounding_bird_folds_its_wings_and_a_gliding_one_holds_them():
+    bird = {"name": "b", "species": "siskin", "wing_db": 20.0, "body_db": 0.0, "flap_s": 0.5, "rest_s": 0.5}
+    radar = {"carrier_hz": 9.85e9, "prf_hz": 2e3, "pulses": 2000}
+    for flight, amplitude in (("bound", 1.0), ("flap_glide", None)):
+        built = Scene.build({"radar": radar, "bird": [{**bird, "flight": flight}]}).without("noise")
+        iq = abs(built.render().iq)
+        assert np.ptp(iq[1100:]) < 1e-3 * iq.max()  # at rest in the second half
+        assert np.ptp(iq[:900]) > 0.1 * iq.max()
+        if amplitude:
+            np.testing.assert_allclose(iq[1100:], amplitude, atol=1e-3)
+
+
+def test_the_papers_bird_sweeps_its_line_and_flashes_as_measured():
+    found = Scene.load("paper_bird").without("noise")
+    iq = found.render().iq
+    body = Scene.build({**dict(found), "bird": [{**dict(found.bird[0]), "wing_db": -100.0}]}).render().iq
+    line_hz = np.diff(np.unwrap(np.angle(body.astype(complex)))) * found.radar.prf_hz / (2 * np.pi)
+    assert line_hz[0] == pytest.approx(-340, abs=1)
+    assert line_hz[-1] == pytest.approx(316, abs=1)
+    # the wings' flashes repeat with the wingbeat: the envelope's autocorrelation peaks at 0.302 s
+    envelope = abs(iq) - abs(iq).mean()
+    lags = np.arange(int(0.2 * 4e3), int(0.4 * 4e3))
+    correlation = [np.dot(envelope[:-lag], envelope[lag:]) / (len(envelope) - lag) for lag in lags]
+    assert lags[int(np.argmax(correlation))] / 4e3 == pytest.approx(0.302, abs=0.002)
+
+
+def test_drawing_records_needs_no_pydantic_and_scenes_are_fetched_when_asked_for():
+    code = (
+        "import sys, bladewing.simulate as s; assert 'pydantic' not in sys.modules; "
+        "s.Scene; assert 'pydantic' in sys.modules; assert not hasattr(s, 'Scenery')"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
