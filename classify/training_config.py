@@ -26,6 +26,7 @@ class TrainingConfig(BaseModel):
     iterations: Annotated[int, Field(ge=1, le=1000)] = 80
     leaves: Annotated[int, Field(ge=2, le=256)] = 15
     precision: Annotated[float, Field(gt=1 / 3, le=1)] = 0.9
+    false_alarm: Annotated[float, Field(gt=0, lt=1)] = 0.01
     models: Annotated[tuple[str, ...], Field(min_length=1)] = (
         "features-linear",
         "features-boosted",

@@ -68,12 +68,14 @@ def test_figures_against_brute_force():
     probabilities = rng.dirichlet(np.ones(3), 3000)
     probabilities[np.arange(3000), labels] += 1
     probabilities /= 2
-    figures = _figures(probabilities, labels, np.array([0.7, 0.6, 0.5]))
+    figures = _figures(probabilities, labels, np.array([0.7, 0.6, 0.5]), 0.01)
     threshold = sorted(probabilities[labels != 0, 0])[int(np.ceil(0.99 * ((labels != 0).sum() - 1)))]
     assert figures["uav_detection"] == pytest.approx(np.mean(probabilities[labels == 0, 0] > threshold), abs=1e-4)
     winner = probabilities.argmax(1)
     named = probabilities.max(1) >= np.array([0.7, 0.6, 0.5])[winner]
     assert figures["named_share"] == pytest.approx(named.mean(), abs=1e-4)
+    wrong = [p[0] >= 0.7 and p.argmax() == 0 for p in probabilities[labels != 0]]
+    assert figures["false_uav"] == pytest.approx(np.mean(wrong), abs=1e-4)
     assert figures["named_accuracy"] == pytest.approx((winner == labels)[named].mean(), abs=1e-4)
 
 
