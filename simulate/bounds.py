@@ -143,10 +143,9 @@ class UavBounds:
         straight = Fidelity(frozenset(UAV_EFFECTS) - {"blade_curvature"}, None)
         echo = np.abs(uav_echo(self.part, self.radar, self.times_s, straight)) + self.blade_curvature()
         # hubs off the line of sight move a little less than the centre does
-        reach = max([r.offset_m + r.blade_length_m for r in self.part.rotors] + [b.offset_m for b in self.part.body])
         total = sum(10 ** (r.flash_db / 20) * 2 * sum(r.amplitudes) for r in self.part.rotors)
         total += sum(10 ** (b.level_db / 20) for b in self.part.body)
-        return echo * chord(path) + total * np.minimum(2, path) * (reach / self.centre_m.min()) ** 2
+        return echo * chord(path) + total * np.minimum(2, path) * (self.part.reach_m / self.centre_m.min()) ** 2
 
     def vibration(self) -> Amplitude:
         """A body at rest in place of a shaken one."""

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from .bird import wing_size
 from .laws import LAWS
 from .receiver import FAULT_CHANCE
 
@@ -30,7 +31,7 @@ class RadarPart(Part):
 
     carrier_hz: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1e12)]
     prf_hz: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1e9)]
-    pulses: Annotated[int, Field(strict=True, ge=1, le=100_000_000)]
+    pulses: Annotated[int, Field(strict=True, ge=1, le=10_000_000)]
 
 
 class BodyPart(Part):
@@ -91,6 +92,18 @@ class TargetPart(Part):
     velocity_mps: Number = 0.0
     acceleration_mps2: Number = 0.0
 
+    @property
+    def reach_m(self) -> float:
+        """Distance of the farthest scatterer from the centre [m]."""
+        return 0.0
+
+    def nearest_m(self, dwell_s: float) -> float:
+        """Smallest range of the centre within the dwell [m]."""
+        times = [0.0, dwell_s]
+        if self.acceleration_mps2 > 0:
+            times.append(min(max(-self.velocity_mps / self.acceleration_mps2, 0.0), dwell_s))
+        return min(self.range_m + t * (self.velocity_mps + 0.5 * self.acceleration_mps2 * t) for t in times)
+
 
 class UavPart(TargetPart):
     """A UAV: body scatterers and rotors, or the name of an `airframe` of the catalogue that brings both."""
@@ -118,12 +131,12 @@ class UavPart(TargetPart):
     def _consistent(self) -> "UavPart":
         if not self.body and not self.rotors:
             raise ValueError("it has neither body nor rotors: give one of them, or an airframe of the catalogue")
-        reach = max(
-            [r.offset_m + r.blade_length_m for r in self.rotors] + [b.offset_m for b in self.body],
-        )
-        if self.range_m <= reach:
-            raise ValueError(f"range_m is {self.range_m}: it must exceed the target's own reach of {reach:.6g} m")
         return self
+
+    @property
+    def reach_m(self) -> float:
+        """Distance of the farthest scatterer from the centre [m]."""
+        return max([r.offset_m + r.blade_length_m for r in self.rotors] + [b.offset_m for b in self.body])
 
 
 class BirdPart(TargetPart):
@@ -154,6 +167,11 @@ class BirdPart(TargetPart):
     members: Annotated[int, Field(strict=True, ge=1, le=50)] = 1
     flock_velocity_mps: NotNegative = 1.0
     flock_seed: Annotated[int, Field(strict=True, ge=0)] = 0
+
+    @property
+    def reach_m(self) -> float:
+        """Half the span [m]."""
+        return float((self.span_m or wing_size(self.mass_kg)[0]) / 2)
 
     @model_validator(mode="before")
     @classmethod
