@@ -263,3 +263,14 @@ def test_a_flock_is_the_sum_of_unlike_birds_and_its_own_seed_decides_them():
     np.testing.assert_array_equal(one.render(1).iq, one.render(2).iq)
     assert abs(one.render().iq - other.render().iq).max() > 1
     assert one.render().truth[0]["members"] == 4
+
+
+def test_phases_turn_what_they_belong_to():
+    def rendered(body_deg: float, hub_deg: float) -> np.ndarray:
+        part = uav(body=[{"level_db": 10.0, "phase_deg": body_deg}], rotors=[{**ROTOR, "hub_phase_deg": hub_deg}])
+        return Scene.build({"radar": RADAR, "uav": [part], "receiver": {"noise": False}}).render().iq
+
+    plain, both = rendered(0.0, 0.0), rendered(90.0, 90.0)
+    np.testing.assert_allclose(both, 1j * plain, atol=1e-3)
+    body = np.sqrt(10) * np.exp(-4j * np.pi / Scene.load("type1").sight.wavelength_m * 1000.0)
+    np.testing.assert_allclose(rendered(90.0, 0.0) - plain, (1j - 1) * body, atol=1e-3)
