@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from .bird import wing_size
+from .insects import INSECT_LAWS
 from .laws import LAWS
 from .receiver import FAULT_CHANCE
 
@@ -189,12 +190,13 @@ class BirdPart(TargetPart):
 class ClutterPart(Part):
     """Clutter or a confuser of one kind, of mean power `level_db`.
 
-    Its parameters are drawn from the laws of the training records (`laws.LAWS`); `values` fixes any of them by name.
+    Its parameters are drawn from the laws of the training records (`laws.LAWS`), those of insects from
+    `insects.INSECT_LAWS`; `values` fixes any of them by name.
     """
 
     name: Name
     on: bool = True
-    kind: Literal["ground", "rain", "sea", "person", "vehicle", "wind_turbine"]
+    kind: Literal["ground", "rain", "sea", "person", "vehicle", "wind_turbine", "insects"]
     level_db: Level
     values: dict[str, Number] = {}
 
@@ -233,9 +235,10 @@ class ReceiverPart(Part):
 
 def _known_laws(values: dict[str, float]) -> dict[str, float]:
     """Refuse a parameter that no law knows, or a value that its law's meaning forbids."""
+    laws = LAWS | INSECT_LAWS
     for name, value in values.items():
-        if name not in LAWS:
-            raise ValueError(f"{name!r} is unknown: the parameters are {', '.join(LAWS)}")
-        if LAWS[name].kind == "log" and value <= 0:
-            raise ValueError(f"{name} is {value}: it must be above 0 [{LAWS[name].unit}]")
+        if name not in laws:
+            raise ValueError(f"{name!r} is unknown: the parameters are {', '.join(laws)}")
+        if laws[name].kind == "log" and value <= 0:
+            raise ValueError(f"{name} is {value}: it must be above 0 [{laws[name].unit}]")
     return values

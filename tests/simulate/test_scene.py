@@ -274,3 +274,28 @@ def test_phases_turn_what_they_belong_to():
     np.testing.assert_allclose(both, 1j * plain, atol=1e-3)
     body = np.sqrt(10) * np.exp(-4j * np.pi / Scene.load("type1").sight.wavelength_m * 1000.0)
     np.testing.assert_allclose(rendered(90.0, 0.0) - plain, (1j - 1) * body, atol=1e-3)
+
+
+def insects(seed: int, **values: float):
+    radar = {"carrier_hz": 9.85e9, "prf_hz": 4e3, "pulses": 4000}
+    part = {"name": "swarm", "kind": "insects", "level_db": 5.0, "values": values}
+    return Scene.build({"radar": radar, "clutter": [part], "receiver": {"noise": False}}).render(seed)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_insects_drift_with_the_wind_and_have_the_level_of_the_scene(seed):
+    found = insects(seed, insect_velocity_mps=3.0, insect_spread_mps=0.3, insect_count=12.0)
+    assert 10 * np.log10(np.mean(abs(found.iq) ** 2)) == pytest.approx(5, abs=1e-3)
+    velocity = -np.fft.fftfreq(4000, 1 / 4e3) * found.radar.wavelength_m / 2
+    power = power_spectrum(found.iq)
+    # 4.5 sigma of own flight and the side line of a wingbeat of at most 275 Hz
+    assert power[abs(velocity - 3) > 4.5 * 0.3 + 275 * found.radar.wavelength_m / 2].sum() < 1e-6 * power.sum()
+    assert found.truth[0]["members"] == 12
+
+
+def test_an_insects_echo_swells_at_its_wingbeat():
+    found = insects(3, insect_count=1.0, insect_wingbeat_hz=100.0, insect_depth=0.4)
+    swell = abs(found.iq) / abs(found.iq).mean()
+    assert swell.max() == pytest.approx(1.4, abs=0.02)
+    lines = abs(np.fft.rfft(swell - swell.mean()))
+    assert 89 < lines.argmax() < 111  # a second: bins are Hz
