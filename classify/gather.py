@@ -1,10 +1,12 @@
 """Synthetic records to model inputs: streamed, several processes at a time, nothing kept of the samples themselves."""
 
 import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context
+from functools import partial
+from multiprocessing import get_context, parent_process
 
 import numpy as np
 from bladewing.features import INPUT_SHAPES, model_inputs
@@ -95,7 +97,8 @@ def _finished(tasks: list[Task], workers: int) -> Iterator[Gathered]:
         yield from map(_gather_task, tasks)
         return
     # spawn, not fork: a fork of a process with threads (torch, onnxruntime) may hang
-    with ProcessPoolExecutor(min(workers, len(tasks)), mp_context=get_context("spawn")) as pool:
+    pool_of = partial(ProcessPoolExecutor, mp_context=get_context("spawn"), initializer=_end_with_parent)
+    with pool_of(min(workers, len(tasks))) as pool:
         waiting: list[Future[Gathered]] = []
         try:
             for task in tasks:
@@ -107,6 +110,18 @@ def _finished(tasks: list[Task], workers: int) -> Iterator[Gathered]:
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def _end_with_parent() -> None:
+    """Watch the parent: a worker whose parent was killed would wait for work for ever."""
+    parent = parent_process()
+    if parent is not None:
+
+        def watch() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=watch, daemon=True).start()
 
 
 def _gather_task(task: Task) -> Gathered:

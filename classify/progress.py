@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import TracebackType
@@ -10,9 +11,13 @@ from rich.console import Console
 from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.progress import Progress as Bars
 
+_LINE_EVERY_S = 30.0
+
 
 class Progress:
     """Bars for the phases of a run, one below the other; use in a ``with``.
+
+    Where stderr is no terminal (a log, a pipe), a line every half minute takes the place of the bars.
 
     Parameters
     ----------
@@ -22,8 +27,11 @@ class Progress:
 
     def __init__(self, *, visible: bool) -> None:
         columns = (TextColumn("{task.description:<24}"), BarColumn(), TaskProgressColumn())
+        console = Console(stderr=True)
+        self._visible, self._drawn = visible, visible and console.is_terminal
+        self._console = console
         self._bars = Bars(
-            *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=Console(stderr=True), disable=not visible
+            *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, disable=not self._drawn
         )
 
     def __enter__(self) -> Progress:
@@ -37,12 +45,25 @@ class Progress:
 
     def say(self, text: str) -> None:
         """Write a line below the bars."""
-        if not self._bars.disable:
-            self._bars.console.print(text, markup=False, highlight=False, soft_wrap=True)
+        if self._visible:
+            self._console.print(text, markup=False, highlight=False, soft_wrap=True)
 
     @contextmanager
     def phase(self, title: str, total: float) -> Iterator[Callable[[float], None]]:
         """Show a bar, and give the function to call with how much of the total is done."""
         task = self._bars.add_task(title, total=total)
-        yield lambda done: self._bars.update(task, completed=done)
+        started = said = time.monotonic()
+
+        def on_done(done: float) -> None:
+            nonlocal said
+            self._bars.update(task, completed=done)
+            now = time.monotonic()
+            if not self._drawn and now - said >= _LINE_EVERY_S and done > 0:
+                said = now
+                to_go_s = (now - started) * (total / done - 1)
+                self.say(f"{title}: {done / total:.0%}, {to_go_s:.0f} s to go")
+
+        yield on_done
         self._bars.update(task, completed=total)
+        if not self._drawn:
+            self.say(f"{title}: done in {time.monotonic() - started:.0f} s")

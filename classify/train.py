@@ -1,6 +1,7 @@
 """Training: synthetic records in, calibrated ONNX models and the account of the run out."""
 
 import json
+import os
 import platform
 import time
 from collections.abc import Callable
@@ -76,6 +77,8 @@ def run_training(
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BadInput(f"{out}: cannot be made a folder: {error.strerror}: give another --out") from None
+    # Threads that spin while they wait make training several times slower beside another busy process.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     started = time.perf_counter()
     with Progress(visible=progress) as bars:
         sets = _gather(settings, bars)

@@ -1,7 +1,7 @@
 """The velocity axis that all radars share: fine where birds and bodies are, coarse where blade tips are."""
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,16 +57,48 @@ class Pooling:
 
     def mean_db(self, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
         """Mean level of each axis bin [dB], shape (..., bins)."""
-        total = np.add.reduceat(relative_power[..., : self.stop], self.starts, axis=-1)
-        return self._place(to_db((total / self.counts).astype(np.float32, copy=False)))
+        total = self._pooled(np.add, relative_power)
+        total /= self.counts
+        return self._place(to_db(total))
 
     def peak_db(self, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
         """Largest level of each axis bin over that of noise in as many bins [dB], shape (..., bins)."""
+        peak = self._pooled(np.maximum, relative_power)
+        peak /= self._expected_peak
+        return self._place(to_db(peak))
+
+    @cached_property
+    def _expected_peak(self) -> NDArray[np.float32]:
+        """Mean of the largest of so many exponentials."""
         independent = np.maximum(self.counts / np.float32(NOISE_BANDWIDTH_BINS), 1)
-        # of the largest of so many exponentials
-        expected = np.maximum(np.log(independent) + np.euler_gamma, 1).astype(np.float32)
-        peak = np.maximum.reduceat(relative_power[..., : self.stop], self.starts, axis=-1)
-        return self._place(to_db((peak / expected).astype(np.float32, copy=False)))
+        return np.maximum(np.log(independent) + np.euler_gamma, 1).astype(np.float32)
+
+    @cached_property
+    def _single(self) -> slice:
+        """The longest run of axis bins about the middle that hold one spectrum bin each."""
+        single = self.counts == 1
+        single[-1] &= self.starts[-1] + 1 == self.stop
+        middle = len(single) // 2
+        below, above = np.flatnonzero(~single[:middle]), np.flatnonzero(~single[middle:])
+        first = int(below[-1]) + 1 if len(below) else 0
+        return slice(first, max(first, middle + int(above[0]) if len(above) else len(single)))
+
+    def _pooled(self, operation: np.ufunc, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Sum or largest of the spectrum bins of each seen axis bin, in rising frequency."""
+        single, starts = self._single, self.starts
+        out = np.empty((*relative_power.shape[:-1], len(starts)), np.float32)
+        # most bins of the axis hold a single one of a coarse spectrum: no need to reduce those
+        np.take(relative_power, starts[single], axis=-1, out=out[..., single], mode="clip")
+        if single.start > 0:
+            stop = starts[single.start] if single.start < len(starts) else self.stop
+            operation.reduceat(
+                relative_power[..., :stop], starts[: single.start], axis=-1, out=out[..., : single.start]
+            )
+        if single.stop < len(starts):
+            operation.reduceat(
+                relative_power[..., : self.stop], starts[single.stop :], axis=-1, out=out[..., single.stop :]
+            )
+        return out
 
     def _place(self, levels_db: NDArray[np.float32]) -> NDArray[np.float32]:
         """Lay the seen bins into the whole axis; frequency rises where velocity falls."""

@@ -15,7 +15,7 @@ def noise_threshold_db(bins: int, false_alarm: float = 1e-2) -> float:
 
 
 def threshold_band_hz(
-    spectrum: Spectrum, threshold_db: float | None = None
+    spectrum: Spectrum, threshold_db: float | None = None, mask: NDArray[np.bool_] | None = None
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Lowest and highest frequency over a threshold: the paper's bandwidth rule.
 
@@ -26,6 +26,8 @@ def threshold_band_hz(
     threshold_db : float, optional
         Threshold over the noise floor [dB]; the paper takes 30 (simulated) and 20 (measured) over the mean amplitude at
         8-10 kHz. By default the level that noise alone exceeds in 1 % of the spectra.
+    mask : ndarray of bool, shape (..., bins), optional
+        True where the spectrum counts, as from `notch_mask`; by default everywhere.
 
     Returns
     -------
@@ -35,6 +37,8 @@ def threshold_band_hz(
     if threshold_db is None:
         threshold_db = noise_threshold_db(spectrum.bins)
     over = spectrum.relative_power > np.float32(10 ** (threshold_db / 10))
+    if mask is not None:
+        over &= mask
     any_over = over.any(axis=-1)
     frequency = spectrum.frequency_hz
     low = frequency[over.argmax(axis=-1)]
@@ -67,15 +71,15 @@ def energy_band_mps(
     """
     total = np.cumsum(energy, axis=-1, dtype=np.float64)
     sums = total[..., -1:]
-    first = (total < TAIL_SHARE * sums).sum(axis=-1)
-    last = np.minimum((total < (1 - TAIL_SHARE) * sums).sum(axis=-1), spectrum.bins - 1)
+    before, within = total < TAIL_SHARE * sums, total < (1 - TAIL_SHARE) * sums
+    first = np.count_nonzero(before, axis=-1)
+    last = np.minimum(np.count_nonzero(within, axis=-1), spectrum.bins - 1)
     velocity = spectrum.velocity_mps
     some = sums[..., 0] > 0
     zero = np.float32(0)
-    held = np.cumsum(energy > 0, axis=-1)
-    inside = np.take_along_axis(held, last[..., None], -1)[..., 0] - np.take_along_axis(
-        held, np.maximum(first - 1, 0)[..., None], -1
-    )[..., 0] * (first > 0)
+    within &= ~before
+    within &= energy > 0
+    inside = np.count_nonzero(within, axis=-1) + 1  # the last bin of the band holds energy, but is not before its end
     return (
         np.where(some, velocity[last], zero).astype(np.float32),
         np.where(some, velocity[np.minimum(first, spectrum.bins - 1)], zero).astype(np.float32),

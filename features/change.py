@@ -1,6 +1,7 @@
 """How the spectrum changes within the dwell: short spectra of its parts, in units of the whole dwell's floor."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,18 +46,24 @@ def frames(iq: NDArray[np.complex64], length: int, count: int) -> NDArray[np.com
     count : int
         Frames, at least 2. Where the record is too short for a hop of one sample, the last frame repeats.
     """
-    pulses = iq.shape[-1]
+    starts, hop = _frame_starts(iq.shape[-1], length, count)
+    if hop:
+        shape, strides = (*iq.shape[:-1], count, length), (*iq.strides[:-1], hop * iq.strides[-1], iq.strides[-1])
+        return np.lib.stride_tricks.as_strided(iq, shape, strides, writeable=False)
+    return np.lib.stride_tricks.sliding_window_view(iq, length, axis=-1)[..., starts, :]
+
+
+@lru_cache(maxsize=64)
+def _frame_starts(pulses: int, length: int, count: int) -> tuple[NDArray[np.intp], int]:
+    """First sample of each frame, and the hop between them if it is the same for all, else 0."""
     starts = np.rint(np.linspace(0, pulses - length, count)).astype(np.intp)
-    hops = np.diff(starts)
-    windows = np.lib.stride_tricks.sliding_window_view(iq, length, axis=-1)
-    if len(set(hops.tolist())) == 1 and hops[0] > 0:
-        return windows[..., :: hops[0], :][..., :count, :]
-    return windows[..., starts, :]
+    hops = set(np.diff(starts).tolist())
+    return starts, hops.pop() if len(hops) == 1 else 0
 
 
 def frame_power(iq: NDArray[np.complex64], spectrum: Spectrum, length: int, count: int) -> NDArray[np.float32]:
     """Power spectra of frames in units of the dwell's noise floor, shape (..., count, bins)."""
-    parts = frames(iq, length, count) * spectrum.scale[..., None, :]
+    parts = frames(iq * spectrum.scale, length, count)
     floor = (spectrum.floor * spectrum.scale[..., 0].astype(np.float64) ** 2).astype(np.float32)
     power = centred_power(parts)
     return (power / np.where(floor > 0, floor, 1)[..., None, None]).astype(np.float32, copy=False)
@@ -85,16 +92,17 @@ def parts_of(iq: NDArray[np.complex64], spectrum: Spectrum, axis_bins: int) -> P
 
 def change_db(parts: Parts) -> NDArray[np.float32]:
     """Standard deviation of the level over the parts, on the shared axis [dB], shape (..., axis bins)."""
-    mean = parts.axis_db.mean(axis=-2)
-    square = np.mean(parts.axis_db * parts.axis_db, axis=-2)
-    return np.sqrt(np.maximum(square - mean * mean, 0)).astype(np.float32)
+    count = np.float32(PARTS)
+    mean = np.add.reduce(parts.axis_db, axis=-2) / count
+    square = np.add.reduce(parts.axis_db * parts.axis_db, axis=-2) / count
+    return np.sqrt(np.maximum(square - mean * mean, np.float32(0)))
 
 
 def centroid_mps(parts: Parts, axis_mps: NDArray[np.float64]) -> NDArray[np.float32]:
     """Centroid of the level over the velocity in each part [m/s], shape (..., PARTS); 0 where nothing is seen."""
-    weight = np.maximum(parts.axis_db - 6, 0)
-    total = weight.sum(axis=-1)
-    sums = (weight * axis_mps.astype(np.float32)).sum(axis=-1)
+    weight = np.maximum(parts.axis_db - np.float32(6), np.float32(0))
+    total = np.add.reduce(weight, axis=-1)
+    sums = weight @ axis_mps.astype(np.float32)
     return np.where(total > 0, sums / np.where(total > 0, total, 1), np.float32(0))
 
 

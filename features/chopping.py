@@ -23,6 +23,10 @@ FUNDAMENTAL_SHARE, FUNDAMENTAL_STRENGTH = 0.35, 3.5
 CLIP_DB = 30.0
 
 
+_NEIGHBOURS = np.array([[-1], [0], [1]])
+_MULTIPLES = np.array([[2], [3]])
+
+
 @dataclass(frozen=True)
 class Chopping:
     """Cepstral estimate of the chopping frequency.
@@ -81,13 +85,17 @@ def cepstrum(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.float32]
     ndarray of float32
         Any scale, the same for all periods.
     """
-    level = np.clip(spectrum.level_db, 0, np.float32(CLIP_DB))
-    count = np.maximum(mask.sum(axis=-1, keepdims=True), 1)
-    mean = np.where(mask, level, np.float32(0)).sum(axis=-1, keepdims=True) / count
-    ripple = np.where(mask, level - mean.astype(np.float32), np.float32(0))
-    transform = fft.rfft(ripple, axis=-1)
-    magnitude = np.sqrt(transform.real**2 + transform.imag**2)
-    return magnitude / noise_shape(spectrum.pulses, spectrum.bins)
+    level = np.maximum(spectrum.level_db, np.float32(0))
+    np.minimum(level, np.float32(CLIP_DB), out=level)
+    kept = mask.astype(np.float32)
+    level *= kept
+    count = np.maximum(np.count_nonzero(mask, axis=-1, keepdims=True), 1)
+    mean = np.add.reduce(level, axis=-1, keepdims=True) / count
+    kept *= mean.astype(np.float32)
+    level -= kept
+    magnitude = np.abs(fft.rfft(level, axis=-1))
+    magnitude /= noise_shape(spectrum.pulses, spectrum.bins)
+    return magnitude
 
 
 def prominence(heights: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -105,17 +113,28 @@ def prominence(heights: NDArray[np.float32]) -> NDArray[np.float32]:
         noise keeps its level; 0 at periods too short to have surroundings.
     """
     count = heights.shape[-1]
+    edges, widths = _surroundings(count)
+    total = np.zeros((*heights.shape[:-1], count + 1))
+    np.cumsum(heights, axis=-1, dtype=np.float64, out=total[..., 1:])
+    at = np.take(total, edges, axis=-1)
+    means = at[..., 1, :, :] - at[..., 0, :, :]
+    means /= widths
+    around = np.maximum(means[..., 0, :], means[..., 1, :])
+    out = heights - around.astype(np.float32)
+    out += np.add.reduce(heights, axis=-1, keepdims=True) / np.float32(count)
+    np.maximum(out, np.float32(0), out=out)
+    out[..., :2] = 0
+    return out
+
+
+@lru_cache(maxsize=64)
+def _surroundings(count: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """First and last of the periods below and above each, shape (2, 2, count), and how many they are, (2, count)."""
     period = np.arange(count)
-    total = np.concatenate([np.zeros((*heights.shape[:-1], 1)), np.cumsum(heights, axis=-1, dtype=np.float64)], axis=-1)
-
-    def mean_over(low: float, high: float) -> NDArray[np.float64]:
-        start = np.minimum((low * period).astype(np.intp), count - 1)
-        stop = np.minimum(np.maximum((high * period).astype(np.intp), start + 1), count)
-        return (total[..., stop] - total[..., start]) / (stop - start)
-
-    around = np.maximum(mean_over(0.6, 0.85), mean_over(1.15, 1.4))
-    out = heights - around + heights.mean(axis=-1, keepdims=True)
-    return np.where(period >= 2, np.maximum(out, 0), 0).astype(np.float32)
+    low, high = (np.array(shares)[:, None] for shares in ((0.6, 1.15), (0.85, 1.4)))
+    start = np.minimum((low * period).astype(np.intp), count - 1)
+    stop = np.minimum(np.maximum((high * period).astype(np.intp), start + 1), count)
+    return np.stack([start, stop]), (stop - start).astype(np.float64)
 
 
 def cepstral_chopping(spectrum: Spectrum, mask: NDArray[np.bool_]) -> Chopping:
@@ -145,22 +164,22 @@ def cepstral_chopping(spectrum: Spectrum, mask: NDArray[np.bool_]) -> Chopping:
     rows = np.arange(len(flat))
     window = flat[:, first : last + 1]
     # the median of Rayleigh heights is 0.83 of their rms; a comb's own peaks do not move it
-    rms = np.median(heights.reshape(flat.shape)[:, first : last + 1], axis=-1) / np.float32(0.8326)
-    peak = window.max(axis=-1)
-    top = first + window.argmax(axis=-1)
+    rms = _median(heights.reshape(flat.shape)[:, first : last + 1]) / np.float32(0.8326)
+    highest = window.argmax(axis=-1)
+    top, peak = first + highest, window[rows, highest]
     least = np.maximum(FUNDAMENTAL_SHARE * peak, FUNDAMENTAL_STRENGTH * rms)
     best = top.copy()
     for divisor in (2, 3, 4):  # the smallest strong one wins, so later divisors overrule
         near = np.rint(top / divisor).astype(np.intp)
-        around = np.stack([flat[rows, np.clip(near + shift, 0, flat.shape[1] - 1)] for shift in (-1, 0, 1)])
+        around = flat[rows, np.clip(near + _NEIGHBOURS, 0, flat.shape[1] - 1)]
         ok = (near >= first) & (around.max(axis=0) >= least)
         best = np.where(ok, near - 1 + around.argmax(axis=0), best)
     best = np.clip(best, 1, flat.shape[1] - 2)
-    left, middle, right = (flat[rows, best + shift] for shift in (-1, 0, 1))
+    left, middle, right = flat[rows, best + _NEIGHBOURS]
     curve = 2 * middle - left - right
     offset = np.where(curve > 0, (right - left) / np.where(curve > 0, 2 * curve, 1), 0)
     period = best + np.clip(offset, -0.5, 0.5)
-    again = [flat[rows, np.minimum(np.rint(n * period).astype(np.intp), flat.shape[1] - 1)] for n in (2, 3)]
+    again = flat[rows, np.minimum(np.rint(_MULTIPLES * period).astype(np.intp), flat.shape[1] - 1)]
     strength = middle / np.where(rms > 0, rms, 1)
     repeats = (again[0] + again[1]) / 2 / np.where(middle > 0, middle, 1)
     frequency = (spectrum.prf_hz / period).astype(np.float32)
@@ -168,3 +187,11 @@ def cepstral_chopping(spectrum: Spectrum, mask: NDArray[np.bool_]) -> Chopping:
     return Chopping(
         frequency.reshape(shape), strength.astype(np.float32).reshape(shape), repeats.astype(np.float32).reshape(shape)
     )
+
+
+def _median(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Median along the last axis, without NumPy's care for NaN."""
+    count = values.shape[-1]
+    low, high = (count - 1) // 2, count // 2
+    ordered = np.partition(values, (low, high) if low < high else low, axis=-1)
+    return (ordered[..., low] + ordered[..., high]) / np.float32(2)

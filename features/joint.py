@@ -72,8 +72,8 @@ def joint_vector(image: NDArray[np.float32], spectrum: Spectrum) -> NDArray[np.f
     fast = power[..., np.abs(axis_mps) > FLASH_MPS, :].sum(axis=-2)
     flash_hz, flash_strength, kurtosis = _flashes(fast, spectrum)
 
-    columns: dict[str, NDArray] = {
-        **{name: np.asarray(value) for name, value in radar_columns(spectrum).items()},
+    columns: dict[str, NDArray | float] = {
+        **radar_columns(spectrum),
         "joint_bandwidth_mps": width.mean(axis=-1),
         "joint_bandwidth_swing_mps": width.std(axis=-1),
         "joint_centroid_swing_mps": centroid.std(axis=-1),

@@ -1,6 +1,7 @@
 """The body line, and what is left outside a notch about it and about velocity zero."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,12 +50,11 @@ def body_line(spectrum: Spectrum) -> Body:
     -------
     Body
     """
-    level = spectrum.level_db
     index = spectrum.relative_power.argmax(axis=-1)
     bins = spectrum.bins
-    left, middle, right = (
-        np.take_along_axis(level, ((index + shift) % bins)[..., None], axis=-1)[..., 0] for shift in (-1, 0, 1)
-    )
+    first = np.arange(index.size).reshape(index.shape) * bins  # of each spectrum, one behind the other
+    level = spectrum.level_db.reshape(-1)
+    left, middle, right = (level[first + (index + shift) % bins] for shift in (-1, 0, 1))
     curve = 2 * middle - left - right
     offset = np.where(curve > 0, (right - left) / np.where(curve > 0, 2 * curve, 1), 0)
     step = spectrum.prf_hz / bins * spectrum.wavelength_m / 2
@@ -84,10 +84,17 @@ def notch_mask(spectrum: Spectrum, body: Body, notch_mps: float = NOTCH_MPS) -> 
     step = spectrum.prf_hz / bins * spectrum.wavelength_m / 2
     # At least the main lobe, at most a third of the span: a slow radar must keep something to look at.
     half = min(max(LOBE_BINS, int(np.ceil(notch_mps / step))), max(1, bins // 6))
-    position = np.arange(bins)
-    keep = np.abs(position - bins // 2) > half
-    away = np.abs(position - body.index[..., None])
-    return keep & (np.minimum(away, bins - away) > half)
+    keep, away = _notches(bins, half)
+    return away[bins - body.index] & keep
+
+
+@lru_cache(maxsize=64)
+def _notches(bins: int, half: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Mask about the middle bin, and the mask about bin i in row bins - i."""
+    position = np.arange(2 * bins)
+    distance = position % bins
+    far = np.minimum(distance, bins - distance) > half
+    return np.abs(position[:bins] - bins // 2) > half, np.lib.stride_tricks.sliding_window_view(far, bins)
 
 
 def residual(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -110,6 +117,6 @@ def notch_residual_db(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np
     ndarray of float32, shape (...)
         0 dB for noise alone; micro-Doppler lifts it.
     """
-    kept = np.maximum(mask.sum(axis=-1), 1)
-    mean = np.where(mask, spectrum.relative_power, np.float32(0)).sum(axis=-1) / kept
+    kept = np.maximum(np.count_nonzero(mask, axis=-1), 1)
+    mean = np.vecdot(spectrum.relative_power, mask.astype(np.float32)) / kept
     return (10 * np.log10(np.maximum(mean, 1e-2))).astype(np.float32)

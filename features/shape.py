@@ -1,7 +1,5 @@
 """Plain numbers about the shape of a spectrum: level by velocity, entropy, peakedness, symmetry."""
 
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,9 +30,10 @@ def band_levels_db(
         [dB over the floor]; a band wholly outside the unambiguous span holds the axis's own mark for "unseen".
     """
     edges = np.searchsorted(axis_mps, SPEED_BANDS_MPS)
-    bands = [slice(a, b) for a, b in pairwise(edges)]
-    one = np.stack([axis_db[..., band].mean(axis=-1) for band in bands], axis=-1)
-    other = np.stack([axis_db[..., ::-1][..., band].mean(axis=-1) for band in bands], axis=-1)
+    widths = np.diff(edges).astype(np.float32)
+    one, other = (
+        np.add.reduceat(side[..., : edges[-1]], edges[:-1], axis=-1) / widths for side in (axis_db, axis_db[..., ::-1])
+    )
     return np.maximum(one, other), np.minimum(one, other)
 
 
@@ -48,21 +47,28 @@ def entropy(energy: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def ripple_db(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Standard deviation of the level outside the notches [dB]: 5.6 for noise, more for lines, shape (...)."""
-    count = np.maximum(mask.sum(axis=-1), 1)
-    level = np.where(mask, spectrum.level_db, np.float32(0))
-    mean = level.sum(axis=-1) / count
-    square = (level * level).sum(axis=-1) / count
+    count = np.maximum(np.count_nonzero(mask, axis=-1), 1)
+    level = spectrum.level_db * mask.astype(np.float32)
+    mean = np.add.reduce(level, axis=-1) / count
+    square = np.vecdot(level, level) / count
     return np.sqrt(np.maximum(square - mean**2, 0)).astype(np.float32)
 
 
 def symmetry(spectrum: Spectrum, energy: NDArray[np.float32], body: Body) -> NDArray[np.float32]:
     """Correlation of the two sides about the body line, -1..1, shape (...): rotors spread to both sides alike."""
     bins = spectrum.bins
-    reach = np.arange(1, bins // 2)
-    root = np.sqrt(np.sqrt(energy))
-    right = np.take_along_axis(root, (body.index[..., None] + reach) % bins, axis=-1)
-    left = np.take_along_axis(root, (body.index[..., None] - reach) % bins, axis=-1)
-    right = right - right.mean(axis=-1, keepdims=True)
-    left = left - left.mean(axis=-1, keepdims=True)
-    norm = np.sqrt((right**2).sum(axis=-1) * (left**2).sum(axis=-1))
-    return np.where(norm > 0, (right * left).sum(axis=-1) / np.where(norm > 0, norm, 1), 0).astype(np.float32)
+    reach = bins // 2 - 1
+    twice = np.empty((body.index.size, 2 * bins), np.float32)  # the circle, cut open anywhere
+    root = np.sqrt(energy.reshape(-1, bins), out=twice[:, :bins])
+    np.sqrt(root, out=root)
+    twice[:, bins:] = root
+    windows = np.lib.stride_tricks.as_strided(
+        twice, (len(twice), 2 * bins - reach, reach), (twice.strides[0], *2 * twice.strides[1:]), writeable=False
+    )
+    rows, index = np.arange(len(twice)), body.index.reshape(-1)
+    right, left = windows[rows, index + 1], windows[rows, index + bins - reach][:, ::-1]
+    right -= np.add.reduce(right, axis=-1, keepdims=True) / np.float32(reach)
+    left -= np.add.reduce(left, axis=-1, keepdims=True) / np.float32(reach)
+    norm = np.sqrt(np.vecdot(right, right) * np.vecdot(left, left))
+    product = np.vecdot(right, left) / np.where(norm > 0, norm, np.float32(1))
+    return np.where(norm > 0, product, np.float32(0)).reshape(body.index.shape)

@@ -42,16 +42,20 @@ def smearing_index(
     spacing = chopping.frequency_hz[..., None]
     usable = np.isfinite(spacing)
     centre = -2 * body.velocity_mps[..., None] / np.float32(spectrum.wavelength_m)
-    frequency = spectrum.frequency_hz.astype(np.float32)
-    order = (frequency - centre) / np.where(usable, spacing, 1)
+    order = spectrum.frequency_hz.astype(np.float32) - centre
+    order /= np.where(usable, spacing, np.float32(1))
     nearest = np.rint(order)
     # Roots of the energy: one strong low line must not outvote the many weak high ones.
-    weight = np.sqrt(energy) * (np.abs(nearest) <= MAX_ORDER) * (nearest != 0)
-    x, y = nearest**2, (order - nearest) ** 2
-    total = weight.sum(axis=-1)
+    order -= nearest
+    x, y = np.square(nearest, out=nearest), np.square(order, out=order)
+    weight = np.sqrt(energy)
+    weight *= x <= MAX_ORDER**2
+    weight *= x > 0
+    total = np.add.reduce(weight, axis=-1)
     safe = np.where(total > 0, total, 1)
-    mean_x, mean_y = (weight * x).sum(axis=-1) / safe, (weight * y).sum(axis=-1) / safe
-    mean_xx, mean_xy = (weight * x * x).sum(axis=-1) / safe, (weight * x * y).sum(axis=-1) / safe
+    mean_x, mean_y = np.vecdot(weight, x) / safe, np.vecdot(weight, y) / safe
+    weight *= x
+    mean_xx, mean_xy = np.vecdot(weight, x) / safe, np.vecdot(weight, y) / safe
     variance = mean_xx - mean_x**2
     slope = (mean_xy - mean_x * mean_y) / np.where(variance > 1e-3, variance, np.inf)
     index = np.sqrt(np.clip(slope, 0, FULLY_SMEARED**2))

@@ -63,8 +63,8 @@ class Spectrum:
 
     @property
     def frequency_hz(self) -> NDArray[np.float64]:
-        """Doppler frequency of each bin [Hz], rising, shape (bins,)."""
-        return fft.fftshift(fft.fftfreq(self.bins, 1 / self.prf_hz))
+        """Doppler frequency of each bin [Hz], rising, shape (bins,), not to be written to."""
+        return _frequencies_hz(self.bins, self.prf_hz)
 
     @property
     def velocity_mps(self) -> NDArray[np.float64]:
@@ -80,6 +80,14 @@ class Spectrum:
 def to_db(relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
     """10 log10 of a power ratio [dB], held at `LOWEST_DB` from below."""
     return np.float32(10 / np.log(10)) * np.log(np.maximum(relative_power, np.float32(10 ** (LOWEST_DB / 10))))
+
+
+@lru_cache(maxsize=64)
+def _frequencies_hz(bins: int, prf_hz: float) -> NDArray[np.float64]:
+    """Centred frequencies of a transform [Hz], shape (bins,)."""
+    frequencies = fft.fftshift(fft.fftfreq(bins, 1 / prf_hz))
+    frequencies.flags.writeable = False
+    return frequencies
 
 
 @lru_cache(maxsize=64)
@@ -148,12 +156,14 @@ def noise_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
         return power.mean(axis=-1)
     size = max(1, half // _FLOOR_BLOCKS)
     blocks = half // size
-    shape = (*power.shape[:-1], blocks, size)
-    sides = []
-    for side in (power[..., : blocks * size], power[..., -blocks * size :]):
-        means = side.reshape(shape).mean(axis=-1) if size > 1 else side
-        rank = round(_FLOOR_QUANTILE * (blocks - 1))
-        sides.append(np.partition(means, rank, axis=-1)[..., rank])
+    means = np.empty((*power.shape[:-1], 2, blocks), power.dtype)
+    for number, side in enumerate((power[..., : blocks * size], power[..., -blocks * size :])):
+        shaped = side.reshape(*power.shape[:-1], blocks, size)
+        np.add.reduce(shaped, axis=-1, out=means[..., number, :])
+    means /= size
+    rank = round(_FLOOR_QUANTILE * (blocks - 1))
+    means.partition(rank, axis=-1)
+    sides = means[..., 0, rank], means[..., 1, rank]
     least, most = np.minimum(*sides), np.maximum(*sides)
     level = np.where(most > _EMPTY_RATIO * least, most, (least + most) / 2)
     # Wilson and Hilferty's normal approximation to the quantile of a gamma of that many degrees of freedom

@@ -1,16 +1,18 @@
 """The feature vector: every measurement of the spectrum, in the order of the schema."""
 
+import math
+from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .axis import axis_velocities_mps
 from .bandwidth import energy_band_mps, noise_threshold_db, threshold_band_hz
 from .change import Parts, busy_db, centroid_mps, change_db
 from .chopping import cepstral_chopping
 from .notch import body_line, notch_mask, notch_residual_db, residual
-from .schema import FEATURES, Feature
+from .schema import FEATURES, FeatureTable
 from .shape import band_levels_db, entropy, ripple_db, symmetry
 from .smearing import smearing_index
 from .spectrum import Spectrum
@@ -19,25 +21,41 @@ from .spectrum import Spectrum
 SIGNIFICANT_DB = 6.0
 
 
+#: Names of the bands' levels on the stronger and on the weaker side.
+_BANDS = tuple([f.name for f in FEATURES if f.name.startswith(stem)] for stem in ("strong_", "weak_"))
+
+#: Speeds that part the change over the dwell into slow, middle and fast [m/s].
+_CHANGE_MPS = (3.0, 20.0)
+
+
+@lru_cache(maxsize=4)
+def _axis_plan(bins: int) -> tuple[NDArray[np.float64], NDArray[np.intp], tuple[int, int, int]]:
+    """The shared axis [m/s], where its fast, middle, slow, middle and fast parts begin, and how many bins each has."""
+    axis_mps = axis_velocities_mps(bins)
+    edges = np.searchsorted(axis_mps, [-_CHANGE_MPS[1], -_CHANGE_MPS[0], _CHANGE_MPS[0], _CHANGE_MPS[1]])
+    fast, middle, slow, *others = np.diff(edges, prepend=0, append=bins)
+    return axis_mps, np.append(0, edges), (int(slow), int(middle + others[0]), int(fast + others[1]))
+
+
 def radar_columns(spectrum: Spectrum) -> dict[str, float]:
     """What the radar allows to be seen, as logarithms."""
     dwell = spectrum.pulses / spectrum.prf_hz
     return {
-        "velocity_step_log": np.log10(spectrum.wavelength_m / (2 * dwell)),
-        "unambiguous_log": np.log10(spectrum.wavelength_m * spectrum.prf_hz / 4),
-        "dwell_log": np.log10(dwell),
-        "pulses_log": np.log10(spectrum.pulses),
+        "velocity_step_log": math.log10(spectrum.wavelength_m / (2 * dwell)),
+        "unambiguous_log": math.log10(spectrum.wavelength_m * spectrum.prf_hz / 4),
+        "dwell_log": math.log10(dwell),
+        "pulses_log": math.log10(spectrum.pulses),
     }
 
 
-def lay_out(columns: dict[str, NDArray], table: tuple[Feature, ...], shape: tuple[int, ...]) -> NDArray[np.float32]:
+def lay_out(columns: Mapping[str, ArrayLike], table: FeatureTable, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """Put named columns in a table's order, each held in its range and NaN (no value) set to 0, clipped to the range.
 
     Parameters
     ----------
     columns : dict of str to ndarray
         One entry a feature, broadcastable to `shape`.
-    table : tuple of Feature
+    table : FeatureTable
         Order and ranges.
     shape : tuple of int
         Leading shape.
@@ -46,18 +64,14 @@ def lay_out(columns: dict[str, NDArray], table: tuple[Feature, ...], shape: tupl
     -------
     ndarray of float32, shape (*shape, len(table))
     """
-    out = np.empty((*shape, len(table)), np.float32)
+    rows = np.empty((len(table), *shape), np.float32)
     for number, feature in enumerate(table):
-        out[..., number] = columns[feature.name]
-    low, high = _ranges(table)
+        rows[number] = columns[feature.name]
+    out = np.ascontiguousarray(np.moveaxis(rows, 0, -1))
     # fmax and fmin would take a bound for NaN; "no value" is 0
-    return np.clip(np.where(np.isnan(out), np.float32(0), out), low, high)
-
-
-@lru_cache(maxsize=4)
-def _ranges(table: tuple[Feature, ...]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Lower and upper bounds of a table's features."""
-    return np.array([f.low for f in table], np.float32), np.array([f.high for f in table], np.float32)
+    out[np.isnan(out)] = 0
+    np.maximum(out, table.low, out=out)
+    return np.minimum(out, table.high, out=out)
 
 
 def feature_vector(
@@ -88,33 +102,28 @@ def feature_vector(
     chopping = cepstral_chopping(spectrum, mask)
     residual_db = notch_residual_db(spectrum, mask)
 
-    outside = Spectrum(
-        np.where(mask, spectrum.relative_power, np.float32(0)),
-        spectrum.floor,
-        spectrum.carrier_hz,
-        spectrum.prf_hz,
-        spectrum.pulses,
-        spectrum.scale,
-    )
-    low_hz, high_hz = threshold_band_hz(outside, noise_threshold_db(spectrum.bins))
+    low_hz, high_hz = threshold_band_hz(spectrum, noise_threshold_db(spectrum.bins), mask)
     width_hz = high_hz - low_hz
     low, high, occupancy = energy_band_mps(spectrum, energy)
     faster_positive = np.abs(high) >= np.abs(low)
     far = np.where(faster_positive, high, -low)
     near = np.where(faster_positive, low, -high)
 
-    axis_mps = axis_velocities_mps(axis_db.shape[-1])
-    speed = np.abs(axis_mps)
+    axis_mps, change_parts, change_widths = _axis_plan(axis_db.shape[-1])
     change = change_db(parts) if change is None else change
+    changes = np.add.reduceat(change, change_parts, axis=-1)
+    centre = changes[..., 2], changes[..., 1] + changes[..., 3], changes[..., 0] + changes[..., 4]
+    slow, middle, fast = (value / width for value, width in zip(centre, change_widths, strict=True))
     centroid = centroid_mps(parts, axis_mps)
     strong, weak = band_levels_db(axis_db, axis_mps)
     half = spectrum.bins // 2
-    side = spectrum.relative_power[..., :half].mean(-1), spectrum.relative_power[..., -half:].mean(-1)
-    total = np.maximum(spectrum.relative_power - 1, 0).sum(axis=-1)
+    power = spectrum.relative_power
+    side = np.add.reduce(power[..., :half], axis=-1) / half, np.add.reduce(power[..., -half:], axis=-1) / half
+    total = np.add.reduce(np.maximum(power - np.float32(1), np.float32(0)), axis=-1)
     peak = excess.max(axis=-1)
 
-    columns: dict[str, NDArray] = {
-        **{name: np.asarray(value) for name, value in radar_columns(spectrum).items()},
+    columns: dict[str, NDArray | float] = {
+        **radar_columns(spectrum),
         "body_level_db": body.level_db,
         "body_speed_mps": np.abs(body.velocity_mps),
         "rest_level_db": spectrum.level_db[..., half - 1 : half + 2].max(axis=-1),
@@ -138,16 +147,14 @@ def feature_vector(
         "chopping_turns": np.log10(np.maximum(chopping.frequency_hz * (spectrum.pulses / spectrum.prf_hz), 0.01)),
         "chopping_orders": width_hz / np.maximum(chopping.frequency_hz, 1),
         "smearing_index": smearing_index(spectrum, energy, body, chopping),
-        "change_slow_db": change[..., speed < 3].mean(axis=-1),
-        "change_middle_db": change[..., (speed >= 3) & (speed < 20)].mean(axis=-1),
-        "change_fast_db": change[..., speed >= 20].mean(axis=-1),
+        "change_slow_db": slow,
+        "change_middle_db": middle,
+        "change_fast_db": fast,
         "centroid_swing_mps": centroid.std(axis=-1),
         "centroid_drift_mps": np.abs(centroid[..., -1] - centroid[..., 0]),
         "busy_swing_db": busy_db(parts).std(axis=-1),
         "empty_side_db": np.abs(10 * np.log10(np.maximum(side[0], 1e-2) / np.maximum(side[1], 1e-2))),
     }
-    names = [f.name for f in FEATURES]
-    for stem, levels in (("strong_", strong), ("weak_", weak)):
-        bands = [name for name in names if name.startswith(stem)]
-        columns.update({name: levels[..., i] for i, name in enumerate(bands)})
+    for names, levels in zip(_BANDS, (strong, weak), strict=True):
+        columns.update(zip(names, np.moveaxis(levels, -1, 0), strict=True))
     return lay_out(columns, FEATURES, spectrum.floor.shape)

@@ -5,6 +5,7 @@
 
 from typing import TYPE_CHECKING
 
+from .airframe import Rotor, body_echo, rotors_echo
 from .dataset import CLASSES, KIND_CLASS, KINDS, TRUTH_UNITS, Records, draw_radar, draw_records, stream
 from .radar import SPEED_OF_LIGHT_MPS, Radar
 from .rotor import RotorMotion, rotor_echo
@@ -20,12 +21,15 @@ __all__ = [
     "TRUTH_UNITS",
     "Radar",
     "Records",
+    "Rotor",
     "RotorMotion",
     "Scene",
     "SceneError",
+    "body_echo",
     "draw_radar",
     "draw_records",
     "rotor_echo",
+    "rotors_echo",
     "stream",
 ]
 

@@ -29,13 +29,14 @@ KINDS: dict[str, dict[str, float]] = {
     "uav": {"fixed_wing": 0.25, "quadcopter": 0.3, "hexacopter": 0.15, "octocopter": 0.1, "helicopter": 0.2},
     "bird": {"flapping_bird": 0.6, "gliding_bird": 0.15, "flock": 0.25},
     "clutter": {
-        "noise": 0.12,
-        "ground": 0.13,
-        "rain": 0.12,
-        "sea": 0.15,
-        "person": 0.13,
-        "vehicle": 0.2,
-        "wind_turbine": 0.15,
+        "noise": 0.2,
+        "ground": 0.11,
+        "rain": 0.09,
+        "sea": 0.11,
+        "person": 0.09,
+        "vehicle": 0.14,
+        "wind_turbine": 0.09,
+        "mover": 0.17,
     },
 }
 

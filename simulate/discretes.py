@@ -1,4 +1,4 @@
-"""Things with moving parts that are neither UAV nor bird: a walking person, a vehicle, a wind turbine.
+"""Things that move and are neither UAV nor bird: a walking person, a vehicle, a wind turbine, a plain reflector.
 
 Each is a handful of scatterers on known paths; they are the hard confusers, because parts of them move fast or turn.
 """
@@ -51,7 +51,8 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
     """Draw a road vehicle: several body scatterers of slightly unlike radial speed, and wheels from 0 to 2 v."""
     t = radar.times_s
     speed = draws.value("vehicle_mps") * draws.sign()
-    acceleration = draws.value("vehicle_acceleration_mps2")
+    # half of them drive steadily
+    acceleration = draws.value("vehicle_acceleration_mps2") * np.where(draws.chance(0.5), 0.05, 1.0)
     spread = draws.value("aspect_spread")  # close to the road each part has its own aspect
     body = np.zeros((len(draws), radar.pulses), np.complex64)
     for _ in range(BODY_POINTS):
@@ -106,8 +107,23 @@ def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
     return Target(micro, body, 45 * draws.uniform() - 5, truth=truth)
 
 
+def draw_mover(draws: Draws, radar: Radar) -> Target:
+    """Draw a featureless moving reflector: a far vehicle, a boat, a balloon. A line alone is no drone."""
+    speed = draws.value("mover_mps")
+    acceleration = draws.value("bird_acceleration_mps2") * np.where(draws.chance(0.7), 0.05, 1.0)
+    path = straight_path(radar.times_s, speed, acceleration)
+    turn = np.exp(1j * draws.value("phase_rad")).astype(np.complex64)[:, None]
+    truth = {"velocity_mps": speed, "acceleration_mps2": acceleration}
+    return Target(turn * range_phasor(path, radar.wavelength_m), snr_law="clutter_snr_db", truth=truth)
+
+
 #: Renderers by kind.
-DISCRETES = {"person": draw_person, "vehicle": draw_vehicle, "wind_turbine": draw_wind_turbine}
+DISCRETES = {
+    "mover": draw_mover,
+    "person": draw_person,
+    "vehicle": draw_vehicle,
+    "wind_turbine": draw_wind_turbine,
+}
 
 
 def draw_discrete(draws: Draws, radar: Radar, kind: str) -> Target:
@@ -119,7 +135,7 @@ def draw_discrete(draws: Draws, radar: Radar, kind: str) -> Target:
         The records' uniform numbers.
     radar : Radar
         The radar that looks.
-    kind : {"person", "vehicle", "wind_turbine"}
+    kind : {"person", "vehicle", "wind_turbine", "mover"}
         What it is.
 
     Returns

@@ -19,8 +19,8 @@ class Law:
 
     Parameters
     ----------
-    kind : {"uniform", "log"}
-        Uniform in the value, or in its logarithm.
+    kind : {"uniform", "log", "rising"}
+        Uniform in the value, or in its logarithm, or with a density that rises towards the upper end.
     low, high : float
         Range, in `unit`.
     unit : str
@@ -39,7 +39,7 @@ class Law:
         """Map uniform numbers in [0, 1) to values."""
         if self.kind == "log":
             return self.low * (self.high / self.low) ** u
-        return self.low + (self.high - self.low) * u
+        return self.low + (self.high - self.low) * (u**0.7 if self.kind == "rising" else u)
 
 
 LAWS: dict[str, Law] = {
@@ -48,7 +48,8 @@ LAWS: dict[str, Law] = {
     "dwell_s": Law("log", 5e-3, 1.0, "s", "envelope; dwells of 2.7-89 ms in Gong 2022"),
     "unambiguous_mps": Law("log", 10.0, 260.0, "m/s", "from slow-body radars to tips of 200 m/s and a margin"),
     # every scene
-    "snr_db": Law("uniform", -20.0, 32.0, "dB", "micro-motion power over noise, a sample"),
+    # rising: a model that is shown many UAVs in which nothing can be seen learns to call an empty cell a UAV
+    "snr_db": Law("rising", -20.0, 32.0, "dB", "micro-motion power over noise, a sample"),
     "clutter_snr_db": Law("uniform", -20.0, 50.0, "dB", "whole clutter return over noise, a sample"),
     "phase_rad": Law("uniform", -np.pi, np.pi, "rad", "no phase is special"),
     "background_db": Law(
@@ -94,6 +95,7 @@ LAWS: dict[str, Law] = {
     "gait_hz": Law("uniform", 0.8, 2.2, "Hz", "1-2 Hz"),
     "vehicle_mps": Law("log", 1.0, 40.0, "m/s", "roads; sign drawn apart"),
     "vehicle_acceleration_mps2": Law("uniform", -10.0, 10.0, "m/s^2", "with the change of aspect close to the road"),
+    "mover_mps": Law("uniform", -60.0, 60.0, "m/s", "boats, balloons, far vehicles, aircraft on a slant path"),
     "wheel_radius_m": Law("log", 0.2, 0.55, "m", "motorcycle to lorry"),
     "aspect_spread": Law("log", 0.005, 0.7, "1", "share of its speed that a near vehicle's far end shows less"),
     "wheel_db": Law("uniform", -35.0, -5.0, "dB", "wheels under the body"),
@@ -112,7 +114,8 @@ LAWS: dict[str, Law] = {
     "high_pass_hz": Law("log", 3.0, 150.0, "Hz", "capacitor-coupled audio front ends; clutter cancellers"),
     "mains_db": Law("uniform", -25.0, 15.0, "dB", "mains lines together over noise"),
     "tilt_db": Law("uniform", -25.0, 0.0, "dB", "receiver band edges under its middle"),
-    "hump_db": Law("uniform", 0.0, 8.0, "dB", "half the swing of a smooth hump in the receiver's band"),
+    "hump_db": Law("uniform", 0.0, 5.0, "dB", "half the swing of a smooth hump in the receiver's band"),
+    "hump_turns": Law("log", 0.2, 8.0, "1", "humps across half the band, from one slope to several swells"),
     "full_scale_db": Law("uniform", -3.0, 20.0, "dB", "full scale over the largest sample; below 0 it clips"),
     "adc_bits": Law("uniform", 6.0, 16.0, "bit", "converters"),
     "image_db": Law("uniform", -50.0, -15.0, "dB", "I/Q imbalance image"),

@@ -21,12 +21,15 @@ FAULT_CHANCE = {
     "flicker": 0.25,
     "phase_noise": 0.25,
     "mains": 0.25,
-    "colour": 0.35,
+    "colour": 0.5,
     "image": 0.3,
     "real_only": 0.03,
-    "analytic": 0.1,
+    "analytic": 0.14,
     "converter": 0.4,
 }
+
+#: Humps of a band that is not flat.
+HUMPS = 2
 
 #: Most spoilt pulses of a record.
 MAX_IMPULSES = 4
@@ -58,9 +61,9 @@ class Receiver:
         self.mains_slope = 1 + 2 * draws.uniform()
         self.mains_phase = draws.value("phase_rad", 12)
         self.tilt_db = draws.value("tilt_db")
-        self.hump_db = draws.value("hump_db")
-        self.hump_turns = 3 * draws.uniform()
-        self.hump_phase = draws.value("phase_rad")
+        self.hump_db = draws.value("hump_db", HUMPS)
+        self.hump_turns = draws.value("hump_turns", HUMPS)
+        self.hump_phase = draws.value("phase_rad", HUMPS)
         self.image_db = draws.value("image_db")
         self.conjugate = draws.chance(0.5)
         self.full_scale_db = draws.value("full_scale_db")
@@ -155,14 +158,15 @@ class Receiver:
         return out
 
     def _colour(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:
-        """A band that is not flat: it falls towards its edges, and a smooth hump lies anywhere in it.
+        """A band that is not flat: it falls towards its edges, and smooth humps lie anywhere in it.
 
         A hump of noise must not pass for a rotor's band.
         """
         share = fft.fftfreq(iq.shape[-1]) * 2
         for row in rows:
-            hump = np.cos(TWO_PI * self.hump_turns[row] * share + self.hump_phase[row])
-            response = 10 ** ((self.tilt_db[row] * share**2 + self.hump_db[row] * hump) / 20)
+            turns = TWO_PI * self.hump_turns[row][:, None] * share + self.hump_phase[row][:, None]
+            level_db = self.tilt_db[row] * share**2 + self.hump_db[row] @ np.cos(turns)
+            response = 10 ** (level_db / 20)
             iq[row] = fft.ifft(fft.fft(iq[row]) * response.astype(np.float32))
 
     def _one_sided(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:

@@ -4,13 +4,17 @@ A blade from radius L1 to L2, seen at aspect beta, adds the radial displacement 
 far field, eqs. 2 and 4). The integral over r of exp(+j 2 k r cos(beta) cos(theta)), k = 2 pi / wavelength, is
 
     (L2 - L1) exp(j k (L1 + L2) c) sinc(k (L2 - L1) c),     c = cos(beta) cos(theta),  sinc(x) = sin(x) / x.
+
+The blade opposite has the conjugate, so two blades cost little more than one.
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .blades import TILE_SAMPLES, Blades, Room
 from .motion import TWO_PI, reduce_phase
 
 
@@ -101,31 +105,23 @@ def rotor_echo(
         Sum over the blades of the mean of exp(j 2 k r c) over the reflecting part of the blade: a blade of amplitude 1
         seen at rest at a right angle contributes 1.
     """
-    amplitudes = np.asarray(blade_amplitudes, np.float32)
-    blades = amplitudes.shape[-1]
-    k_cos_beta = TWO_PI / wavelength_m * np.cos(np.asarray(beta_rad, np.float64))
-    tip, root = np.asarray(blade_length_m, np.float64), np.asarray(root_m, np.float64)
-    middle = ((tip + root) * k_cos_beta).astype(np.float32)[..., None]
-    half = ((tip - root) * k_cos_beta).astype(np.float32)[..., None]
-    asymmetry = np.asarray(edge_asymmetry, np.float32)[..., None]
-
-    angle = reduce_phase(angle_rad)
-    cos0, sin0 = np.cos(angle), np.sin(angle)
-    out = np.zeros(np.broadcast_shapes(angle.shape, middle.shape, (*amplitudes.shape[:-1], 1)), np.complex64)
-    for blade in range(blades):
-        weight = amplitudes[..., blade, None]
-        if not np.any(weight):
-            continue
-        turn = TWO_PI * blade / blades
-        cos_turn, sin_turn = np.float32(np.cos(turn)), np.float32(np.sin(turn))
-        cosine = cos0 * cos_turn - sin0 * sin_turn
-        x = half * cosine
-        # np.sinc divides by pi twice over; here x is safe from 0 because sin(x)/x is 1 to float32 below 1e-4
-        x_safe = np.where(np.abs(x) < 1e-4, np.float32(1e-4), x)
-        magnitude = weight * (np.sin(x_safe) / x_safe)
-        if np.any(asymmetry):
-            magnitude *= 1 + asymmetry * (sin0 * cos_turn + cos0 * sin_turn)
-        phase = middle * cosine
-        out.real += magnitude * np.cos(phase)
-        out.imag += magnitude * np.sin(phase)
-    return out
+    angle = np.asarray(angle_rad, np.float64)
+    lead = np.broadcast_shapes(
+        angle.shape[:-1],
+        *(np.shape(value) for value in (blade_length_m, beta_rad, root_m, edge_asymmetry)),
+        np.shape(blade_amplitudes)[:-1],
+    )
+    blades = Blades.of(lead, wavelength_m, blade_length_m, beta_rad, root_m, blade_amplitudes, edge_asymmetry)
+    pulses = angle.shape[-1]
+    angle = np.broadcast_to(angle, (*lead, pulses)).reshape(-1, pulses)
+    out = np.empty(angle.shape, np.complex64)
+    wide = max(1, min(pulses, TILE_SAMPLES))
+    high, room = TILE_SAMPLES // wide, Room(8 * TILE_SAMPLES)
+    for row, at in product(range(0, len(out), high), range(0, pulses, wide)):
+        rows, span = slice(row, row + high), slice(at, at + wide)
+        reduced = reduce_phase(angle[rows, span])
+        part = out[rows, span]
+        real, imag = np.empty_like(reduced), np.empty_like(reduced)
+        blades.sum(rows, reduced, room, real, imag)
+        part.real, part.imag = real, imag
+    return out.reshape(*lead, pulses)

@@ -1,12 +1,15 @@
 """Small UAVs: fixed wing, multirotors, and the helicopter with its geared tail rotor."""
 
+from dataclasses import fields
+
 import numpy as np
 from numpy.typing import NDArray
 
+from .airframe import Rotor, body_echo, rotors_echo
 from .laws import LAWS, Draws
-from .motion import TWO_PI, phasor, range_phasor, straight_path
+from .motion import TWO_PI
 from .radar import Radar
-from .rotor import RotorMotion, rotor_echo
+from .rotor import RotorMotion
 from .target import Target
 
 #: Lifting rotors of each kind.
@@ -49,24 +52,11 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
     offsets = draws.uniform(rotors) - 0.5 if rotors > 1 else np.zeros((len(draws), 1))
     rates = rotation[:, None] * (1 + spread[:, None] * offsets)
     level = np.exp(0.4 * draws.normal(rotors))
-    micro = np.zeros((len(draws), radar.pulses), np.complex64)
+    lifting = []
     for r in range(rotors):
-        angle = _motion(draws, rates[:, r]).angle_rad(radar.times_s)
-        hub = (level[:, r] * np.exp(1j * draws.value("phase_rad"))).astype(np.complex64)
-        for count in BLADES:
-            rows = np.flatnonzero(blades == count)
-            if not len(rows):
-                continue
-            echo = rotor_echo(
-                angle[rows],
-                wavelength_m=radar.wavelength_m,
-                blade_length_m=length[rows],
-                beta_rad=beta[rows],
-                root_m=root[rows],
-                blade_amplitudes=amplitudes[rows, :count],
-                edge_asymmetry=asymmetry[rows],
-            )
-            micro[rows] += hub[rows, None] * echo
+        motion = _motion(draws, rates[:, r])
+        hub = level[:, r] * np.exp(1j * draws.value("phase_rad"))
+        lifting.append(Rotor(motion, length, beta, root, amplitudes, asymmetry, hub))
     truth = {
         "rotation_hz": rates.mean(axis=1),
         "rotation_spread": np.ptp(rates, axis=1) / rates.mean(axis=1),
@@ -80,16 +70,28 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
         # one reflecting blade repeats once a turn, equal blades `blades` times
         "chopping_hz": rates.mean(axis=1) * np.where((amplitudes[:, 1:] > 0).any(axis=1), blades, 1),
     }
+    tail = []
     if kind == "helicopter":
-        tail, truth["tail_rotation_hz"] = _tail_rotor(draws, radar, length, rotation)
-        micro += tail
-
-    vibration = draws.value("vibration_rad")[:, None] * np.sin(
-        TWO_PI * rates[:, :1] * radar.times_s + draws.value("phase_rad")[:, None]
+        rotor, truth["tail_rotation_hz"] = _tail_rotor(draws, length, rotation)
+        tail.append(rotor)
+    vibration, phase, rest = (draws.value(law) for law in ("vibration_rad", "phase_rad", "phase_rad"))
+    path = {"velocity_mps": velocity, "acceleration_mps2": acceleration}
+    micro = np.empty((len(draws), radar.pulses), np.complex64)
+    for count in BLADES:
+        rows = np.flatnonzero(blades == count)
+        if len(rows):
+            some = [_of(rotor, rows, count) for rotor in lifting] + [_of(rotor, rows) for rotor in tail]
+            micro[rows] = rotors_echo(radar, some, len(rows), **{name: value[rows] for name, value in path.items()})
+    body = body_echo(
+        radar,
+        len(draws),
+        **path,
+        phase_rad=rest,
+        vibration_rad=vibration,
+        vibration_hz=rates[:, 0],
+        vibration_phase_rad=phase,
     )
-    path = range_phasor(straight_path(radar.times_s, velocity, acceleration), radar.wavelength_m)
-    body = phasor(vibration + draws.value("phase_rad")[:, None]) * path
-    return Target(micro * path, body, draws.value("uav_body_db"), truth=truth)
+    return Target(micro, body, draws.value("uav_body_db"), truth=truth)
 
 
 def _motion(draws: Draws, rate_hz: NDArray[np.float64]) -> RotorMotion:
@@ -113,11 +115,8 @@ def _blade_amplitudes(draws: Draws) -> NDArray[np.float64]:
 
 
 def _tail_rotor(
-    draws: Draws,
-    radar: Radar,
-    main_length_m: NDArray[np.float64],
-    main_rotation_hz: NDArray[np.float64],
-) -> tuple[NDArray[np.complex64], NDArray[np.float64]]:
+    draws: Draws, main_length_m: NDArray[np.float64], main_rotation_hz: NDArray[np.float64]
+) -> tuple[Rotor, NDArray[np.float64]]:
     """A two-blade tail rotor, geared to the main one, in an upright plane: its aspect is another angle.
 
     Tip speed is held below 200 m/s, as on real airframes.
@@ -125,13 +124,15 @@ def _tail_rotor(
     length = main_length_m * draws.value("tail_ratio")
     rate = np.minimum(main_rotation_hz * draws.value("gear_ratio"), 200.0 / (TWO_PI * length))
     motion = _motion(draws, rate)
-    echo = rotor_echo(
-        motion.angle_rad(radar.times_s),
-        wavelength_m=radar.wavelength_m,
-        blade_length_m=length,
-        beta_rad=LAWS["uav_beta_rad"](draws.uniform()),
-        blade_amplitudes=(1.0, 1.0),
-        root_m=0.2 * length,
-    )
-    level = 0.4 * np.exp(0.5 * draws.normal() + 1j * draws.value("phase_rad"))
-    return level.astype(np.complex64)[:, None] * echo, rate
+    beta = LAWS["uav_beta_rad"](draws.uniform())
+    hub = 0.4 * np.exp(0.5 * draws.normal() + 1j * draws.value("phase_rad"))
+    amplitudes = np.ones((len(draws), 2))
+    return Rotor(motion, length, beta, 0.2 * length, amplitudes, np.zeros(len(draws)), hub), rate
+
+
+def _of(rotor: Rotor, rows: NDArray[np.intp], blades: int | None = None) -> Rotor:
+    """Some records' rotor, with the first of its blades."""
+    taken = {f.name: getattr(rotor, f.name)[rows] for f in fields(rotor) if f.name != "motion"}
+    taken["blade_amplitudes"] = taken["blade_amplitudes"][:, :blades]
+    motion = {f.name: getattr(rotor.motion, f.name)[rows] for f in fields(rotor.motion)}
+    return Rotor(RotorMotion(**motion), **taken)

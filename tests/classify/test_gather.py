@@ -1,4 +1,11 @@
+import os
+import signal
+import subprocess
+import sys
+import time
+
 import numpy as np
+import pytest
 from bladewing.classify import gather as gather_module
 from bladewing.classify.gather import gather
 from bladewing.features import INPUT_SHAPES
@@ -36,3 +43,32 @@ def test_progress_counts_every_record():
     seen = []
     gather(0, "test", 50, names=("features",), workers=1, on_records=seen.append)
     assert sum(seen) == 50
+
+
+ORPHAN = """
+
+from bladewing.classify import gather
+if __name__ == "__main__":
+    said = lambda count: print("under way", flush=True)
+    gather.gather(0, "train", 24_000, names=("features",), workers=2, on_records=said)
+"""
+
+
+def test_workers_end_with_a_killed_parent(tmp_path):
+    script = tmp_path / "orphan.py"
+    script.write_text(ORPHAN)
+    parent = subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True, start_new_session=True)
+    assert parent.stdout is not None
+    assert parent.stdout.readline() == "under way\n"
+    parent.kill()
+    parent.stdout.close()
+    parent.wait()
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(parent.pid, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.2)
+    os.killpg(parent.pid, signal.SIGKILL)
+    pytest.fail("workers outlived their parent")

@@ -1,0 +1,56 @@
+"""The shipped model on measured recordings it was never trained on; they lie beside the project, not in it."""
+
+import json
+from pathlib import Path
+
+import pytest
+from bladewing.classify.cli import main
+
+FOLDER = Path(__file__).parents[3] / "shared" / "recordings"
+RECORDINGS = sorted(FOLDER.glob("*.sigmf-meta"))
+
+pytestmark = pytest.mark.skipif(not RECORDINGS, reason=f"no measured recordings in ../shared/{FOLDER.name}: not tested")
+
+
+@pytest.fixture(scope="module")
+def answers():
+    from contextlib import redirect_stdout
+    from io import StringIO
+
+    with redirect_stdout(StringIO()) as said:
+        assert main(["predict", "--json", *map(str, RECORDINGS)]) == 0
+    return [json.loads(line) for line in said.getvalue().splitlines()]
+
+
+def dwells(answers, start: str) -> list[dict]:
+    return [a for a in answers if "label" in a and Path(a["file"]).name.startswith(start)]
+
+
+def tracks(answers, start: str) -> list[dict]:
+    return [a["track"] for a in answers if "track" in a and Path(a["file"]).name.startswith(start)]
+
+
+def test_every_recording_gets_a_label_a_dwell_and_one_in_all(answers):
+    assert len([a for a in answers if "track" in a]) == len(RECORDINGS)
+    for answer in answers:
+        if "track" not in answer:
+            assert answer["stop_s"] - answer["start_s"] == pytest.approx(0.08, abs=1e-3)
+            assert (answer["label"] == "unknown") == bool(answer["reason"])
+
+
+def test_the_drone_is_a_uav(answers):
+    found = [a["label"] for a in dwells(answers, "drone")]
+    assert len(found) >= 50
+    assert found.count("uav") >= 0.95 * len(found)
+    assert {t["label"] for t in tracks(answers, "drone")} == {"uav"}
+
+
+def test_the_sea_at_1_khz_is_unknown_for_the_right_reason(answers):
+    for answer in dwells(answers, "sea"):
+        assert answer["label"] == "unknown"
+        assert "unambiguous velocity 8.0 m/s is below 10 m/s" in answer["reason"]
+
+
+def test_no_walker_vehicle_or_sea_recording_is_a_uav(answers):
+    for start in ("person", "vehicle", "sea"):
+        assert "uav" not in {t["label"] for t in tracks(answers, start)}

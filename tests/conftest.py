@@ -1,0 +1,12 @@
+"""Settings of the whole test run."""
+
+import os
+
+from hypothesis import HealthCheck, settings
+
+# One thread each: the tests' models are tiny, and threads that wait for a core cost more than they bring.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+# Machines are shared: how long an example takes says nothing.
+settings.register_profile("shared", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("shared")
