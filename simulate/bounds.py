@@ -29,7 +29,7 @@ from .render_uav import (
 
 Amplitude = NDArray[np.float64]
 
-_SPACING_BINS = 48  # a blade's angles to the line of sight are counted in so many classes
+_SPACING_CLASSES = 40  # of a blade's angles to the line of sight
 
 
 def moment_envelope(order: int, z: Amplitude, root_share: float = 0.0) -> Amplitude:
@@ -143,10 +143,9 @@ class UavBounds:
         straight = Fidelity(frozenset(UAV_EFFECTS) - {"blade_curvature"}, None)
         echo = np.abs(uav_echo(self.part, self.radar, self.times_s, straight)) + self.blade_curvature()
         # hubs off the line of sight move a little less than the centre does
-        reach = max([r.offset_m + r.blade_length_m for r in self.part.rotors] + [b.offset_m for b in self.part.body])
         total = sum(10 ** (r.flash_db / 20) * 2 * sum(r.amplitudes) for r in self.part.rotors)
         total += sum(10 ** (b.level_db / 20) for b in self.part.body)
-        return echo * chord(path) + total * np.minimum(2, path) * (reach / self.centre_m.min()) ** 2
+        return echo * chord(path) + total * np.minimum(2, path) * (self.part.reach_m / self.centre_m.min()) ** 2
 
     def vibration(self) -> Amplitude:
         """A body at rest in place of a shaken one."""
@@ -186,18 +185,27 @@ class UavBounds:
         for rotor in self.part.rotors:
             if rotor.root_m == rotor.blade_length_m:
                 continue
-            half = self._phase(rotor) * (1 - rotor.root_m / rotor.blade_length_m) / 2
-            missed = _gauss_errors(points, half)
+            half = self.wavenumber * (rotor.blade_length_m - rotor.root_m) / 2
+            cos_beta = np.cos(rotor_beta_rad(self.part, rotor))
+            nearness = rotor.blade_length_m / (self.centre_m.min() - rotor.offset_m)
             for amplitude, theta in self._blades(rotor):
-                which = np.minimum((np.abs(np.cos(theta)) * _SPACING_BINS).astype(int), _SPACING_BINS - 1)
+                cosine = np.abs(cos_beta * np.cos(theta))
+                # the sphere's sag makes the phase run faster towards the tip
+                steepest = cosine + nearness * (1 - cosine**2)
+                classes, missed = _gauss_errors(points, half, float(np.ceil(64 * steepest.max())) / 64)
+                which = np.searchsorted(classes, steepest)
                 total += amplitude * (1 + np.abs(rotor.edge_asymmetry * np.sin(theta))) * missed[which]
         return float(np.sum(total**2))
 
 
-@lru_cache(maxsize=256)
-def _gauss_errors(points: int, largest_half_phase_rad: float) -> Amplitude:
-    """`gauss_error` of each class of angles: the rotors of an airframe are often alike."""
-    return gauss_error(points, largest_half_phase_rad * np.linspace(0, 1, _SPACING_BINS + 1)[1:])
+@lru_cache(maxsize=512)
+def _gauss_errors(points: int, half_phase_rad: float, steepest: float) -> tuple[Amplitude, Amplitude]:
+    """Upper ends of classes of steepness up to `steepest`, finest there, and `gauss_error` of each.
+
+    Kept, because the rotors of an airframe are often alike.
+    """
+    classes = steepest * (1 - np.linspace(1, 0, _SPACING_CLASSES + 1)[1:] ** 2)
+    return classes, gauss_error(points, half_phase_rad * classes)
 
 
 def gauss_error(points: int, half_phase_rad: Amplitude) -> Amplitude:

@@ -7,6 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from .bird import wing_size
+from .insects import INSECT_LAWS
 from .laws import LAWS
 from .receiver import FAULT_CHANCE
 
@@ -30,7 +32,7 @@ class RadarPart(Part):
 
     carrier_hz: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1e12)]
     prf_hz: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1e9)]
-    pulses: Annotated[int, Field(strict=True, ge=1, le=100_000_000)]
+    pulses: Annotated[int, Field(strict=True, ge=1, le=10_000_000)]
 
 
 class BodyPart(Part):
@@ -91,6 +93,18 @@ class TargetPart(Part):
     velocity_mps: Number = 0.0
     acceleration_mps2: Number = 0.0
 
+    @property
+    def reach_m(self) -> float:
+        """Distance of the farthest scatterer from the centre [m]."""
+        return 0.0
+
+    def nearest_m(self, dwell_s: float) -> float:
+        """Smallest range of the centre within the dwell [m]."""
+        times = [0.0, dwell_s]
+        if self.acceleration_mps2 > 0:
+            times.append(min(max(-self.velocity_mps / self.acceleration_mps2, 0.0), dwell_s))
+        return min(self.range_m + t * (self.velocity_mps + 0.5 * self.acceleration_mps2 * t) for t in times)
+
 
 class UavPart(TargetPart):
     """A UAV: body scatterers and rotors, or the name of an `airframe` of the catalogue that brings both."""
@@ -118,12 +132,12 @@ class UavPart(TargetPart):
     def _consistent(self) -> "UavPart":
         if not self.body and not self.rotors:
             raise ValueError("it has neither body nor rotors: give one of them, or an airframe of the catalogue")
-        reach = max(
-            [r.offset_m + r.blade_length_m for r in self.rotors] + [b.offset_m for b in self.body],
-        )
-        if self.range_m <= reach:
-            raise ValueError(f"range_m is {self.range_m}: it must exceed the target's own reach of {reach:.6g} m")
         return self
+
+    @property
+    def reach_m(self) -> float:
+        """Distance of the farthest scatterer from the centre [m]."""
+        return max([r.offset_m + r.blade_length_m for r in self.rotors] + [b.offset_m for b in self.body])
 
 
 class BirdPart(TargetPart):
@@ -155,6 +169,11 @@ class BirdPart(TargetPart):
     flock_velocity_mps: NotNegative = 1.0
     flock_seed: Annotated[int, Field(strict=True, ge=0)] = 0
 
+    @property
+    def reach_m(self) -> float:
+        """Half the span [m]."""
+        return float((self.span_m or wing_size(self.mass_kg)[0]) / 2)
+
     @model_validator(mode="before")
     @classmethod
     def _from_catalogue(cls, values: Any) -> Any:
@@ -171,12 +190,13 @@ class BirdPart(TargetPart):
 class ClutterPart(Part):
     """Clutter or a confuser of one kind, of mean power `level_db`.
 
-    Its parameters are drawn from the laws of the training records (`laws.LAWS`); `values` fixes any of them by name.
+    Its parameters are drawn from the laws of the training records (`laws.LAWS`), those of insects from
+    `insects.INSECT_LAWS`; `values` fixes any of them by name.
     """
 
     name: Name
     on: bool = True
-    kind: Literal["ground", "rain", "sea", "person", "vehicle", "wind_turbine"]
+    kind: Literal["ground", "rain", "sea", "person", "vehicle", "wind_turbine", "insects"]
     level_db: Level
     values: dict[str, Number] = {}
 
@@ -215,9 +235,10 @@ class ReceiverPart(Part):
 
 def _known_laws(values: dict[str, float]) -> dict[str, float]:
     """Refuse a parameter that no law knows, or a value that its law's meaning forbids."""
+    laws = LAWS | INSECT_LAWS
     for name, value in values.items():
-        if name not in LAWS:
-            raise ValueError(f"{name!r} is unknown: the parameters are {', '.join(LAWS)}")
-        if LAWS[name].kind == "log" and value <= 0:
-            raise ValueError(f"{name} is {value}: it must be above 0 [{LAWS[name].unit}]")
+        if name not in laws:
+            raise ValueError(f"{name!r} is unknown: the parameters are {', '.join(laws)}")
+        if laws[name].kind == "log" and value <= 0:
+            raise ValueError(f"{name} is {value}: it must be above 0 [{laws[name].unit}]")
     return values

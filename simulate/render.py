@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from .clutter import draw_clutter
 from .discretes import DISCRETES, draw_discrete
-from .laws import WIDTH, Draws
+from .insects import INSECT_LAWS, draw_insects
+from .laws import LAWS, WIDTH, Draws
 from .parts import ClutterPart
 from .radar import Radar
 from .receiver import NormalsOf, Receiver
@@ -98,14 +99,16 @@ class _Chosen(Draws):
         self._values = values
 
     def value(self, law: str, columns: int | None = None) -> NDArray[np.float64]:
-        drawn = super().value(law, columns)
+        drawn = (LAWS | INSECT_LAWS)[law](self.uniform(columns))
         return np.full_like(drawn, self._values[law]) if law in self._values else drawn
 
 
 def _clutter_echo(part: ClutterPart, radar: Radar, rng: Generator) -> tuple[NDArray[np.complex64], dict[str, float]]:
     """Clutter of mean power `level_db`, and what was drawn of it."""
     draws = _Chosen(rng.random((1, WIDTH)), part.values)
-    if part.kind in DISCRETES:
+    if part.kind == "insects":
+        target = draw_insects(draws, radar)
+    elif part.kind in DISCRETES:
         target = draw_discrete(draws, radar, part.kind)
     else:
         target = draw_clutter(draws, radar, part.kind, NormalsOf([rng])(np.array([0])))

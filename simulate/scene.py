@@ -12,12 +12,16 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from .motion import TWO_PI
 from .parts import BirdPart, BodyPart, ClutterPart, RadarPart, ReceiverPart, RotorPart, TargetPart, UavPart
 from .radar import Radar
+from .receiver import FAULT_CHANCE
 
 if TYPE_CHECKING:
     from .plan import Plan
     from .render import Rendering
 
 _SOUND_MPS = 340.0
+
+#: Names that random streams of the receiver go by.
+_RESERVED = ("noise", "jitter", "receiver")
 
 
 class SceneError(ValueError):
@@ -69,10 +73,23 @@ class Scene(BaseModel):
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"two parts are named {name!r}: every name must be its own")
+            if name in _RESERVED or name in FAULT_CHANCE:
+                raise ValueError(f"a part is named {name!r}: that is the receiver's: give it another name")
         known = [*names, *self.receiver.effects, "noise"]
         for name in self.off:
             if name not in known:
                 raise ValueError(f"off holds {name!r}: it may hold {', '.join(known)}")
+        return self
+
+    @model_validator(mode="after")
+    def _ranges(self) -> "Scene":
+        for part in (*self.uav, *self.bird):
+            nearest = part.nearest_m(self.radar.pulses / self.radar.prf_hz)
+            if not nearest > part.reach_m:
+                raise ValueError(
+                    f"{part.name}: range_m is {part.range_m}: within the dwell it comes to {nearest:.6g} m, which must "
+                    f"exceed its own reach of {part.reach_m:.6g} m"
+                )
         return self
 
     @classmethod

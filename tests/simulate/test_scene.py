@@ -41,7 +41,10 @@ def power_spectrum(iq: np.ndarray) -> np.ndarray:
         (scene(uav=[uav(beta_deg=91.0)]), r"uav\[0\]\.beta_deg is 91\.0: it should be less than or equal to 90"),
         (scene(uav=[uav(velocity=3.0)]), r"unknown field uav\[0\]\.velocity: the fields are .*velocity_mps"),
         (scene(uav=[uav(rotors=[{**ROTOR, "rpm": 3.0}])]), r"unknown field .*rpm: the fields are blade_length_m"),
-        (scene(uav=[uav(range_m=0.1)]), r"range_m is 0\.1: it must exceed the target's own reach of 0\.15 m"),
+        (scene(uav=[uav(range_m=0.1)]), r"range_m is 0\.1: .* must exceed its own reach of 0\.15 m"),
+        (scene(uav=[uav(range_m=1.0, velocity_mps=-30.0)]), r"within the dwell it comes to -0\.2 m"),
+        (scene(uav=[uav(range_m=1.0, velocity_mps=-90.0, acceleration_mps2=4500.0)]), r"it comes to 0\.1 m"),
+        (scene(uav=[uav(name="mains")]), r"a part is named 'mains': that is the receiver's"),
         (scene(uav=[{"name": "x", "airframe": "jumbo"}]), r"airframe is 'jumbo': it must be one of type1"),
         (scene(uav=[{"name": "empty"}]), r"neither body nor rotors"),
         (scene(uav=[uav(), uav()]), r"two parts are named 'drone'"),
@@ -210,3 +213,89 @@ def test_drawing_records_needs_no_pydantic_and_scenes_are_fetched_when_asked_for
         "s.Scene; assert 'pydantic' in sys.modules; assert not hasattr(s, 'Scenery')"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def empty(**receiver) -> Scene:
+    return Scene.build({"radar": {**RADAR, "pulses": 5000}, "receiver": {"noise": False, **receiver}})
+
+
+def test_the_receivers_parts_do_what_their_values_say():
+    dc = empty(dc_db=-3.0).render().iq
+    np.testing.assert_allclose(dc, 10 ** (-3 / 20), rtol=1e-6)
+    mains = empty(effects=["mains"], mains_hz=60.0, values={"mains_db": 6.0}).render(2).iq
+    lines = abs(np.fft.fft(mains)) ** 2 / len(mains) ** 2  # 0.2 s: 60 Hz is bin 12
+    assert lines.sum() == pytest.approx(10**0.6, rel=0.01)
+    on_lines = np.zeros(len(lines), bool)
+    on_lines[12 : 12 * 12 + 1 : 12] = on_lines[-12 : -12 * 12 - 1 : -12] = True
+    assert lines[~on_lines].sum() < 1e-9
+    noise = {"noise": True, "effects": ["converter"], "values": {"adc_bits": 6.0, "full_scale_db": 0.0}}
+    coarse = empty(**noise).render(1).iq
+    assert len(np.unique(coarse.real)) <= 2**6 + 1
+    assert len(np.unique(empty(**{**noise, "effects": []}).render(1).iq.real)) > 2**10
+
+
+def test_phase_noise_turns_a_line_and_leaves_its_power():
+    part = uav(rotors=[])
+    values = {"radar": RADAR, "uav": [part], "receiver": {"noise": False}}
+    clean = Scene.build(values).render().iq
+    receiver = {"noise": False, "effects": ["phase_noise"], "values": {"phase_noise_rad": 0.02}}
+    turned = Scene.build({**values, "receiver": receiver}).render().iq
+    np.testing.assert_allclose(abs(turned), abs(clean), rtol=1e-5)
+    assert 0.002 < np.std(np.angle(turned / clean)) < 0.1
+
+
+def test_jitter_of_the_prf_moves_the_phase_of_what_moves():
+    part = uav(rotors=[], velocity_mps=20.0)
+    still = Scene.build({"radar": RADAR, "uav": [part], "receiver": {"noise": False}}).render().iq
+    receiver = {"noise": False, "jitter_s": 1e-6}
+    shaken = Scene.build({"radar": RADAR, "uav": [part], "receiver": receiver}).render().iq
+    expected_rad = 4 * np.pi / 0.0304357825 * 20 * 1e-6
+    # the rms of a thousand normal numbers scatters by 2.2 %; 6 sigma
+    assert np.std(np.angle(shaken / still)) == pytest.approx(expected_rad, rel=0.14)
+
+
+def test_a_flock_is_the_sum_of_unlike_birds_and_its_own_seed_decides_them():
+    bird = {"name": "b", "species": "starling", "members": 4, "heave_m": 0.01}
+    one, other = (
+        Scene.build({"radar": RADAR, "bird": [{**bird, "flock_seed": seed}], "receiver": {"noise": False}})
+        for seed in (1, 2)
+    )
+    np.testing.assert_array_equal(one.render(1).iq, one.render(2).iq)
+    assert abs(one.render().iq - other.render().iq).max() > 1
+    assert one.render().truth[0]["members"] == 4
+
+
+def test_phases_turn_what_they_belong_to():
+    def rendered(body_deg: float, hub_deg: float) -> np.ndarray:
+        part = uav(body=[{"level_db": 10.0, "phase_deg": body_deg}], rotors=[{**ROTOR, "hub_phase_deg": hub_deg}])
+        return Scene.build({"radar": RADAR, "uav": [part], "receiver": {"noise": False}}).render().iq
+
+    plain, both = rendered(0.0, 0.0), rendered(90.0, 90.0)
+    np.testing.assert_allclose(both, 1j * plain, atol=1e-3)
+    body = np.sqrt(10) * np.exp(-4j * np.pi / Scene.load("type1").sight.wavelength_m * 1000.0)
+    np.testing.assert_allclose(rendered(90.0, 0.0) - plain, (1j - 1) * body, atol=1e-3)
+
+
+def insects(seed: int, **values: float):
+    radar = {"carrier_hz": 9.85e9, "prf_hz": 4e3, "pulses": 4000}
+    part = {"name": "swarm", "kind": "insects", "level_db": 5.0, "values": values}
+    return Scene.build({"radar": radar, "clutter": [part], "receiver": {"noise": False}}).render(seed)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_insects_drift_with_the_wind_and_have_the_level_of_the_scene(seed):
+    found = insects(seed, insect_velocity_mps=3.0, insect_spread_mps=0.3, insect_count=12.0)
+    assert 10 * np.log10(np.mean(abs(found.iq) ** 2)) == pytest.approx(5, abs=1e-3)
+    velocity = -np.fft.fftfreq(4000, 1 / 4e3) * found.radar.wavelength_m / 2
+    power = power_spectrum(found.iq)
+    # 4.5 sigma of own flight and the side line of a wingbeat of at most 275 Hz
+    assert power[abs(velocity - 3) > 4.5 * 0.3 + 275 * found.radar.wavelength_m / 2].sum() < 1e-6 * power.sum()
+    assert found.truth[0]["members"] == 12
+
+
+def test_an_insects_echo_swells_at_its_wingbeat():
+    found = insects(3, insect_count=1.0, insect_wingbeat_hz=100.0, insect_depth=0.4)
+    swell = abs(found.iq) / abs(found.iq).mean()
+    assert swell.max() == pytest.approx(1.4, abs=0.02)
+    lines = abs(np.fft.rfft(swell - swell.mean()))
+    assert 89 < lines.argmax() < 111  # a second: bins are Hz
