@@ -196,8 +196,9 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
     micro = np.zeros((records, radar.pulses), np.complex64)
     body = np.zeros_like(micro)
     high = max(1, TILE_SAMPLES // radar.pulses)
-    birds = [(m, np.flatnonzero(members > m)) for m in range(int(members.max()))]
-    for member, rows in [(m, rows[i : i + high]) for m, rows in birds for i in range(0, len(rows), high)]:
+    there = [np.flatnonzero(members > member) for member in range(int(members.max()))]
+    tiles = [(member, all_[i : i + high]) for member, all_ in enumerate(there) for i in range(0, len(all_), high)]
+    for member, rows in tiles:
         cycle = TWO_PI * rate[rows, member, None] * radar.times_s + phase[rows, member, None]
         flap = np.ones(len(rows))
         if kind == "gliding_bird":
