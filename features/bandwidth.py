@@ -77,7 +77,7 @@ def energy_band_mps(
     starts = np.arange(0, bins, _BLOCK)
     total = np.cumsum(np.add.reduceat(flat, starts, axis=-1), axis=-1, dtype=np.float64)
     sums = total[:, -1]
-    first, last = (_crossing(flat, total, share * sums) for share in (TAIL_SHARE, 1 - TAIL_SHARE))
+    first, last = _crossings(flat, total, np.array([[TAIL_SHARE], [1 - TAIL_SHARE]]) * sums)
     position = np.arange(bins, dtype=np.int32)
     within = (position >= first[:, None].astype(np.int32)) & (position <= last[:, None].astype(np.int32))
     within &= flat > 0
@@ -92,8 +92,10 @@ def energy_band_mps(
     )
 
 
-def _crossing(energy: NDArray[np.float32], total: NDArray[np.float64], level: NDArray[np.float64]) -> NDArray[np.intp]:
-    """First bin up to which the energy adds up to a level.
+def _crossings(
+    energy: NDArray[np.float32], total: NDArray[np.float64], levels: NDArray[np.float64]
+) -> NDArray[np.intp]:
+    """First bin up to which the energy adds up to each level.
 
     Parameters
     ----------
@@ -101,16 +103,16 @@ def _crossing(energy: NDArray[np.float32], total: NDArray[np.float64], level: ND
         Energy of each bin.
     total : ndarray of float64, shape (records, blocks)
         Energy up to the end of each block of `_BLOCK` bins.
-    level : ndarray of float64, shape (records,)
+    levels : ndarray of float64, shape (levels, records)
         At most the energy of all.
 
     Returns
     -------
-    ndarray of int, shape (records,)
+    ndarray of int, shape (levels, records)
     """
     rows, bins = np.arange(len(energy)), energy.shape[1]
-    block = np.minimum(np.count_nonzero(total < level[:, None], axis=-1), total.shape[1] - 1)
-    before = np.where(block > 0, total[rows, block - 1], 0.0)
-    inside = np.minimum(block[:, None] * _BLOCK + np.arange(_BLOCK), bins - 1)
-    upto = np.cumsum(energy[rows[:, None], inside], axis=-1, dtype=np.float64) + before[:, None]
-    return np.minimum(block * _BLOCK + np.count_nonzero(upto < level[:, None], axis=-1), bins - 1)
+    block = np.minimum(np.count_nonzero(total < levels[..., None], axis=-1), total.shape[1] - 1)
+    inside = np.minimum(block[..., None] * _BLOCK + np.arange(_BLOCK), bins - 1)
+    upto = np.cumsum(energy[rows[:, None], inside], axis=-1, dtype=np.float64)
+    upto += np.where(block > 0, total[rows, block - 1], 0.0)[..., None]
+    return np.minimum(block * _BLOCK + np.count_nonzero(upto < levels[..., None], axis=-1), bins - 1)
