@@ -8,6 +8,9 @@ from .spectrum import Spectrum
 #: Share of the residual energy left out on each side of the energy band.
 TAIL_SHARE = 0.025
 
+#: Bins summed together before the energy is followed bin by bin, where it matters.
+_BLOCK = 32
+
 
 def noise_threshold_db(bins: int, false_alarm: float = 1e-2) -> float:
     """Level that noise alone exceeds in any of so many bins with that probability [dB over the floor]."""
@@ -69,19 +72,47 @@ def energy_band_mps(
     occupancy : ndarray of float32, shape (...)
         Share of the bins within the band that hold energy, 0..1.
     """
-    total = np.cumsum(energy, axis=-1, dtype=np.float64)
-    sums = total[..., -1:]
-    before, within = total < TAIL_SHARE * sums, total < (1 - TAIL_SHARE) * sums
-    first = np.count_nonzero(before, axis=-1)
-    last = np.minimum(np.count_nonzero(within, axis=-1), spectrum.bins - 1)
-    velocity = spectrum.velocity_mps
-    some = sums[..., 0] > 0
-    zero = np.float32(0)
-    within &= ~before
-    within &= energy > 0
-    inside = np.count_nonzero(within, axis=-1) + 1  # the last bin of the band holds energy, but is not before its end
+    bins = spectrum.bins
+    flat = energy.reshape(-1, bins)
+    starts = np.arange(0, bins, _BLOCK)
+    total = np.cumsum(np.add.reduceat(flat, starts, axis=-1), axis=-1, dtype=np.float64)
+    sums = total[:, -1]
+    first, last = _crossings(flat, total, np.array([[TAIL_SHARE], [1 - TAIL_SHARE]]) * sums)
+    position = np.arange(bins, dtype=np.int32)
+    within = (position >= first[:, None].astype(np.int32)) & (position <= last[:, None].astype(np.int32))
+    within &= flat > 0
+    lead = energy.shape[:-1]
+    inside, some = np.count_nonzero(within, axis=-1).reshape(lead), (sums > 0).reshape(lead)
+    first, last = first.reshape(lead), last.reshape(lead)
+    velocity, zero = spectrum.velocity_mps, np.float32(0)
     return (
         np.where(some, velocity[last], zero).astype(np.float32),
-        np.where(some, velocity[np.minimum(first, spectrum.bins - 1)], zero).astype(np.float32),
+        np.where(some, velocity[first], zero).astype(np.float32),
         np.where(some, inside / (last - first + 1), zero).astype(np.float32),
     )
+
+
+def _crossings(
+    energy: NDArray[np.float32], total: NDArray[np.float64], levels: NDArray[np.float64]
+) -> NDArray[np.intp]:
+    """First bin up to which the energy adds up to each level.
+
+    Parameters
+    ----------
+    energy : ndarray of float32, shape (records, bins)
+        Energy of each bin.
+    total : ndarray of float64, shape (records, blocks)
+        Energy up to the end of each block of `_BLOCK` bins.
+    levels : ndarray of float64, shape (levels, records)
+        At most the energy of all.
+
+    Returns
+    -------
+    ndarray of int, shape (levels, records)
+    """
+    rows, bins = np.arange(len(energy)), energy.shape[1]
+    block = np.minimum(np.count_nonzero(total < levels[..., None], axis=-1), total.shape[1] - 1)
+    inside = np.minimum(block[..., None] * _BLOCK + np.arange(_BLOCK), bins - 1)
+    upto = np.cumsum(energy[rows[:, None], inside], axis=-1, dtype=np.float64)
+    upto += np.where(block > 0, total[rows, block - 1], 0.0)[..., None]
+    return np.minimum(block * _BLOCK + np.count_nonzero(upto < levels[..., None], axis=-1), bins - 1)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .notch import Mask, weights
 from .spectrum import KAISER_BETA, Spectrum
 
 #: Range in which a chopping frequency is sought [Hz]: a slow main rotor to a small propeller of four blades.
@@ -24,6 +25,7 @@ CLIP_DB = 30.0
 
 
 _NEIGHBOURS = np.array([[-1], [0], [1]])
+_DIVISORS = np.array([[2], [3], [4]])
 _MULTIPLES = np.array([[2], [3]])
 
 
@@ -67,7 +69,7 @@ def noise_shape(pulses: int, bins: int) -> NDArray[np.float32]:
     return np.sqrt(np.maximum(variance, 1e-3 * variance.max())).astype(np.float32)
 
 
-def cepstrum(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+def cepstrum(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     """Magnitude of the cepstrum of the notched, floored log spectrum, shape (..., bins // 2 + 1).
 
     Index k is a period of k / PRF. Both signs of Doppler count, and a one-sided comb is one too, hence the magnitude.
@@ -77,8 +79,8 @@ def cepstrum(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.float32]
     ----------
     spectrum : Spectrum
         Spectra, shape (..., bins).
-    mask : ndarray of bool, shape (..., bins)
-        True where the spectrum counts.
+    mask : ndarray of bool or float32, shape (..., bins)
+        True (or 1) where the spectrum counts.
 
     Returns
     -------
@@ -87,12 +89,11 @@ def cepstrum(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.float32]
     """
     level = np.maximum(spectrum.level_db, np.float32(0))
     np.minimum(level, np.float32(CLIP_DB), out=level)
-    kept = mask.astype(np.float32)
+    kept = weights(mask)
     level *= kept
-    count = np.maximum(np.count_nonzero(mask, axis=-1, keepdims=True), 1)
+    count = np.maximum(np.add.reduce(kept, axis=-1, keepdims=True), np.float32(1))
     mean = np.add.reduce(level, axis=-1, keepdims=True) / count
-    kept *= mean.astype(np.float32)
-    level -= kept
+    level -= kept * mean
     magnitude = np.abs(fft.rfft(level, axis=-1))
     magnitude /= noise_shape(spectrum.pulses, spectrum.bins)
     return magnitude
@@ -137,15 +138,15 @@ def _surroundings(count: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     return np.stack([start, stop]), (stop - start).astype(np.float64)
 
 
-def cepstral_chopping(spectrum: Spectrum, mask: NDArray[np.bool_]) -> Chopping:
+def cepstral_chopping(spectrum: Spectrum, mask: Mask) -> Chopping:
     """Estimate the chopping frequency (the paper's eq. 25) from the cepstrum.
 
     Parameters
     ----------
     spectrum : Spectrum
         Spectra, shape (..., bins).
-    mask : ndarray of bool, shape (..., bins)
-        From `notch_mask`: the body line must not take part.
+    mask : ndarray of bool or float32, shape (..., bins)
+        From `notch_mask` (or its `weights`): the body line must not take part.
 
     Returns
     -------
@@ -168,17 +169,18 @@ def cepstral_chopping(spectrum: Spectrum, mask: NDArray[np.bool_]) -> Chopping:
     highest = window.argmax(axis=-1)
     top, peak = first + highest, window[rows, highest]
     least = np.maximum(FUNDAMENTAL_SHARE * peak, FUNDAMENTAL_STRENGTH * rms)
-    best = top.copy()
-    for divisor in (2, 3, 4):  # the smallest strong one wins, so later divisors overrule
-        near = np.rint(top / divisor).astype(np.intp)
-        around = flat[rows, np.clip(near + _NEIGHBOURS, 0, flat.shape[1] - 1)]
-        ok = (near >= first) & (around.max(axis=0) >= least)
-        best = np.where(ok, near - 1 + around.argmax(axis=0), best)
-    best = np.clip(best, 1, flat.shape[1] - 2)
+    near = np.rint(top / _DIVISORS).astype(np.intp)
+    around = flat[rows, near + _NEIGHBOURS[:, None]]  # (neighbours, divisors, records)
+    ok = (near >= first) & (around.max(axis=0) >= least)
+    found = near - 1 + around.argmax(axis=0)
+    best = top
+    for number in range(len(_DIVISORS)):  # the smallest strong one wins, so later divisors overrule
+        best = np.where(ok[number], found[number], best)
+    best = np.minimum(np.maximum(best, 1), flat.shape[1] - 2)
     left, middle, right = flat[rows, best + _NEIGHBOURS]
     curve = 2 * middle - left - right
     offset = np.where(curve > 0, (right - left) / np.where(curve > 0, 2 * curve, 1), 0)
-    period = best + np.clip(offset, -0.5, 0.5)
+    period = best + np.minimum(np.maximum(offset, -0.5), 0.5)
     again = flat[rows, np.minimum(np.rint(_MULTIPLES * period).astype(np.intp), flat.shape[1] - 1)]
     strength = middle / np.where(rms > 0, rms, 1)
     repeats = (again[0] + again[1]) / 2 / np.where(middle > 0, middle, 1)
@@ -192,6 +194,8 @@ def cepstral_chopping(spectrum: Spectrum, mask: NDArray[np.bool_]) -> Chopping:
 def _median(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Median along the last axis, without NumPy's care for NaN."""
     count = values.shape[-1]
-    low, high = (count - 1) // 2, count // 2
-    ordered = np.partition(values, (low, high) if low < high else low, axis=-1)
-    return (ordered[..., low] + ordered[..., high]) / np.float32(2)
+    high = count // 2
+    ordered = np.partition(values, high, axis=-1)
+    if count % 2:
+        return ordered[..., high]
+    return (ordered[..., :high].max(axis=-1) + ordered[..., high]) / np.float32(2)

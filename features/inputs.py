@@ -15,6 +15,9 @@ from .vector import feature_vector
 #: Fewest pulses that leave anything to measure outside the notches.
 MIN_PULSES = 16
 
+#: Samples worked on at a time: scratch memory stays small whatever the batch.
+BLOCK_SAMPLES = 1 << 16
+
 
 def model_inputs(
     iq: ArrayLike, *, carrier_hz: float, prf_hz: float, names: Collection[str] = ("features", "spectrum")
@@ -47,6 +50,21 @@ def model_inputs(
     samples = np.asarray(iq, np.complex64)
     if samples.ndim < 1 or samples.shape[-1] < MIN_PULSES:
         raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least {MIN_PULSES} pulses")
+    high = max(1, BLOCK_SAMPLES // samples.shape[-1])
+    if samples.size <= high * samples.shape[-1]:
+        return _inputs(samples, carrier_hz, prf_hz, names)
+    flat = samples.reshape(-1, samples.shape[-1])
+    blocks = [_inputs(flat[i : i + high], carrier_hz, prf_hz, names) for i in range(0, len(flat), high)]
+    return {
+        name: np.concatenate([block[name] for block in blocks]).reshape(*samples.shape[:-1], *INPUT_SHAPES[name])
+        for name in blocks[0]
+    }
+
+
+def _inputs(
+    samples: NDArray[np.complex64], carrier_hz: float, prf_hz: float, names: Collection[str]
+) -> dict[str, NDArray[np.float32]]:
+    """The inputs of a batch that is worked on as a whole."""
     spectrum = doppler_spectrum(samples, carrier_hz=carrier_hz, prf_hz=prf_hz)
     out: dict[str, NDArray[np.float32]] = {}
     if "spectrum" in names or "features" in names:

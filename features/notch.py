@@ -16,6 +16,10 @@ NOTCH_MPS = 3.0
 LOBE_BINS = 5
 
 
+#: True, or 1, where a spectrum counts.
+Mask = NDArray[np.bool_] | NDArray[np.float32]
+
+
 @dataclass(frozen=True)
 class Body:
     """The strongest line of each spectrum.
@@ -58,7 +62,7 @@ def body_line(spectrum: Spectrum) -> Body:
     curve = 2 * middle - left - right
     offset = np.where(curve > 0, (right - left) / np.where(curve > 0, 2 * curve, 1), 0)
     step = spectrum.prf_hz / bins * spectrum.wavelength_m / 2
-    velocity = spectrum.velocity_mps[index] - np.clip(offset, -0.5, 0.5) * step
+    velocity = spectrum.velocity_mps[index] - np.minimum(np.maximum(offset, -0.5), 0.5) * step
     return Body(index, velocity.astype(np.float32), middle)
 
 
@@ -97,26 +101,34 @@ def _notches(bins: int, half: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]
     return np.abs(position[:bins] - bins // 2) > half, np.lib.stride_tricks.sliding_window_view(far, bins)
 
 
-def residual(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+def weights(mask: Mask) -> NDArray[np.float32]:
+    """A mask as numbers to multiply by: cheaper than choosing bin by bin."""
+    return mask.astype(np.float32, copy=False)
+
+
+def residual(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     """Power over the floor outside the notches, in units of the floor, shape (..., bins); 0 inside and below noise."""
-    return np.where(mask, np.maximum(spectrum.relative_power - np.float32(1), 0), np.float32(0))
+    excess = spectrum.relative_power - np.float32(1)
+    np.maximum(excess, np.float32(0), out=excess)
+    excess *= weights(mask)
+    return excess
 
 
-def notch_residual_db(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+def notch_residual_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     """Notch-residual energy: mean power outside the notches over the noise floor [dB].
 
     Parameters
     ----------
     spectrum : Spectrum
         Spectra, shape (..., bins).
-    mask : ndarray of bool, shape (..., bins)
-        From `notch_mask`.
+    mask : ndarray of bool or float32, shape (..., bins)
+        From `notch_mask`, or its `weights`.
 
     Returns
     -------
     ndarray of float32, shape (...)
         0 dB for noise alone; micro-Doppler lifts it.
     """
-    kept = np.maximum(np.count_nonzero(mask, axis=-1), 1)
-    mean = np.vecdot(spectrum.relative_power, mask.astype(np.float32)) / kept
-    return (10 * np.log10(np.maximum(mean, 1e-2))).astype(np.float32)
+    kept = weights(mask)
+    mean = np.vecdot(spectrum.relative_power, kept) / np.maximum(np.add.reduce(kept, axis=-1), np.float32(1))
+    return np.float32(10) * np.log10(np.maximum(mean, np.float32(1e-2)))

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .notch import Body
+from .notch import Body, Mask, weights
 from .spectrum import Spectrum
 
 #: Edges of the speed bands [m/s]: body and bird speeds below, limbs and wing tips between, blade tips above.
@@ -45,10 +45,11 @@ def entropy(energy: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.where(total[..., 0] > 0, bits, np.float32(1)).astype(np.float32)
 
 
-def ripple_db(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+def ripple_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     """Standard deviation of the level outside the notches [dB]: 5.6 for noise, more for lines, shape (...)."""
-    count = np.maximum(np.count_nonzero(mask, axis=-1), 1)
-    level = spectrum.level_db * mask.astype(np.float32)
+    kept = weights(mask)
+    count = np.maximum(np.add.reduce(kept, axis=-1), np.float32(1))
+    level = spectrum.level_db * kept
     mean = np.add.reduce(level, axis=-1) / count
     square = np.vecdot(level, level) / count
     return np.sqrt(np.maximum(square - mean**2, 0)).astype(np.float32)

@@ -11,7 +11,7 @@ from .axis import axis_velocities_mps
 from .bandwidth import energy_band_mps, noise_threshold_db, threshold_band_hz
 from .change import Parts, busy_db, centroid_mps, change_db
 from .chopping import cepstral_chopping
-from .notch import body_line, notch_mask, notch_residual_db, residual
+from .notch import body_line, notch_mask, notch_residual_db, residual, weights
 from .schema import FEATURES, FeatureTable
 from .shape import band_levels_db, entropy, ripple_db, symmetry
 from .smearing import smearing_index
@@ -97,10 +97,11 @@ def feature_vector(
     """
     body = body_line(spectrum)
     mask = notch_mask(spectrum, body)
-    excess = residual(spectrum, mask)
-    energy = np.where(spectrum.level_db > SIGNIFICANT_DB, excess, np.float32(0))
-    chopping = cepstral_chopping(spectrum, mask)
-    residual_db = notch_residual_db(spectrum, mask)
+    kept = weights(mask)
+    excess = residual(spectrum, kept)
+    energy = excess * (spectrum.level_db > SIGNIFICANT_DB)  # a choice bin by bin would cost ten times as much
+    chopping = cepstral_chopping(spectrum, kept)
+    residual_db = notch_residual_db(spectrum, kept)
 
     low_hz, high_hz = threshold_band_hz(spectrum, noise_threshold_db(spectrum.bins), mask)
     width_hz = high_hz - low_hz
@@ -137,7 +138,7 @@ def feature_vector(
         "energy_width_mps": high - low,
         "occupancy": occupancy,
         "entropy": entropy(energy),
-        "ripple_db": ripple_db(spectrum, mask),
+        "ripple_db": ripple_db(spectrum, kept),
         "peak_over_mean_db": 10 * np.log10(np.maximum(peak + 1, 1)) - residual_db,
         "symmetry": symmetry(spectrum, energy, body),
         "chopping_log": np.log10(np.maximum(chopping.frequency_hz, 1)),

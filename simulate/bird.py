@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .blades import TILE_SAMPLES, TINY
 from .laws import Draws
-from .motion import TWO_PI, range_phasor, straight_path
+from .motion import TWO_PI, range_phasor, reduce_phase, straight_path
 from .radar import Radar
 from .target import Target
 
@@ -51,8 +52,8 @@ def wing_size(mass_kg: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float
 
 
 def stroke_angles_rad(
-    cycle_rad: NDArray[np.float64], stroke_scale: ArrayLike = 1.0
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    cycle_rad: NDArray[np.floating], stroke_scale: ArrayLike = 1.0
+) -> tuple[NDArray[np.floating], NDArray[np.floating], NDArray[np.floating]]:
     """Angles of a two-part wing over the wingbeat cycle.
 
     Parameters
@@ -64,14 +65,14 @@ def stroke_angles_rad(
 
     Returns
     -------
-    inner, outer, sweep : ndarray, shape (..., pulses)
+    inner, outer, sweep : ndarray of the type of `cycle_rad`, shape (..., pulses)
         Elevation of the inner and of the outer part, and fore-aft sweep of the outer part [rad].
 
     References
     ----------
     Stroke 40 cos + 15, 30 cos + 40, 20 sin + 40 degrees: Journal of Electromagnetic Engineering and Science (2021).
     """
-    scale = np.asarray(stroke_scale, np.float64)[..., None]
+    scale = np.asarray(stroke_scale, cycle_rad.dtype)[..., None]
     cosine, sine = scale * np.cos(cycle_rad), scale * np.sin(cycle_rad)
     return np.deg2rad(40 * cosine + 15), np.deg2rad(30 * cosine + 40), np.deg2rad(20 * sine + 40)
 
@@ -111,33 +112,43 @@ def wing_echo(
     -------
     ndarray of complex64, shape (..., pulses)
     """
-    inner, outer, sweep = stroke_angles_rad(cycle_rad, stroke_scale)
-    part = np.asarray(half_span_m, np.float64)[..., None] / 2
-    k = TWO_PI / wavelength_m
-    forward, right, up = (sight[..., axis, None] for axis in range(3))
-    feather = np.asarray(feather_weight, np.float32)[..., None]
-    stroke = 1 + np.asarray(down_stroke, np.float64)[..., None] * np.sin(cycle_rad)
-    out = np.zeros(np.broadcast_shapes(cycle_rad.shape, part.shape), np.complex64)
-    for side in (1.0, -1.0):
-        along_inner = part * (side * right * np.cos(inner) + up * np.sin(inner))
-        along_outer = part * (
-            forward * np.sin(sweep) + np.cos(sweep) * (side * right * np.cos(outer) + up * np.sin(outer))
-        )
-        wrist, tip = along_inner, along_inner + along_outer
-        # A displacement towards the radar advances the phase by 2 k per metre.
-        out += np.sinc(k * along_inner / np.pi) * _cis(k * along_inner)
-        out += np.sinc(k * along_outer / np.pi) * _cis(k * (2 * wrist + along_outer))
-        out += feather * (_cis(2 * k * wrist) + _cis(2 * k * tip))
-    return out * stroke.astype(np.float32)
-
-
-def _cis(phase_rad: NDArray[np.float64]) -> NDArray[np.complex64]:
-    """exp(j phase) for phases of at most some thousand radians, which a wing's span bounds."""
-    phase = phase_rad.astype(np.float32)
-    out = np.empty(phase.shape, np.complex64)
-    np.cos(phase, out=out.real)
-    np.sin(phase, out=out.imag)
+    cycle = reduce_phase(cycle_rad)
+    inner, outer, sweep = stroke_angles_rad(cycle, stroke_scale)
+    k_part = (TWO_PI / wavelength_m / 2 * np.asarray(half_span_m, np.float64)[..., None]).astype(np.float32)
+    forward, right, up = (k_part * sight[..., axis, None].astype(np.float32) for axis in range(3))
+    feather, down = (np.asarray(x, np.float32)[..., None] for x in (feather_weight, down_stroke))
+    inner_right, inner_up = right * np.cos(inner), up * np.sin(inner)
+    back, across = forward * np.sin(sweep), np.cos(sweep)
+    outer_right, outer_up = across * right * np.cos(outer), back + across * up * np.sin(outer)
+    out = np.zeros(inner_right.shape, np.complex64)
+    for side in (np.float32(1), np.float32(-1)):
+        # A displacement towards the radar advances the phase by 2 k per metre, so by 2 x at the wrist and 2 y more at
+        # the tip; the middles of the parts are half as far.
+        inner_line, to_wrist = _line(inner_up + side * inner_right)
+        outer_line, to_tip = _line(outer_up + side * outer_right)
+        to_tip += 1
+        to_tip *= feather
+        outer_line += to_tip
+        outer_line *= to_wrist
+        out += inner_line
+        out += outer_line
+    out *= 1 + down * np.sin(cycle)
     return out
+
+
+def _line(phase_rad: NDArray[np.float32]) -> tuple[NDArray[np.complex64], NDArray[np.complex64]]:
+    """Echo of a line whose middle is at that phase, sinc(x) exp(jx), and the phasor exp(2jx) of its end.
+
+    A wing's span bounds the phase to some thousand radians, which float32 holds.
+    """
+    x = phase_rad + TINY
+    middle = np.empty(x.shape, np.complex64)
+    middle.real = np.cos(x)
+    middle.imag = sine = np.sin(x)
+    end = middle * middle
+    sine /= x
+    middle *= sine
+    return middle, end
 
 
 def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
@@ -184,8 +195,10 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
 
     micro = np.zeros((records, radar.pulses), np.complex64)
     body = np.zeros_like(micro)
-    for member in range(int(members.max())):
-        rows = np.flatnonzero(members > member)
+    high = max(1, TILE_SAMPLES // radar.pulses)
+    there = [np.flatnonzero(members > member) for member in range(int(members.max()))]
+    tiles = [(member, all_[i : i + high]) for member, all_ in enumerate(there) for i in range(0, len(all_), high)]
+    for member, rows in tiles:
         cycle = TWO_PI * rate[rows, member, None] * radar.times_s + phase[rows, member, None]
         flap = np.ones(len(rows))
         if kind == "gliding_bird":
@@ -201,7 +214,7 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
             feather_weight=feather[rows],
         )
         # the body rises and sinks against the wings, at the wingbeat
-        heave = (bob * sight[:, 2])[rows, None] * np.cos(cycle)
+        heave = (bob * sight[:, 2])[rows, None] * np.cos(reduce_phase(cycle))
         own = velocity[rows] + (spread[rows, member] if member else 0.0)
         path = straight_path(radar.times_s, own, acceleration[rows]) + heave
         moved = level[rows, member, None] * range_phasor(path, radar.wavelength_m)

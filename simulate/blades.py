@@ -20,7 +20,7 @@ from .motion import TWO_PI
 TILE_SAMPLES = 1 << 15
 
 #: Keeps sin(x) / x from 0 / 0 where cosines cancel; far below what a float32 of any other x resolves.
-_TINY = np.float32(1e-30)
+TINY = np.float32(1e-30)
 
 #: Least phase of a whole blade [rad]: a blade without length is a point, and sin(x) / x = 1.
 _LEAST_HALF = 1e-20
@@ -106,7 +106,7 @@ class Blades:
         for pair in range(maps.shape[1]):
             np.matmul(maps[:, pair], basis.swapaxes(0, 1), out=mapped.swapaxes(0, 1))
             x, y = mapped[0], mapped[1]
-            x += _TINY
+            x += TINY
             np.sin(x, out=sinc)
             sinc /= x
             for function, weight, total in parts:

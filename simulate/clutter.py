@@ -43,7 +43,7 @@ def billingsley(wind_mph: ArrayLike, carrier_hz: float) -> tuple[NDArray[np.floa
 
 
 def shaped_noise(
-    normals: Normals, radar: Radar, velocity_psd: NDArray[np.float64], velocities_mps: NDArray[np.float64]
+    normals: Normals, radar: Radar, velocity_psd: NDArray[np.floating], velocities_mps: NDArray[np.float64]
 ) -> NDArray[np.complex64]:
     """Complex Gaussian process of unit power with a given velocity spectrum.
 
@@ -156,14 +156,15 @@ _BRAGG_M_PER_S2 = 9.81 / (4 * np.pi)
 
 def _gaussian(
     v: NDArray[np.float64], mean_mps: NDArray[np.float64], width_mps: NDArray[np.float64], radar: Radar
-) -> NDArray[np.float64]:
+) -> NDArray[np.floating]:
     """Gaussian velocity spectrum wrapped onto the unambiguous span, shape (records, lines), unit sum."""
     span = 2 * radar.unambiguous_mps
     away = v[None, :] - mean_mps[:, None]
     away -= span * np.rint(away / span)
     step = np.abs(v[1]) if len(v) > 1 else span
     width = np.maximum(width_mps, step / 2)[:, None]  # never thinner than a line
-    psd = np.exp(-0.5 * (away / width) ** 2)
+    away /= width
+    psd = np.exp(np.float32(-0.5) * np.square(away.astype(np.float32)))
     return psd / psd.sum(axis=-1, keepdims=True)
 
 

@@ -5,6 +5,7 @@ Each is a handful of scatterers on known paths; they are the hard confusers, bec
 
 import numpy as np
 
+from .airframe import body_echo
 from .laws import Draws
 from .motion import TWO_PI, range_phasor, straight_path
 from .radar import Radar
@@ -28,7 +29,6 @@ BODY_POINTS, WHEEL_POINTS = 9, 8
 
 def draw_person(draws: Draws, radar: Radar) -> Target:
     """Draw a walker: a torso that sways and limbs whose speed swings about the torso's at the gait."""
-    t = radar.times_s
     speed, gait, phase = draws.value("person_mps"), draws.value("gait_hz"), draws.value("phase_rad")
     micro = np.zeros((len(draws), radar.pulses), np.complex64)
     body = np.zeros_like(micro)
@@ -36,20 +36,25 @@ def draw_person(draws: Draws, radar: Radar) -> Target:
         stretch = swing * (0.6 + 0.6 * draws.uniform())
         omega = TWO_PI * gait * (2 if number == 0 else 1)  # the torso bobs twice a stride
         offset = phase + TWO_PI * turns
-        away = (speed * stretch / omega)[:, None] * (
-            np.sin(omega[:, None] * t + offset[:, None]) - np.sin(offset)[:, None]
+        swing_rad = -2 * TWO_PI / radar.wavelength_m * speed * stretch / omega
+        level = amplitude * np.exp(0.3 * draws.normal())
+        body_echo(
+            radar,
+            len(draws),
+            velocity_mps=speed,
+            phase_rad=draws.value("phase_rad") - swing_rad * np.sin(offset),
+            vibration_rad=swing_rad,
+            vibration_hz=omega / TWO_PI,
+            vibration_phase_rad=offset,
+            amplitude=level,
+            out=body if number == 0 else micro,
         )
-        echo = range_phasor(straight_path(t, speed) + away, radar.wavelength_m)
-        level = (amplitude * np.exp(0.3 * draws.normal() + 1j * draws.value("phase_rad"))).astype(np.complex64)
-        part = body if number == 0 else micro
-        part += level[:, None] * echo
     truth = {"velocity_mps": speed, "gait_hz": gait}
     return Target(micro, body, 3 + 12 * draws.uniform(), truth=truth)
 
 
 def draw_vehicle(draws: Draws, radar: Radar) -> Target:
     """Draw a road vehicle: several body scatterers of slightly unlike radial speed, and wheels from 0 to 2 v."""
-    t = radar.times_s
     speed = draws.value("vehicle_mps") * draws.sign()
     # half of them drive steadily
     acceleration = draws.value("vehicle_acceleration_mps2") * np.where(draws.chance(0.5), 0.05, 1.0)
@@ -57,8 +62,9 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
     body = np.zeros((len(draws), radar.pulses), np.complex64)
     for _ in range(BODY_POINTS):
         own = speed * (1 - spread * draws.uniform())
-        level = np.exp(0.6 * draws.normal() + 1j * draws.value("phase_rad")).astype(np.complex64)
-        body += level[:, None] * range_phasor(straight_path(t, own, acceleration), radar.wavelength_m)
+        level, phase = np.exp(0.6 * draws.normal()), draws.value("phase_rad")
+        path = {"velocity_mps": own, "acceleration_mps2": acceleration}
+        body_echo(radar, len(draws), **path, phase_rad=phase, amplitude=level, out=body)
     radius = draws.value("wheel_radius_m")
     turn = speed / (TWO_PI * radius)
     wheels = np.zeros_like(body)
@@ -66,10 +72,20 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
         # a scatterer on the rim rolls: its speed along the road runs from 0 at the ground to 2 v at the top
         rim = radius * (0.5 + 0.5 * draws.uniform())
         phase = draws.value("phase_rad")
-        angle = TWO_PI * turn[:, None] * t + phase[:, None]
-        away = rim[:, None] * (np.sin(angle) - np.sin(phase)[:, None])
-        level = np.exp(0.4 * draws.normal() + 1j * draws.value("phase_rad")).astype(np.complex64)
-        wheels += level[:, None] * range_phasor(straight_path(t, speed, acceleration) + away, radar.wavelength_m)
+        rim_rad = -2 * TWO_PI / radar.wavelength_m * rim
+        level = np.exp(0.4 * draws.normal())
+        body_echo(
+            radar,
+            len(draws),
+            velocity_mps=speed,
+            acceleration_mps2=acceleration,
+            phase_rad=draws.value("phase_rad") - rim_rad * np.sin(phase),
+            vibration_rad=rim_rad,
+            vibration_hz=turn,
+            vibration_phase_rad=phase,
+            amplitude=level,
+            out=wheels,
+        )
     truth = {"velocity_mps": speed, "acceleration_mps2": acceleration, "rotation_hz": np.abs(turn)}
     return Target(wheels, body, -draws.value("wheel_db"), truth=truth)
 

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from bladewing.features import FEATURES, INPUT_SHAPES, JOINT_FEATURES, doppler_spectrum, model_inputs, schema_hash
+from bladewing.features import inputs as inputs_module
 from bladewing.features.change import frames
 from bladewing.features.joint import frame_length, stft_image
 from bladewing.features.schema import IMAGE_FRAMES
@@ -70,6 +71,18 @@ def test_batch_equals_loop():
         one = model_inputs(iq[i], **RADAR, names=ALL)
         for name in ALL:
             np.testing.assert_allclose(batch[name][i], one[name], rtol=1e-4, atol=1e-3)
+
+
+@pytest.mark.parametrize("names", [ALL, ("spectrum",)])
+def test_blocks_of_any_size_give_the_same(monkeypatch, names):
+    iq = np.stack([scene(seed) for seed in range(6)]).reshape(2, 3, PULSES)
+    whole = model_inputs(iq, **RADAR, names=names)
+    monkeypatch.setattr(inputs_module, "BLOCK_SAMPLES", 4 * PULSES + 1)
+    parts = model_inputs(iq, **RADAR, names=names)
+    assert list(parts) == list(whole)
+    for name in names:
+        assert parts[name].shape == (2, 3, *INPUT_SHAPES[name])
+        np.testing.assert_allclose(parts[name], whole[name], rtol=1e-4, atol=1e-3)
 
 
 def test_only_what_is_asked_for_is_computed():
