@@ -11,17 +11,17 @@ from .periodogram import LINE_DB, Periodogram
 
 #: Score that chance alone exceeds in under 1 % of the records: of white noise; where a line was taken out; where the
 #: static background was, with its skirt [nats]. Calibrated by tests/benchmarks/comb_false_alarms.py.
-THRESHOLDS = (13.0, 16.0, 22.0)
+THRESHOLDS = (13.0, 16.0, 25.0)
 
 #: A rotor's lines reach at least so far from the body [m/s]; wings, limbs and wheels seldom do with so few lines.
-LEAST_REACH_MPS = 9.0
+LEAST_REACH_MPS = 12.0
 
 #: A comb needs so many lines, at least.
 LEAST_LINES = 4
 
-#: Multiples of the mains, by their half period: a comb of these with a line at velocity zero is the supply's.
-MAINS_HZ = (50.0, 60.0, 100.0, 120.0)
-MAINS_SHARE = 0.004
+#: A comb of multiples of the mains with a line at velocity zero is taken for the supply's, this near to them, relative.
+MAINS_HZ = tuple(mains * multiple for mains in (50.0, 60.0) for multiple in (1, 2, 3, 4, 6))
+MAINS_SHARE = 0.005
 
 #: Every k-th line stronger than the others by this factor in power: unequal blades, k to a turn.
 UNEQUAL_FACTOR = 4.0
@@ -109,7 +109,8 @@ def find_comb(data: Periodogram) -> tuple[Comb | None, str]:
     if reach_mps < LEAST_REACH_MPS:
         return None, f"no rotor: lines reach {reach_mps:.1f} m/s, rotors {LEAST_REACH_MPS:.0f} m/s and more"
     spacing_hz = fit.spacing * data.prf_hz
-    on_zero = abs(fit.centre / fit.spacing - round(fit.centre / fit.spacing)) * fit.spacing * data.pulses < 1.0
+    off_zero = abs(fit.centre - fit.spacing * round(fit.centre / fit.spacing)) * data.pulses
+    on_zero = off_zero < max(0.2, 3 * fit.centre_std * data.pulses)
     if on_zero and any(abs(spacing_hz / mains - 1) < MAINS_SHARE for mains in MAINS_HZ):
         return None, f"no rotor: lines every {spacing_hz:.1f} Hz about velocity zero may be the mains"
     within = (fit.orders >= start.low) & (fit.orders <= start.high)

@@ -6,7 +6,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.ndimage import maximum_filter1d
 
 from .chopping import CHOPPING_RANGE_HZ
 from .periodogram import BLOCK_BINS, NEIGHBOUR_SHARE, Periodogram
@@ -33,6 +32,9 @@ LINE_CAP = 5.0
 
 #: What a comb whose sides reach unequally far must have more [nats].
 UNEVEN_COST = 4.0
+
+#: A comb counted from a stronger line a whole number of spacings away must keep this share of the evidence.
+SAME_COMB_SHARE = 0.6
 
 #: Fine steps to each side of a coarse spacing.
 FINE_STEPS = 8
@@ -104,6 +106,8 @@ def line_evidence(power: NDArray[np.float64], block: int) -> NDArray[np.float32]
     block : int
         Bins of a neighbourhood.
     """
+    from scipy.ndimage import maximum_filter1d  # here, because predicting needs no such import
+
     strongest = maximum_filter1d(power, block, mode="wrap")
     held = power / (1 + NEIGHBOUR_SHARE * np.maximum(strongest - 10, 0))
     held = np.minimum(held, 60.0).astype(np.float32)
@@ -236,4 +240,18 @@ def best_candidate(data: Periodogram) -> Candidate | None:
                 octaves = octaves[(octaves >= low) & (octaves <= high)]
                 for shift in np.arange(-1, 2) * 0.3 / data.pulses:
                     found += score(data, evidence, (octaves[:, None] * factors[::2]).ravel(), centre + shift)
-    return max(found, key=lambda c: c.score, default=None)
+    best = max(found, key=lambda c: c.score, default=None)
+    if best is None:
+        return None
+    # any line of a comb may pass for its centre: of lines a whole number of spacings apart the strongest is the body's
+    for centre in data.centres:
+        if centre == best.centre:
+            break
+        orders = (centre - best.centre) / best.spacing
+        if abs(orders - round(orders)) * best.spacing * data.pulses > 1.5:
+            continue
+        same = [c for c in found if c.centre == centre and abs(c.spacing / best.spacing - 1) < 0.01]
+        other = max(same, key=lambda c: c.score, default=best)
+        if other.score > SAME_COMB_SHARE * best.score:
+            return other
+    return best

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .bandwidth import threshold_band_hz
 from .chopping import Chopping
-from .comb import Comb, find_comb
+from .comb import LEAST_REACH_MPS, Comb, find_comb
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .periodogram import Periodogram, prepare
 from .rotor_band import fit_edge
@@ -187,16 +187,23 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     low, high = threshold_band_hz(spectrum, PAPER_THRESHOLD_DB)
     out["threshold_bandwidth_hz"] = float(high - low)
     comb, out["reason"] = find_comb(data)
+    prf_hz, wavelength_m = data.prf_hz, data.wavelength_m
+    if comb is not None:
+        edge, edge_std = _edge(data, comb, blades or 2)
+        edge_mps = edge * prf_hz * wavelength_m / 2
+        if edge_mps < LEAST_REACH_MPS:
+            comb, out["reason"] = (
+                None,
+                f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s",
+            )
     out |= _body(data, comb)
     if comb is None:
         return out
-    prf_hz, wavelength_m = data.prf_hz, data.wavelength_m
     chopping_hz = comb.chopping * prf_hz
     out["chopping_hz"], out["chopping_hz_std"] = chopping_hz, comb.chopping_std * prf_hz
     out["comb_order"] = float(np.abs(comb.fit.orders).max() // comb.per_turn)
     out["comb_snr_db"] = float(10 * np.log10(max(comb.fit.snr.sum() / data.pulses, 1e-9)))
 
-    edge, edge_std = _edge(data, comb, blades or 2)
     rotors = separate_rotors(data, comb, edge)
     count = len(rotors.rates)
     for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):

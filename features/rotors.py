@@ -23,6 +23,9 @@ RATE_SPREAD = 0.05
 LEAST_EVIDENCE = 14.0
 LEAST_SHARE = 0.03
 
+#: A comb weaker than this share of the strongest is what a rate that changed within the dwell leaves behind.
+LEAST_POWER_SHARE = 0.12
+
 #: Rates nearer than this are one: so many bins apart at the outermost order.
 RESOLVED_BINS = 0.9
 
@@ -100,6 +103,10 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
             break
         fit = fit_comb(rest, Candidate(float(rates[index]), evidence, -reach, reach, centre))
         if fit is None:
+            break
+        power = [float((np.abs(known.amplitudes) ** 2).sum()) for known in (*fits, fit)]
+        if power[-1] < LEAST_POWER_SHARE * max(power):
+            resolved = False
             break
         fits.append(fit)
         fits = _again(data, fits, centre, reach)
