@@ -84,6 +84,69 @@ def predict(
 
 
 @app.command()
+def measure(
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RECORDING",
+            help="SigMF (.sigmf-meta, .sigmf-data, their stem, or an archive .sigmf), .npy, .npz or .mat.",
+            show_default=False,
+        ),
+    ],
+    blades: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Blades of a rotor, if known.", show_default=False)
+    ] = None,
+    beta_deg: Annotated[
+        float | None,
+        typer.Option(
+            metavar="B",
+            help="Angle between line of sight and rotor plane [deg], 0 to below 90, if known.",
+            show_default=False,
+        ),
+    ] = None,
+    dwell: Annotated[float, typer.Option(metavar="SECONDS", help="Length of a dwell [s].")] = 0.08,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.svg", help="Draw the clearest dwell: spectrum, comb, band and notch."),
+    ] = None,
+    carrier_hz: Annotated[
+        float | None, typer.Option(metavar="F", help="Carrier [Hz], where the file does not say.")
+    ] = None,
+    prf_hz: Annotated[float | None, typer.Option(metavar="F", help="PRF [Hz], where the file does not say.")] = None,
+    variable: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Which array of an .npz or .mat file, if it holds several.")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="One JSON object a line: one a dwell, a closing one a recording.")
+    ] = False,
+) -> None:
+    """Measure the rotor in each dwell, with error bars: body velocity, chopping, single rotors, band, blade."""
+    from rich.console import Console
+
+    from . import measure as work
+
+    settings = work.Settings.checked(dwell_s=dwell, blades=blades, beta_deg=beta_deg)
+    unreadable = 0
+    clearest = None
+    for result in work.measured(recordings, settings, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable):
+        if isinstance(result, BadInput):
+            unreadable += 1
+            _complain(str(result))
+            continue
+        if as_json:
+            for line in result.json_objects():
+                print(json.dumps(line, allow_nan=False))
+        else:
+            result.print(Console(highlight=False))
+        sys.stdout.flush()
+        clearest = result.clearer(clearest)
+    if plot is not None and clearest is not None:
+        clearest.write_plot(plot)
+    if unreadable:
+        raise typer.Exit(2)
+
+
+@app.command()
 def train(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where the models and train.json go.")] = Path("out"),
     config: Annotated[

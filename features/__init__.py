@@ -1,6 +1,7 @@
 """From slow-time IQ to spectra, measurements and model inputs: arrays in, arrays out."""
 
 from .inputs import model_inputs
+from .measure import Measurements, measure
 from .schema import FEATURES, INPUT_SHAPES, JOINT_FEATURES, Feature, schema_hash
 from .spectrum import Spectrum, doppler_spectrum
 
@@ -9,8 +10,10 @@ __all__ = [
     "INPUT_SHAPES",
     "JOINT_FEATURES",
     "Feature",
+    "Measurements",
     "Spectrum",
     "doppler_spectrum",
+    "measure",
     "model_inputs",
     "schema_hash",
 ]

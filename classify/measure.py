@@ -1,0 +1,285 @@
+"""The work behind `bladewing measure`: recordings in, a table with error bars and one line of summary out."""
+
+import math
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from bladewing.features.measure import Measurements, measure
+
+from .errors import BadInput, one_line
+from .predict import checked_dwell_s, distinct
+from .recording import Recording, load_recording
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+#: What a dwell's JSON object holds beside its times and the reason, in this order.
+VALUES = (
+    "body_velocity_mps",
+    "body_velocity_mps_std",
+    "chopping_hz",
+    "chopping_hz_std",
+    "comb_order",
+    "comb_snr_db",
+    "rotor_count",
+    "smearing_index",
+    "bandwidth_hz",
+    "bandwidth_hz_std",
+    "threshold_bandwidth_hz",
+    "tip_speed_mps",
+    "tip_speed_mps_std",
+    "notch_residual_db",
+    "rotation_hz",
+    "rotation_hz_std",
+    "blade_length_m",
+    "blade_length_m_std",
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is asked of every recording.
+
+    Attributes
+    ----------
+    dwell_s
+        Length of a dwell [s].
+    blades
+        Blades of a rotor, if known.
+    beta_rad
+        Angle between line of sight and rotor plane [rad], if known.
+    """
+
+    dwell_s: float
+    blades: int | None
+    beta_rad: float | None
+
+    @classmethod
+    def checked(cls, *, dwell_s: float, blades: int | None, beta_deg: float | None) -> "Settings":
+        """Check the options of the command.
+
+        Raises
+        ------
+        BadInput
+            The dwell is not above 0, there is less than one blade, or beta is not in 0 to below 90 degrees.
+        """
+        if blades is not None and blades < 1:
+            raise BadInput(f"--blades is {blades}: it must be a whole number of at least 1")
+        if beta_deg is not None and not 0 <= beta_deg < 90:
+            raise BadInput(f"--beta-deg is {beta_deg:g}: it must be at least 0 and below 90 [deg]")
+        return cls(checked_dwell_s(dwell_s), blades, None if beta_deg is None else math.radians(beta_deg))
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What was measured in one recording.
+
+    Attributes
+    ----------
+    recording
+        As it was read.
+    iq
+        Its dwells, shape (dwells, pulses).
+    start_s, stop_s
+        Shape (dwells,): where each dwell begins and ends [s].
+    values
+        The measurements, shape (dwells,).
+    """
+
+    recording: Recording
+    iq: np.ndarray
+    start_s: np.ndarray
+    stop_s: np.ndarray
+    values: Measurements
+
+    def json_objects(self) -> Iterator[dict[str, Any]]:
+        """One object a dwell and a closing one; what has no value is null."""
+        for n in range(len(self.iq)):
+            rates = self.values.rotor_rates_hz[n]
+            yield {
+                "file": self.recording.name,
+                "start_s": round(float(self.start_s[n]), 9),
+                "stop_s": round(float(self.stop_s[n]), 9),
+                **{name: _number(getattr(self.values, name)[n]) for name in VALUES},
+                "rotor_rates_hz": [float(rate) for rate in rates[np.isfinite(rates)]],
+                "rotors_resolved": bool(self.values.rotors_resolved[n]),
+                "length_is_lower_bound": self.values.length_is_lower_bound,
+                "alternatives": self.values.alternatives((n,)),
+                "reason": str(self.values.reason[n]) or None,
+            }
+        yield {"file": self.recording.name, "recording": self.together()}
+
+    def together(self) -> dict[str, Any]:
+        """Medians over the dwells that hold a comb, and how many those are."""
+        held = np.isfinite(self.values.chopping_hz)
+        names = ("body_velocity_mps", "chopping_hz", "bandwidth_hz", "tip_speed_mps", "rotation_hz", "blade_length_m")
+        medians = {name: _number(np.median(getattr(self.values, name)[held])) if held.any() else None for name in names}
+        return {"dwells": len(self.iq), "with_comb": int(held.sum()), **medians}
+
+    def print(self, console: "Console") -> None:
+        """Write a table, one line a dwell, and the line of the recording."""
+        from rich.table import Table
+        from rich.text import Text
+
+        v = self.values
+        heads = ("start s", "body m/s", "chopping Hz", "rotors", "band Hz", "tip m/s")
+        table = Table(*heads, box=None, pad_edge=False, collapse_padding=True)
+        for column in table.columns:
+            column.justify, column.no_wrap = "right", True
+        console.print(Text(one_line(self.recording.name), style="bold"), soft_wrap=True)
+        silent: dict[str, int] = {}
+        for n in range(len(self.iq)):
+            reason = str(v.reason[n])
+            if reason:
+                short = reason.split(":")[0]
+                silent[short] = silent.get(short, 0) + 1
+                continue
+            count = f"{v.rotor_count[n]:.0f}" if v.rotors_resolved[n] else f">={v.rotor_count[n]:.0f}"
+            table.add_row(
+                f"{self.start_s[n]:.3f}",
+                with_error(v.body_velocity_mps[n], v.body_velocity_mps_std[n]),
+                with_error(v.chopping_hz[n], v.chopping_hz_std[n]),
+                count,
+                with_error(v.bandwidth_hz[n], v.bandwidth_hz_std[n]),
+                with_error(v.tip_speed_mps[n], v.tip_speed_mps_std[n]),
+            )
+        if table.row_count:
+            console.print(table)
+        for reason, dwells in silent.items():
+            console.print(Text(f"{dwells} dwells: {reason}"))
+        console.print(Text(self.sentence()), soft_wrap=True)
+
+    def sentence(self) -> str:
+        """The recording in one line: the answer an engineer wants."""
+        all_together = self.together()
+        if not all_together["with_comb"]:
+            return f"no rotor in {all_together['dwells']} dwells"
+        clear = self.clearest()
+        v = self.values
+        rates = v.rotor_rates_hz[clear]
+        rates = rates[np.isfinite(rates)]
+        turns = v.chopping_hz[clear] / v.rotation_hz[clear]
+        body = f"body {all_together['body_velocity_mps']:+.2f} m/s"
+        bound = "at least " if v.length_is_lower_bound else ""
+        if np.isfinite(turns):
+            rpm = ", ".join(f"{60 * rate / turns:.0f}" for rate in rates)
+            error_cm = 100 * v.blade_length_m_std[clear]
+            blade = f"blade {bound}{with_error(100 * v.blade_length_m[clear], error_cm)} cm"
+            rotor = f"{turns:.0f}-blade rotors at {rpm} rpm, {blade}"
+        else:
+            options = (
+                f"{c['blades']} x {c['rpm']:.0f} rpm ({bound}{100 * c['blade_length_m']:.1f} cm)"
+                for c in v.alternatives((clear,))[:4]
+            )
+            rotor = "blades x rate: " + " or ".join(options)
+        return f"comb in {all_together['with_comb']} of {all_together['dwells']} dwells; {rotor}; {body}"
+
+    def clearest(self) -> int:
+        """The dwell whose comb stands highest over the noise; the first one where there is none."""
+        snr = self.values.comb_snr_db
+        return int(np.nanargmax(snr)) if np.isfinite(snr).any() else 0
+
+    def clearer(self, other: "Measured | None") -> "Measured":
+        """Of two, the one whose clearest dwell is the clearer; the other where neither holds a comb."""
+        if other is None:
+            return self
+        mine, theirs = (np.nan_to_num(m.values.comb_snr_db[m.clearest()], nan=-np.inf) for m in (self, other))
+        return self if mine > theirs else other
+
+    def write_plot(self, path: str | os.PathLike[str]) -> None:
+        """Draw the clearest dwell as an SVG file.
+
+        Raises
+        ------
+        BadInput
+            The file cannot be written.
+        """
+        from .files import write_whole
+        from .measure_plot import spectrum_svg
+
+        n = self.clearest()
+        drawing = spectrum_svg(self.iq[n], self.recording, self.values, n)
+        try:
+            write_whole(path, drawing)
+        except OSError as error:
+            raise BadInput(f"--plot {path}: {error.strerror or error}: name a file in an existing folder") from error
+
+
+def with_error(value: float, std: float) -> str:
+    """A value and its standard deviation, to the deviation's second digit.
+
+    Examples
+    --------
+    >>> with_error(116.6671, 0.0123)
+    '116.667 +- 0.012'
+    >>> with_error(7220.4, 61.2)
+    '7220 +- 61'
+    """
+    if not (math.isfinite(value) and math.isfinite(std)):
+        return "-"
+    digits = 0 if std >= 9.5 else min(5, 1 - math.floor(math.log10(max(std, 1e-5))))
+    return f"{value:.{digits}f} +- {std:.{digits}f}"
+
+
+def measure_recording(recording: Recording, settings: Settings) -> Measured:
+    """Cut a recording into dwells and measure each.
+
+    Parameters
+    ----------
+    recording
+        One range cell. A rest shorter than a dwell is dropped, but a recording shorter than one dwell is taken whole.
+    settings
+        What is asked.
+
+    Raises
+    ------
+    BadInput
+        The recording holds fewer than 2 pulses.
+    """
+    if len(recording.iq) < 2:
+        raise BadInput(f"{recording.name}: 1 pulse: a measurement needs at least 2")
+    pulses = max(2, round(min(settings.dwell_s * recording.prf_hz, len(recording.iq))))
+    count = len(recording.iq) // pulses
+    iq = recording.iq[: count * pulses].reshape(count, pulses)
+    values = measure(
+        iq,
+        carrier_hz=recording.carrier_hz,
+        prf_hz=recording.prf_hz,
+        blades=settings.blades,
+        beta_rad=settings.beta_rad,
+    )
+    start_s = recording.start_s + np.arange(count) * pulses / recording.prf_hz
+    return Measured(recording, iq, start_s, start_s + pulses / recording.prf_hz, values)
+
+
+def measured(
+    paths: Iterable[Path],
+    settings: Settings,
+    *,
+    carrier_hz: float | None = None,
+    prf_hz: float | None = None,
+    variable: str | None = None,
+) -> Iterator[Measured | BadInput]:
+    """Measure recordings one after another; one that is bad gives its error instead and does not stop the others.
+
+    Parameters
+    ----------
+    paths, carrier_hz, prf_hz, variable
+        As for `bladewing.classify.recording.load_recording`.
+    settings
+        What is asked.
+    """
+    for path in distinct(paths):
+        try:
+            recording = load_recording(path, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable)
+            yield measure_recording(recording, settings)
+        except BadInput as error:
+            yield error
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if math.isfinite(value) else None

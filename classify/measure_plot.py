@@ -1,0 +1,88 @@
+"""One dwell's spectrum as SVG, with the comb, the band and the notch drawn on it."""
+
+import numpy as np
+from bladewing.features.measure import Measurements
+from bladewing.features.notch import NOTCH_MPS
+from bladewing.features.spectrum import doppler_spectrum
+
+from .errors import one_line
+from .recording import Recording
+
+_WIDTH, _HEIGHT, _LEFT, _BOTTOM, _TOP = 960, 420, 56, 44, 34
+
+
+def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, index: int) -> str:
+    """Draw a spectrum and what was measured in it.
+
+    Parameters
+    ----------
+    iq
+        One dwell, shape (pulses,).
+    recording
+        Where it comes from.
+    values
+        The recording's measurements, shape (dwells,).
+    index
+        Which dwell.
+    """
+    from xml.sax.saxutils import escape
+
+    spectrum = doppler_spectrum(iq, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
+    level = spectrum.level_db
+    frequency = spectrum.frequency_hz
+    low, high = float(frequency[0]), float(frequency[-1])
+    top_db = 10 * np.ceil(float(level.max()) / 10 + 0.2)
+    bottom_db = -10.0
+
+    def x(hz: float) -> float:
+        return _LEFT + (hz - low) / (high - low) * (_WIDTH - _LEFT - 12)
+
+    def y(db: float) -> float:
+        return _TOP + (top_db - db) / (top_db - bottom_db) * (_HEIGHT - _TOP - _BOTTOM)
+
+    base = y(bottom_db)
+    parts: list[str] = []
+
+    def band(first_hz: float, last_hz: float, colour: str, title: str) -> None:
+        a, b = x(max(first_hz, low)), x(min(last_hz, high))
+        if b > a:
+            parts.append(
+                f'<rect x="{a:.1f}" y="{_TOP}" width="{b - a:.1f}" height="{base - _TOP:.1f}" fill="{colour}">'
+                f"<title>{title}</title></rect>"
+            )
+
+    per_mps = 2 / spectrum.wavelength_m
+    body_hz = -float(values.body_velocity_mps[index]) * per_mps
+    chopping_hz, width_hz = float(values.chopping_hz[index]), float(values.bandwidth_hz[index])
+    if np.isfinite(width_hz):
+        band(body_hz - width_hz / 2, body_hz + width_hz / 2, "#dbe9f6", f"band {width_hz:.0f} Hz")
+    for centre_hz in {0.0, body_hz} if np.isfinite(body_hz) else {0.0}:
+        band(centre_hz - NOTCH_MPS * per_mps, centre_hz + NOTCH_MPS * per_mps, "#e6e6e6", "notch")
+    if np.isfinite(chopping_hz):
+        reach = int(values.comb_order[index])
+        for order in range(-reach, reach + 1):
+            hz = body_hz + order * chopping_hz
+            if low <= hz <= high:
+                parts.append(
+                    f'<path d="M{x(hz):.1f} {base:.1f}v6" stroke="#c0392b" stroke-width="1.2"/>'
+                    f'<path d="M{x(hz):.1f} {_TOP}V{base:.1f}" stroke="#c0392b" stroke-width="0.5" opacity="0.35"/>'
+                )
+    for db in np.arange(0, top_db + 1, 20):
+        parts.append(f'<path d="M{_LEFT} {y(db):.1f}H{_WIDTH - 12}" stroke="#ccc" stroke-width="0.5"/>')
+        parts.append(f'<text x="{_LEFT - 6}" y="{y(db) + 4:.1f}" text-anchor="end">{db:.0f}</text>')
+    points = " ".join(f"{x(f):.1f},{y(max(db, bottom_db)):.1f}" for f, db in zip(frequency, level, strict=True))
+    parts.append(f'<polyline points="{points}" fill="none" stroke="#1f4e79" stroke-width="0.9"/>')
+    for hz in np.linspace(low, high, 9):
+        parts.append(f'<text x="{x(hz):.1f}" y="{base + 20:.1f}" text-anchor="middle">{hz:.0f}</text>')
+    said = str(values.reason[index]) or f"comb every {chopping_hz:.2f} Hz, band {width_hz:.0f} Hz"
+    title = escape(one_line(f"{recording.name}: {said}"))
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" width="{_WIDTH}" '
+        f'height="{_HEIGHT}" font-family="sans-serif" font-size="11" fill="#222">\n'
+        f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="white"/>\n'
+        f'<text x="{_LEFT}" y="20" font-size="13">{title}</text>\n'
+        + "\n".join(parts)
+        + f'\n<text x="{_WIDTH / 2}" y="{_HEIGHT - 6}" text-anchor="middle">Doppler frequency [Hz]</text>\n'
+        f'<text transform="translate(14 {_HEIGHT / 2}) rotate(-90)" text-anchor="middle">level over noise [dB]</text>\n'
+        "</svg>\n"
+    )

@@ -1,0 +1,266 @@
+"""Measurements of a dwell with their standard deviations: body, chopping, single rotors, band, blade."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .bandwidth import threshold_band_hz
+from .chopping import Chopping
+from .comb import LEAST_REACH_MPS, Comb, find_comb
+from .notch import Body, body_line, notch_mask, notch_residual_db, residual
+from .periodogram import Periodogram, prepare
+from .rotor_band import fit_edge
+from .rotors import MAX_ROTORS, separate_rotors
+from .smearing import smearing_index
+from .spectrum import Spectrum, doppler_spectrum
+
+#: Threshold of the paper's bandwidth rule over the noise [dB]: it took 20 on measured data, 30 on simulated.
+PAPER_THRESHOLD_DB = 20.0
+
+#: Blade counts listed where none is given.
+BLADE_CHOICES = (1, 2, 3, 4, 5)
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """What `measure` found; every array has the batch's leading shape, NaN where there is no value.
+
+    Parameters
+    ----------
+    body_velocity_mps, body_velocity_mps_std : ndarray
+        Radial velocity of the body [m/s], positive when the range grows.
+    chopping_hz, chopping_hz_std : ndarray
+        Chopping frequency, blades x rotation rate [Hz].
+    comb_order : ndarray
+        Outermost order of chopping lines that speaks for the comb [1].
+    comb_snr_db : ndarray
+        Power of the comb's lines over the noise, a sample [dB].
+    rotor_rates_hz, rotor_rates_hz_std : ndarray, shape (..., MAX_ROTORS)
+        Chopping frequency of each single rotor, rising [Hz], padded with NaN.
+    rotor_count : ndarray
+        Rotors told apart; NaN without a comb.
+    rotors_resolved : ndarray of bool
+        False where rates lie nearer than the dwell tells apart: the count is then a lower bound.
+    smearing_index : ndarray
+        Relative spread of the rotor rates from the growth of the line width with the order [1].
+    bandwidth_hz, bandwidth_hz_std : ndarray
+        Doppler bandwidth f_max - f_min from the fitted edge of the line family [Hz] (the paper's eq. 26).
+    threshold_bandwidth_hz : ndarray
+        The same by the paper's rule: the range over a threshold of `PAPER_THRESHOLD_DB` [Hz].
+    tip_speed_mps, tip_speed_mps_std : ndarray
+        Blade tip speed [m/s]; its part along the line of sight, a lower bound, where beta is not given.
+    notch_residual_db : ndarray
+        Mean power outside the notches over the noise floor [dB].
+    rotation_hz, rotation_hz_std : ndarray
+        Rotation rate [Hz]; NaN where the number of blades is neither given nor seen in unequal lines.
+    blade_length_m, blade_length_m_std : ndarray
+        Blade length [m]; a lower bound where beta is not given. NaN where the rotation rate is.
+    length_is_lower_bound : bool
+        True where beta was not given.
+    reason : ndarray of str
+        Why there is no comb; empty where there is one.
+    """
+
+    body_velocity_mps: NDArray[np.float64]
+    body_velocity_mps_std: NDArray[np.float64]
+    chopping_hz: NDArray[np.float64]
+    chopping_hz_std: NDArray[np.float64]
+    comb_order: NDArray[np.float64]
+    comb_snr_db: NDArray[np.float64]
+    rotor_rates_hz: NDArray[np.float64]
+    rotor_rates_hz_std: NDArray[np.float64]
+    rotor_count: NDArray[np.float64]
+    rotors_resolved: NDArray[np.bool_]
+    smearing_index: NDArray[np.float64]
+    bandwidth_hz: NDArray[np.float64]
+    bandwidth_hz_std: NDArray[np.float64]
+    threshold_bandwidth_hz: NDArray[np.float64]
+    tip_speed_mps: NDArray[np.float64]
+    tip_speed_mps_std: NDArray[np.float64]
+    notch_residual_db: NDArray[np.float64]
+    rotation_hz: NDArray[np.float64]
+    rotation_hz_std: NDArray[np.float64]
+    blade_length_m: NDArray[np.float64]
+    blade_length_m_std: NDArray[np.float64]
+    length_is_lower_bound: bool
+    reason: NDArray[np.str_]
+
+    def alternatives(self, index: tuple[int, ...] = ()) -> list[dict[str, float]]:
+        """The {blades, rpm, blade_length_m} that a record's chopping frequency and band allow.
+
+        Parameters
+        ----------
+        index : tuple of int
+            Which record of the batch; () for a single one.
+
+        Returns
+        -------
+        list of dict
+            One entry where the rotation rate is known, one a blade count where it is not, none without a comb.
+        """
+        chopping = float(self.chopping_hz[index])
+        if not np.isfinite(chopping):
+            return []
+        rotation = float(self.rotation_hz[index])
+        choices = [round(chopping / rotation)] if np.isfinite(rotation) else list(BLADE_CHOICES)
+        tip = float(self.tip_speed_mps[index])
+        return [
+            {"blades": n, "rpm": 60 * chopping / n, "blade_length_m": tip * n / (2 * np.pi * chopping)} for n in choices
+        ]
+
+
+def measure(
+    iq: ArrayLike,
+    *,
+    carrier_hz: float,
+    prf_hz: float,
+    blades: int | None = None,
+    beta_rad: float | None = None,
+) -> Measurements:
+    """Measure the rotor in each record, or say why there is none.
+
+    Parameters
+    ----------
+    iq : array_like of complex, shape (..., pulses)
+        Slow-time samples of one range cell, any gain.
+    carrier_hz, prf_hz : float
+        Carrier and pulse repetition frequency [Hz], > 0.
+    blades : int, optional
+        Blades of a rotor, >= 1.
+    beta_rad : float, optional
+        Angle between the line of sight and the rotor plane [rad], 0 <= beta < pi/2.
+
+    Returns
+    -------
+    Measurements
+        Standard deviations hold for the model: steady rates within the dwell, white noise about each line.
+
+    Raises
+    ------
+    ValueError
+        If `iq` has fewer than 2 pulses or holds a value that is not finite, or an argument is out of its range.
+    """
+    if blades is not None and (blades != int(blades) or blades < 1):
+        raise ValueError(f"blades is {blades!r}: it must be a whole number of at least 1")
+    if beta_rad is not None and not 0 <= beta_rad < np.pi / 2:
+        raise ValueError(f"beta_rad is {beta_rad!r}: it must be at least 0 and below pi/2 [rad]")
+    samples = np.asarray(iq, np.complex64)
+    if not np.isfinite(samples).all():
+        raise ValueError("iq holds values that are not finite: cut them out or replace them by 0")
+    spectrum = doppler_spectrum(samples, carrier_hz=carrier_hz, prf_hz=prf_hz)
+    shape = samples.shape[:-1]
+    rows = []
+    for index in np.ndindex(shape):
+        rows.append(_measure_one(samples[index], _record(spectrum, index), blades, beta_rad))
+    columns = {}
+    for field in fields(Measurements):
+        if field.name != "length_is_lower_bound":
+            values = np.array([row[field.name] for row in rows])
+            extra = (MAX_ROTORS,) if field.name.startswith("rotor_rates") else ()
+            columns[field.name] = values.reshape((*shape, *extra))
+    return Measurements(**columns, length_is_lower_bound=beta_rad is None)
+
+
+def _record(spectrum: Spectrum, index: tuple[int, ...]) -> Spectrum:
+    return Spectrum(
+        spectrum.relative_power[index],
+        spectrum.floor[index],
+        spectrum.carrier_hz,
+        spectrum.prf_hz,
+        spectrum.pulses,
+        spectrum.scale[index],
+    )
+
+
+def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | None, beta_rad: float | None) -> dict:
+    """The numbers of one record, by the names of `Measurements`."""
+    out: dict = {field.name: np.nan for field in fields(Measurements)}
+    out["rotor_rates_hz"] = out["rotor_rates_hz_std"] = np.full(MAX_ROTORS, np.nan)
+    out["rotors_resolved"] = False
+    data = prepare(iq, carrier_hz=spectrum.carrier_hz, prf_hz=spectrum.prf_hz)
+    if data is None:
+        return out | {"reason": "no signal"}
+    body = body_line(spectrum)
+    mask = notch_mask(spectrum, body)
+    out["notch_residual_db"] = float(notch_residual_db(spectrum, mask))
+    low, high = threshold_band_hz(spectrum, PAPER_THRESHOLD_DB)
+    out["threshold_bandwidth_hz"] = float(high - low)
+    comb, out["reason"] = find_comb(data)
+    prf_hz, wavelength_m = data.prf_hz, data.wavelength_m
+    if comb is not None:
+        edge, edge_std = _edge(data, comb, blades or 2)
+        edge_mps = edge * prf_hz * wavelength_m / 2
+        if edge_mps < LEAST_REACH_MPS:
+            comb, out["reason"] = (
+                None,
+                f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s",
+            )
+    out |= _body(data, comb)
+    if comb is None:
+        return out
+    chopping_hz = comb.chopping * prf_hz
+    out["chopping_hz"], out["chopping_hz_std"] = chopping_hz, comb.chopping_std * prf_hz
+    out["comb_order"] = float(np.abs(comb.fit.orders).max() // comb.per_turn)
+    out["comb_snr_db"] = float(10 * np.log10(max(comb.fit.snr.sum() / data.pulses, 1e-9)))
+
+    rotors = separate_rotors(data, comb, edge)
+    count = len(rotors.rates)
+    for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):
+        padded = np.full(MAX_ROTORS, np.nan)
+        padded[:count] = values * prf_hz
+        out[name] = padded
+    out["rotor_count"], out["rotors_resolved"] = float(count), rotors.resolved
+    # unequal blades tell their number; between the lines of several rotors the weak ones may be something else
+    seen = comb.per_turn if comb.per_turn > 1 and count == 1 else None
+    known = blades if blades is not None else seen
+    out["bandwidth_hz"], out["bandwidth_hz_std"] = 2 * edge * prf_hz, 2 * edge_std * prf_hz
+    cosine = 1.0 if beta_rad is None else float(np.cos(beta_rad))
+    tip, tip_std = (value * prf_hz * wavelength_m / 2 / cosine for value in (edge, edge_std))
+    out["tip_speed_mps"], out["tip_speed_mps_std"] = tip, tip_std
+    if known is not None:
+        rotation = chopping_hz / known
+        out["rotation_hz"], out["rotation_hz_std"] = rotation, out["chopping_hz_std"] / known
+        length = tip / (2 * np.pi * rotation)
+        out["blade_length_m"] = length
+        out["blade_length_m_std"] = length * float(np.hypot(tip_std / tip, comb.chopping_std / comb.chopping))
+
+    centre_mps = np.float32(-comb.fit.centre * prf_hz * wavelength_m / 2)
+    energy = np.where(spectrum.level_db > 6.0, residual(spectrum, mask), np.float32(0))
+    nothing = np.float32(np.nan)
+    index = smearing_index(
+        spectrum,
+        energy,
+        Body(body.index, np.asarray(centre_mps), body.level_db),
+        Chopping(np.asarray(np.float32(chopping_hz)), np.asarray(nothing), np.asarray(nothing)),
+    )
+    out["smearing_index"] = float(index)
+    return out
+
+
+def _body(data: Periodogram, comb: Comb | None) -> dict[str, float]:
+    """The body's velocity: from its own line, or from the comb's centre where background may hide that line."""
+    own, level_db = data.centres[0], data.centres_db[0]
+    # the bound of a single line's frequency, and what its interpolation between bins is off by
+    snr = 10 ** (level_db / 10)
+    own_std = float(np.hypot(np.sqrt(1.5 / snr) / np.pi, 0.01)) / data.pulses
+    turns, std = own, own_std
+    if comb is not None:
+        offset = (own - comb.fit.centre) * data.pulses
+        if abs(offset) > 1.0 or comb.fit.centre_std < own_std:
+            turns, std = comb.fit.centre, comb.fit.centre_std
+    scale = data.prf_hz * data.wavelength_m / 2
+    return {"body_velocity_mps": -turns * scale, "body_velocity_mps_std": std * scale}
+
+
+def _edge(data: Periodogram, comb: Comb, blades: int) -> tuple[float, float]:
+    """Edge of the line family and its standard deviation [cycles a sample from the body], both sides together."""
+    order = np.arange(1, int(0.49 / comb.chopping) + 1)
+    away, power = [], []
+    for sign in (-1, 1):
+        frequency = comb.fit.centre + sign * order * comb.chopping
+        usable = data.usable(frequency)
+        away.append(order[usable] * comb.chopping)
+        power.append(data.at(frequency)[usable])
+    distance = np.concatenate(away)
+    return fit_edge(distance, np.concatenate(power), np.ones(len(distance)), comb.chopping / blades)

@@ -1,0 +1,93 @@
+import json
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from bladewing.classify.cli import main
+from bladewing.classify.measure import with_error
+from bladewing.simulate import RotorMotion, rotor_echo
+
+CARRIER_HZ, PRF_HZ, PULSES = 9.85e9, 35e3, 3000
+RADAR = ["--carrier-hz", "9.85e9", "--prf-hz", "35e3"]
+RATE_HZ, LENGTH_M, VELOCITY_MPS = 57.7, 0.15, -20.0
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("measure")
+    rng = np.random.default_rng(1)
+    times_s = np.arange(2 * PULSES) / PRF_HZ
+    wavelength_m = 299_792_458.0 / CARRIER_HZ
+    blades = rotor_echo(
+        RotorMotion(RATE_HZ).angle_rad(times_s), wavelength_m=wavelength_m, blade_length_m=LENGTH_M
+    ).astype(complex)
+    blades /= np.sqrt(np.mean(np.abs(blades) ** 2))
+    noise = (rng.standard_normal(2 * PULSES) + 1j * rng.standard_normal(2 * PULSES)) * np.sqrt(0.5)
+    moved = (blades + 10) * np.exp(-4j * np.pi * VELOCITY_MPS * times_s / wavelength_m)
+    np.save(path / "drone.npy", (moved + noise).astype(np.complex64))
+    np.save(path / "noise.npy", noise.astype(np.complex64))
+    return path
+
+
+def test_json_gives_a_line_a_dwell_and_one_a_recording(folder, capsys):
+    given = ["--json", "--dwell", "0.0857", "--blades", "2", "--beta-deg", "0"]
+    assert main(["measure", str(folder / "drone.npy"), *RADAR, *given]) == 0
+    *dwells, closing = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert len(dwells) == closing["recording"]["dwells"] == closing["recording"]["with_comb"] == 2
+    for dwell in dwells:
+        assert dwell["chopping_hz"] == pytest.approx(2 * RATE_HZ, abs=5 * dwell["chopping_hz_std"])
+        assert dwell["body_velocity_mps"] == pytest.approx(VELOCITY_MPS, abs=0.1)
+        assert dwell["blade_length_m"] == pytest.approx(LENGTH_M, rel=0.02)
+        assert not dwell["length_is_lower_bound"]
+        assert [a["blades"] for a in dwell["alternatives"]] == [2]
+        assert dwell["reason"] is None
+
+
+def test_noise_has_nulls_and_a_reason(folder, capsys):
+    assert main(["measure", str(folder / "noise.npy"), *RADAR, "--json"]) == 0
+    dwell, *_, closing = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert dwell["chopping_hz"] is None
+    assert dwell["rotor_rates_hz"] == dwell["alternatives"] == []
+    assert dwell["reason"].startswith("no comb")
+    assert closing["recording"]["with_comb"] == 0
+
+
+def test_the_table_says_rate_and_blade(folder, capsys):
+    assert main(["measure", str(folder / "drone.npy"), *RADAR, "--blades", "2"]) == 0
+    said = capsys.readouterr().out
+    assert "chopping Hz" in said
+    assert f"2-blade rotors at {60 * RATE_HZ:.0f} rpm, blade at least" in said
+    assert max(map(len, said.splitlines()[1:-1])) <= 80
+
+
+def test_the_plot_is_svg_with_the_comb_on_it(folder, tmp_path, capsys):
+    target = tmp_path / "drone.svg"
+    assert main(["measure", str(folder / "drone.npy"), *RADAR, "--plot", str(target)]) == 0
+    root = ET.fromstring(target.read_text())
+    assert root.tag.endswith("svg")
+    titles = [e.text for e in root.iter() if e.tag.endswith("title")]
+    assert "notch" in titles
+    assert any(t.startswith("band ") for t in titles)
+    assert sum(e.get("stroke") == "#c0392b" for e in root.iter()) > 20
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--beta-deg", "90"], "--beta-deg is 90"),
+        (["--blades", "0"], "blades"),
+        (["--dwell", "0"], "--dwell"),
+        (["--plot", "/nowhere/at/all.svg"], "--plot"),
+    ],
+)
+def test_bad_options_are_one_line_and_code_2(folder, capsys, options, said):
+    assert main(["measure", str(folder / "drone.npy"), *RADAR, *options]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert said in error
+
+
+def test_a_value_is_written_to_the_second_digit_of_its_error():
+    assert with_error(0.123456, 0.0456) == "0.123 +- 0.046"
+    assert with_error(12345.6, 789) == "12346 +- 789"
+    assert with_error(1.0, float("nan")) == "-"

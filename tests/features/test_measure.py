@@ -1,0 +1,169 @@
+import numpy as np
+import pytest
+from bladewing.features import measure
+from bladewing.features.comb import find_comb, strong_multiple
+from bladewing.features.periodogram import prepare
+from bladewing.features.rotor_band import expected_power, fit_edge
+from bladewing.features.slow_lines import remove_bands, slepian
+
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
+
+RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+
+
+def drone(rates_hz, *, snr_db=0.0, seed=0, **options):
+    noise = white(np.random.default_rng(seed), PULSES)
+    return rotors(rates_hz, **options) * 10 ** (snr_db / 20) + noise
+
+
+@pytest.mark.parametrize(("rate_hz", "velocity_mps"), [(58.61, -20.0), (43.27, 7.3), (101.9, 0.0)])
+def test_chopping_is_within_its_own_error_bar(rate_hz, velocity_mps):
+    found = measure(drone([rate_hz], velocity_mps=velocity_mps, body=10.0), **RADAR)
+    assert abs(found.chopping_hz - 2 * rate_hz) < 4 * found.chopping_hz_std
+    assert found.chopping_hz_std < 0.03  # [Hz]; the bin is 11.7 Hz
+    assert found.body_velocity_mps == pytest.approx(velocity_mps, abs=0.1)
+    assert found.reason == ""
+    assert found.rotor_count == 1
+
+
+def test_normalised_errors_have_unit_variance():
+    rng = np.random.default_rng(5)
+    errors = []
+    for seed in range(40):
+        rate_hz = rng.uniform(45, 110)
+        found = measure(drone([rate_hz], snr_db=-8, seed=seed, velocity_mps=rng.uniform(-25, 25)), **RADAR)
+        errors.append((found.chopping_hz - 2 * rate_hz) / found.chopping_hz_std)
+    # chi-squared of 40 degrees of freedom over 40 lies within 0.5..1.75 in 99.7 %
+    assert 0.5 < np.mean(np.square(errors)) < 1.75
+
+
+def test_a_body_line_50_db_up_does_not_hide_the_comb():
+    rate_hz = 57.3
+    found = measure(drone([rate_hz], velocity_mps=12.0, body=10**2.5), **RADAR)
+    assert found.chopping_hz == pytest.approx(2 * rate_hz, rel=1e-3)
+
+
+def test_bandwidth_tip_and_blade_follow_eq_26():
+    rate_hz, length_m = 58.61, 0.15
+    found = measure(drone([rate_hz], length_m=length_m, velocity_mps=3.0), **RADAR, blades=2, beta_rad=0.0)
+    tip_mps = 2 * np.pi * rate_hz * length_m
+    assert found.bandwidth_hz == pytest.approx(4 * tip_mps / WAVELENGTH_M, rel=0.02)
+    assert found.tip_speed_mps == pytest.approx(tip_mps, rel=0.02)
+    assert found.rotation_hz == pytest.approx(rate_hz, rel=1e-3)
+    assert found.blade_length_m == pytest.approx(length_m, rel=0.02)
+    assert not found.length_is_lower_bound
+    # half the band at 60 degrees, and the same blade once beta is told
+    tilted = drone([rate_hz], length_m=length_m * np.cos(np.pi / 3), velocity_mps=3.0)
+    told = measure(tilted, **RADAR, blades=2, beta_rad=np.pi / 3)
+    assert told.blade_length_m == pytest.approx(length_m, rel=0.04)
+    assert measure(tilted, **RADAR, blades=2).length_is_lower_bound
+
+
+def test_without_blades_there_are_alternatives_instead_of_a_rate():
+    found = measure(drone([58.61]), **RADAR)
+    assert np.isnan(found.rotation_hz)
+    rpm = {choice["blades"]: choice["rpm"] for choice in found.alternatives()}
+    assert rpm[2] == pytest.approx(60 * 58.61, rel=1e-3)
+    assert rpm[1] == pytest.approx(2 * rpm[2])
+
+
+@pytest.mark.parametrize(
+    "iq",
+    [
+        np.zeros(PULSES),
+        np.ones(PULSES),
+        tone(1234.0),
+        100 * tone(1234.0) + white(np.random.default_rng(1), PULSES),
+        100 * tone(1234.0) + 50 * tone(-4000.0) + white(np.random.default_rng(2), PULSES),
+        white(np.random.default_rng(3), PULSES),
+        white(np.random.default_rng(3), 40),
+    ],
+    ids=["silence", "constant", "a line", "a line in noise", "two lines", "noise", "short"],
+)
+def test_where_there_is_no_comb_there_is_a_reason_and_no_number(iq):
+    found = measure(iq, **RADAR)
+    assert found.reason != ""
+    for name in ("chopping_hz", "bandwidth_hz", "tip_speed_mps", "rotor_count", "smearing_index", "blade_length_m"):
+        assert np.isnan(getattr(found, name))
+    assert np.isnan(found.rotor_rates_hz).all()
+    assert found.alternatives() == []
+
+
+def test_mains_harmonics_are_no_rotor():
+    times_s = np.arange(PULSES) / PRF_HZ
+    hum = sum(np.exp(2j * np.pi * 100 * order * times_s + 1j * order) for order in range(-30, 31))
+    found = measure(hum + white(np.random.default_rng(0), PULSES), **RADAR)
+    assert "mains" in str(found.reason)
+
+
+def test_a_batch_gives_what_a_loop_gives():
+    batch = np.stack([drone([58.6]), white(np.random.default_rng(4), PULSES), drone([80.2, 81.3], seed=2)])
+    together = measure(batch, **RADAR)
+    for index, iq in enumerate(batch):
+        alone = measure(iq, **RADAR)
+        for name in ("chopping_hz", "bandwidth_hz", "rotor_rates_hz", "body_velocity_mps", "reason"):
+            np.testing.assert_array_equal(getattr(together, name)[index], getattr(alone, name))
+
+
+def test_gain_phase_time_reversal_and_scale():
+    iq = drone([58.61], velocity_mps=-9.0)
+    base = measure(iq, **RADAR)
+    turned = measure(iq * 32 * np.exp(1j), **RADAR)
+    assert turned.chopping_hz == pytest.approx(base.chopping_hz, rel=1e-6)
+    # time reversed: Doppler changes sign, the chopping stays
+    back = measure(iq[::-1], **RADAR)
+    assert back.chopping_hz == pytest.approx(base.chopping_hz, abs=2 * base.chopping_hz_std)
+    assert back.body_velocity_mps == pytest.approx(-base.body_velocity_mps, abs=0.02)
+    # carrier and PRF doubled: the same samples mean twice the rates at the same speeds
+    scaled = measure(iq, carrier_hz=2 * CARRIER_HZ, prf_hz=2 * PRF_HZ)
+    assert scaled.chopping_hz == pytest.approx(2 * base.chopping_hz, rel=1e-6)
+    assert scaled.tip_speed_mps == pytest.approx(base.tip_speed_mps, rel=1e-6)
+    assert scaled.body_velocity_mps == pytest.approx(base.body_velocity_mps, rel=1e-6)
+
+
+def test_rotors_20_rpm_apart_are_told_apart_and_like_ones_are_not():
+    rates_hz = np.array([3395.0, 3431.0, 3464.0, 3500.0]) / 60
+    found = measure(drone(rates_hz, snr_db=3, velocity_mps=5.0, body=10.0), **RADAR)
+    assert found.rotor_count == 4
+    np.testing.assert_allclose(found.rotor_rates_hz[:4], 2 * rates_hz, rtol=2e-3)
+    assert np.isnan(found.rotor_rates_hz[4:]).all()
+    assert measure(drone([58.0, 58.0]), **RADAR).rotor_count == 1
+
+
+def test_strong_lines_of_unequal_blades():
+    orders = np.arange(-20, 21)
+    power = np.where(orders % 2 == 0, 100.0, 5.0)
+    assert strong_multiple(orders, power) == 2
+    assert strong_multiple(orders, np.full(41, 50.0)) == 1
+
+
+def test_bad_arguments_are_refused():
+    iq = drone([58.0])
+    for wrong in ({"blades": 0}, {"blades": 1.5}, {"beta_rad": np.pi / 2}, {"beta_rad": -0.1}):
+        with pytest.raises(ValueError, match="must be"):
+            measure(iq, **RADAR, **wrong)
+    with pytest.raises(ValueError, match="not finite"):
+        measure(np.where(np.arange(PULSES) == 5, np.nan, iq), **RADAR)
+
+
+def test_slepian_sequences_take_out_a_band_and_leave_the_rest():
+    basis = slepian(600, 3.0)
+    np.testing.assert_allclose(basis @ basis.T, np.eye(len(basis)), atol=1e-9)
+    time = np.arange(600)
+    inside, outside = np.exp(2j * np.pi * 0.1012 * time), np.exp(2j * np.pi * 0.15 * time)
+    assert np.mean(np.abs(remove_bands(1e4 * inside, [(0.1, 3.0), (0.3, 3.0)])) ** 2) < 1e-4
+    assert np.mean(np.abs(remove_bands(outside, [(0.1, 3.0)])) ** 2) > 0.9
+
+
+def test_the_edge_of_an_ideal_family_is_found():
+    away = np.arange(1, 60) * 117.0
+    power = 1 + 300 * expected_power(away, np.array(3610.0), 58.5)
+    edge, std = fit_edge(away, power, np.ones(59), 58.5)
+    assert edge == pytest.approx(3610, rel=0.01)
+    assert 0 < std < 117
+
+
+def test_evidence_needs_more_than_chance():
+    noise = white(np.random.default_rng(8), 30, 1500)
+    combs = [find_comb(prepare(iq.astype(np.complex64), **RADAR))[0] for iq in noise]
+    assert sum(comb is not None for comb in combs) <= 2
