@@ -278,12 +278,14 @@ def _versions() -> dict[str, str]:
 
 
 def _print_table(account: dict[str, Any], out: Path) -> None:
+    from rich import box
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title=f"{account['records']['test']} test records, looked at once", title_justify="left")
+    title = f"{account['records']['test']} test records, looked at once"
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("model", no_wrap=True)
-    for column in ("accuracy", "UAV found", "named", "right", "false UAV", "ECE", "kB", "s"):
+    for column in ("accuracy", "found", "false", "named", "right", "ECE", "kB", "s"):
         table.add_column(column, justify="right", no_wrap=True)
     for name, model in account["models"].items():
         figures = model["test"]
@@ -292,9 +294,9 @@ def _print_table(account: dict[str, Any], out: Path) -> None:
             name,
             f"{figures['balanced_accuracy']:.3f}",
             f"{figures['uav_detection']:.3f}",
-            f"{figures['named_share']:.0%}",
+            f"{figures['false_uav']:.3f}",
+            f"{figures['named_share']:.3f}",
             "-" if right is None else f"{right:.3f}",
-            f"{figures['false_uav']:.1%}",
             f"{figures['expected_calibration_error']:.3f}",
             f"{model['bytes'] / 1000:.0f}",
             f"{model['seconds']:.0f}",
@@ -302,11 +304,11 @@ def _print_table(account: dict[str, Any], out: Path) -> None:
     console = Console(highlight=False)
     console.print(table)
     console.print(
-        "accuracy: balanced over the three classes; radars from 2 to 100 GHz, dwells from 5 ms,\n"
-        "  SNR from -20 dB, so that many records hold nothing to see\n"
-        f"UAV found: at {account['false_alarm']:.0%} of birds and clutter called UAV\n"
-        "named, right: share not answered 'unknown', and how many of these are right\n"
-        "false UAV: share of the birds and the clutter that is named UAV\n"
-        "ECE: expected calibration error of the probabilities"
+        "accuracy  balanced over the classes; radars of 2 to 100 GHz, dwells from 5 ms,\n"
+        "          SNR from -20 dB: many records hold nothing to see\n"
+        f"found     UAVs found where {account['false_alarm']:.0%} of birds and clutter would be called UAV\n"
+        "false     birds and clutter that are named UAV\n"
+        "named     records not answered 'unknown'; right: how many of these are right\n"
+        "ECE       expected calibration error of the probabilities"
     )
     console.print(f"Models and {ACCOUNT} are in {out}; trained in {account['seconds']['all']:.0f} s.", soft_wrap=True)
