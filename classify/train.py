@@ -278,12 +278,11 @@ def _versions() -> dict[str, str]:
 
 
 def _print_table(account: dict[str, Any], out: Path) -> None:
-    from rich import box
     from rich.console import Console
     from rich.table import Table
 
     title = f"{account['records']['test']} test records, looked at once"
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
     table.add_column("model", no_wrap=True)
     for column in ("accuracy", "found", "false", "named", "right", "ECE", "kB", "s"):
         table.add_column(column, justify="right", no_wrap=True)
