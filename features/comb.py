@@ -10,7 +10,7 @@ from .comb_search import best_candidate
 from .periodogram import LINE_DB, Periodogram
 
 #: Score that chance alone exceeds in under 1 % of the records: of white noise; where a line was taken out; where the
-#: static background was, with its skirt [nats]. Calibrated by tests/benchmarks/comb_false_alarms.py.
+#: static background was, with its skirt [nats]. Checked by tests/benchmarks/measurement_tables.py.
 THRESHOLDS = (13.0, 16.0, 25.0)
 
 #: A rotor's lines reach at least so far from the body [m/s]; wings, limbs and wheels seldom do with so few lines.

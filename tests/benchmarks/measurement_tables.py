@@ -15,7 +15,7 @@ from bladewing.features import measure
 
 def chopping(draws: int) -> None:
     """Chopping frequency against the Cramer-Rao bound; octave errors; truth of the stated deviations."""
-    print(f"chopping, {draws} draws a row, rates 40-110 Hz, 2 blades of 15 cm, |v| < 30 m/s; ground moves at 0 m/s")
+    print(f"chopping, {draws} draws a row, rates 40-110 Hz, 2 blades of 15 cm, |v| < 30 m/s")
     print(" SNR  body ground | found  within 2%  octave err | RMSE/bound  normalised variance   ms")
     for snr_db, body_db, ground_db in (
         (-16, 20, None),
