@@ -10,7 +10,7 @@ from .comb_search import best_candidate
 from .periodogram import LINE_DB, Periodogram
 
 #: Score that chance alone exceeds in under 1 % of the records: of white noise; where a line was taken out; where the
-#: static background was, with its skirt [nats]. Calibrated by tests/benchmarks/comb_false_alarms.py.
+#: static background was, with its skirt [nats]. Checked by tests/benchmarks/measurement_tables.py.
 THRESHOLDS = (13.0, 16.0, 25.0)
 
 #: A rotor's lines reach at least so far from the body [m/s]; wings, limbs and wheels seldom do with so few lines.
@@ -19,8 +19,9 @@ LEAST_REACH_MPS = 12.0
 #: A comb needs so many lines, at least.
 LEAST_LINES = 4
 
-#: A comb of multiples of the mains with a line at velocity zero is taken for the supply's, this near to them, relative.
-MAINS_HZ = tuple(mains * multiple for mains in (50.0, 60.0) for multiple in (1, 2, 3, 4, 6))
+#: A comb whose lines all lie on multiples of the mains is taken for the supply's, this near to them, relative.
+MAINS_HZ = (50.0, 60.0)
+MAINS_MULTIPLES = (1, 2, 3, 4, 6)
 MAINS_SHARE = 0.005
 
 #: Every k-th line stronger than the others by this factor in power: unequal blades, k to a turn.
@@ -75,6 +76,17 @@ def strong_multiple(orders: NDArray[np.intp], power: NDArray[np.float64]) -> int
     return best
 
 
+def of_mains(fit: CombFit, data: Periodogram) -> bool:
+    """True where spacing and centre of a comb are both multiples of the mains, and with them every line."""
+    for mains_hz in MAINS_HZ:
+        multiple = round(fit.spacing * data.prf_hz / mains_hz)
+        if multiple in MAINS_MULTIPLES and abs(fit.spacing * data.prf_hz / (multiple * mains_hz) - 1) < MAINS_SHARE:
+            base = fit.spacing / multiple
+            off = abs(fit.centre - base * round(fit.centre / base)) * data.pulses
+            return off < max(0.2, 3 * fit.centre_std * data.pulses)
+    return False
+
+
 def threshold(data: Periodogram) -> float:
     """Score a comb must exceed in this record [nats]."""
     if data.rest_half > 0:
@@ -108,11 +120,8 @@ def find_comb(data: Periodogram) -> tuple[Comb | None, str]:
     reach_mps = max(start.high, -start.low) * fit.spacing * data.prf_hz * data.wavelength_m / 2
     if reach_mps < LEAST_REACH_MPS:
         return None, f"no rotor: lines reach {reach_mps:.1f} m/s, rotors {LEAST_REACH_MPS:.0f} m/s and more"
-    spacing_hz = fit.spacing * data.prf_hz
-    off_zero = abs(fit.centre - fit.spacing * round(fit.centre / fit.spacing)) * data.pulses
-    on_zero = off_zero < max(0.2, 3 * fit.centre_std * data.pulses)
-    if on_zero and any(abs(spacing_hz / mains - 1) < MAINS_SHARE for mains in MAINS_HZ):
-        return None, f"no rotor: lines every {spacing_hz:.1f} Hz about velocity zero may be the mains"
+    if of_mains(fit, data):
+        return None, f"no rotor: lines every {fit.spacing * data.prf_hz:.1f} Hz may be the mains"
     within = (fit.orders >= start.low) & (fit.orders <= start.high)
     fit = replace(fit, orders=fit.orders[within], amplitudes=fit.amplitudes[within], snr=fit.snr[within])
     power = np.abs(fit.amplitudes) ** 2 * data.pulses / data.level_at(fit.centre + fit.spacing * fit.orders)

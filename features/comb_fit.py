@@ -17,6 +17,9 @@ SMOOTHED_ORDERS = 2
 #: Lines beyond the outermost that speak for the comb, fitted with it: what they hold must not leak into the others.
 MARGIN_ORDERS = 3
 
+#: The level under the lines is not taken to be below this share of the record's floor: the fit takes noise out too.
+LEAST_LEVEL = 0.8
+
 
 @dataclass(frozen=True)
 class CombFit:
@@ -113,7 +116,7 @@ def fit_comb(data: Periodogram, start: Candidate) -> CombFit | None:
         frequency = centre + spacing * orders
         lines = line_matrix(pulses, centre, spacing, orders)
         # what the lines leak lifts the level between them: once they are fitted, it is taken from what they leave
-        level = data.level_at(frequency) if number == 0 else data.level_of(rest)(frequency)
+        level = data.level_at(frequency) if number == 0 else np.maximum(data.level_of(rest)(frequency), LEAST_LEVEL)
         seen = lines.conj() @ data.samples / pulses
         power = np.abs(seen) ** 2 * pulses / level
         snr = np.maximum(smoothed(power, orders) - 1, 1e-3)

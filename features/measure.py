@@ -189,7 +189,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     comb, out["reason"] = find_comb(data)
     prf_hz, wavelength_m = data.prf_hz, data.wavelength_m
     if comb is not None:
-        edge, edge_std = _edge(data, comb, blades or 2)
+        edge, edge_std = _edge(data, comb, np.array([comb.chopping]), blades or 2)
         edge_mps = edge * prf_hz * wavelength_m / 2
         if edge_mps < LEAST_REACH_MPS:
             comb, out["reason"] = (
@@ -206,6 +206,8 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
 
     rotors = separate_rotors(data, comb, edge)
     count = len(rotors.rates)
+    if count > 1:
+        edge, edge_std = _edge(data, comb, rotors.rates, blades or 2)
     for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):
         padded = np.full(MAX_ROTORS, np.nan)
         padded[:count] = values * prf_hz
@@ -253,14 +255,18 @@ def _body(data: Periodogram, comb: Comb | None) -> dict[str, float]:
     return {"body_velocity_mps": -turns * scale, "body_velocity_mps_std": std * scale}
 
 
-def _edge(data: Periodogram, comb: Comb, blades: int) -> tuple[float, float]:
-    """Edge of the line family and its standard deviation [cycles a sample from the body], both sides together."""
-    order = np.arange(1, int(0.49 / comb.chopping) + 1)
+def _edge(data: Periodogram, comb: Comb, rates: NDArray[np.float64], blades: int) -> tuple[float, float]:
+    """Edge of the line family and its standard deviation [cycles a sample from the body], both sides together.
+
+    Each line's power is the mean over the single rotors' lines of that order, since they part at the outer orders.
+    """
+    fastest = float(rates.max())
+    order = np.arange(1, int(0.49 / fastest) + 1)
     away, power = [], []
     for sign in (-1, 1):
-        frequency = comb.fit.centre + sign * order * comb.chopping
-        usable = data.usable(frequency)
-        away.append(order[usable] * comb.chopping)
-        power.append(data.at(frequency)[usable])
+        frequency = comb.fit.centre + sign * order[:, None] * rates
+        usable = data.usable(frequency).all(axis=1)
+        away.append(order[usable] * fastest)
+        power.append(data.at(frequency)[usable].mean(axis=1))
     distance = np.concatenate(away)
-    return fit_edge(distance, np.concatenate(power), np.ones(len(distance)), comb.chopping / blades)
+    return fit_edge(distance, np.concatenate(power), np.full(len(distance), float(len(rates))), fastest / blades)

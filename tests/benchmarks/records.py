@@ -1,0 +1,59 @@
+"""Records that the tables of measurements are made of: 3000 pulses at 35 kHz and 9.85 GHz, rates off the bin."""
+
+import numpy as np
+from bladewing.simulate import RotorMotion, rotor_echo
+
+CARRIER_HZ, PRF_HZ, PULSES = 9.85e9, 35e3, 3000
+RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+WAVELENGTH_M = 299_792_458.0 / CARRIER_HZ
+TIMES_S = np.arange(PULSES) / PRF_HZ
+
+
+def white(rng: np.random.Generator, *shape: int) -> np.ndarray:
+    """Complex noise of unit power a sample."""
+    return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) * np.sqrt(0.5)
+
+
+def rotors(rng: np.random.Generator, rates_hz: np.ndarray, *, length_m: float = 0.15, blades: int = 2) -> np.ndarray:
+    """Blades of equal rotors of random phases, unit power a sample together."""
+    echo = np.zeros(PULSES, complex)
+    for rate_hz in rates_hz:
+        angle = RotorMotion(rate_hz, rng.uniform(0, 2 * np.pi)).angle_rad(TIMES_S)
+        one = rotor_echo(angle, wavelength_m=WAVELENGTH_M, blade_length_m=length_m, blade_amplitudes=np.ones(blades))
+        echo += one * np.exp(2j * np.pi * rng.uniform())
+    return echo / np.sqrt(np.mean(np.abs(echo) ** 2))
+
+
+def ground(rng: np.random.Generator, per_mps: float = 5.5) -> np.ndarray:
+    """A static return and a skirt about it that falls as exp(-per_mps |v|), half the unit power each."""
+    speed = np.abs(np.fft.fftfreq(PULSES, 1 / PRF_HZ)) * WAVELENGTH_M / 2
+    skirt = np.fft.ifft(np.fft.fft(white(rng, PULSES)) * np.exp(-per_mps * speed / 2))
+    return (1 + skirt / np.sqrt(np.mean(np.abs(skirt) ** 2))) * np.sqrt(0.5)
+
+
+def record(
+    rng: np.random.Generator,
+    rates_hz: np.ndarray,
+    *,
+    snr_db: float,
+    body_db: float,
+    velocity_mps: float,
+    ground_db: float | None = None,
+    **rotor: float,
+) -> np.ndarray:
+    """One record: blades at `snr_db` over the noise, body and ground so many dB over the blades."""
+    amplitude = 10 ** (snr_db / 20)
+    target = rotors(rng, rates_hz, **rotor) + 10 ** (body_db / 20) * np.exp(2j * np.pi * rng.uniform())
+    iq = amplitude * target * np.exp(-4j * np.pi * velocity_mps * TIMES_S / WAVELENGTH_M)
+    if ground_db is not None:
+        iq = iq + amplitude * 10 ** (ground_db / 20) * ground(rng)
+    return (iq + white(rng, PULSES)).astype(np.complex64)
+
+
+def bound_hz(echo: np.ndarray, chopping_hz: float, snr_db: float) -> float:
+    """Cramer-Rao bound of the chopping frequency, body frequency unknown [Hz]; `echo` has unit power."""
+    order = np.arange(-int(PRF_HZ / 2 / chopping_hz), int(PRF_HZ / 2 / chopping_hz) + 1)
+    lines = np.exp(-2j * np.pi * np.outer(order * chopping_hz, TIMES_S)) @ echo / PULSES
+    power = np.abs(lines) ** 2 * 10 ** (snr_db / 10)
+    moment = (order**2 * power).sum() - (order * power).sum() ** 2 / power.sum()
+    return float(np.sqrt(6 / (PULSES * (PULSES**2 - 1) * moment)) / (2 * np.pi) * PRF_HZ)
