@@ -8,7 +8,16 @@ from bladewing.features.spectrum import doppler_spectrum
 from .errors import one_line
 from .recording import Recording
 
+#: Colours of what is drawn behind the spectrum.
+_LEGEND = (("#dbe9f6", "band"), ("#f3d9b1", "notch"), ("#c0392b", "comb"))
+
 _WIDTH, _HEIGHT, _LEFT, _BOTTOM, _TOP = 960, 420, 56, 44, 34
+
+
+def _round_step(least: float) -> float:
+    """The smallest of 1, 2 and 5 times a power of ten that is not below a value."""
+    power = 10.0 ** np.floor(np.log10(least))
+    return float(next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least))
 
 
 def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, index: int) -> str:
@@ -55,9 +64,9 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
     body_hz = -float(values.body_velocity_mps[index]) * per_mps
     chopping_hz, width_hz = float(values.chopping_hz[index]), float(values.bandwidth_hz[index])
     if np.isfinite(width_hz):
-        band(body_hz - width_hz / 2, body_hz + width_hz / 2, "#dbe9f6", f"band {width_hz:.0f} Hz")
+        band(body_hz - width_hz / 2, body_hz + width_hz / 2, _LEGEND[0][0], f"band {width_hz:.0f} Hz")
     for centre_hz in {0.0, body_hz} if np.isfinite(body_hz) else {0.0}:
-        band(centre_hz - NOTCH_MPS * per_mps, centre_hz + NOTCH_MPS * per_mps, "#e6e6e6", "notch")
+        band(centre_hz - NOTCH_MPS * per_mps, centre_hz + NOTCH_MPS * per_mps, _LEGEND[1][0], "notch")
     if np.isfinite(chopping_hz):
         reach = int(values.comb_order[index])
         for order in range(-reach, reach + 1):
@@ -72,8 +81,14 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
         parts.append(f'<text x="{_LEFT - 6}" y="{y(db) + 4:.1f}" text-anchor="end">{db:.0f}</text>')
     points = " ".join(f"{x(f):.1f},{y(max(db, bottom_db)):.1f}" for f, db in zip(frequency, level, strict=True))
     parts.append(f'<polyline points="{points}" fill="none" stroke="#1f4e79" stroke-width="0.9"/>')
-    for hz in np.linspace(low, high, 9):
+    step_hz = _round_step((high - low) / 10)
+    for hz in np.arange(np.ceil(low / step_hz), np.floor(high / step_hz) + 1) * step_hz:
+        parts.append(f'<path d="M{x(hz):.1f} {base:.1f}v4" stroke="#222" stroke-width="0.8"/>')
         parts.append(f'<text x="{x(hz):.1f}" y="{base + 20:.1f}" text-anchor="middle">{hz:.0f}</text>')
+    for number, (colour, words) in enumerate(_LEGEND):
+        left = _WIDTH - 12 - 76 * (len(_LEGEND) - number)
+        parts.append(f'<rect x="{left}" y="{_TOP - 24}" width="12" height="12" fill="{colour}" stroke="#888"/>')
+        parts.append(f'<text x="{left + 18}" y="{_TOP - 14}">{words}</text>')
     said = str(values.reason[index]) or f"comb every {chopping_hz:.2f} Hz, band {width_hz:.0f} Hz"
     title = escape(one_line(f"{recording.name}: {said}"))
     return (
