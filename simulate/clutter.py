@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import fft
+from scipy import fft, special
 
-from .laws import Draws
+from .laws import LAWS, Draws
 from .motion import TWO_PI
 from .radar import Radar
 from .target import Normals, Target
@@ -168,13 +168,41 @@ def _gaussian(
     return psd / psd.sum(axis=-1, keepdims=True)
 
 
-def _texture(draws: Draws, radar: Radar, shape: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Slow modulation of the sea's amplitude: the log of the power swings with the spread of a gamma texture.
+#: Sinusoids that make up the slow Gaussian behind a texture.
+_SWELLS = 4
 
-    The decorrelation time is 0.1 to 1 s, so within a dwell the texture is a slope or a swell rather than noise.
+
+def _texture(draws: Draws, radar: Radar, shape: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Slow modulation of the sea's amplitude by a gamma texture, which makes the intensity K-distributed.
+
+    A Gaussian of a few slow sinusoids (decorrelation 0.1 to 1 s, so a slope or a swell within a dwell) is mapped to the
+    gamma law of unit mean and shape nu: a memoryless transform keeps the law exact at every instant.
+
+    Parameters
+    ----------
+    draws : Draws
+        The records' uniform numbers.
+    radar : Radar
+        The radar that looks.
+    shape : ndarray, shape (records,)
+        Shape nu of the texture [1]; its variance is 1 / nu.
+
+    Returns
+    -------
+    ndarray of float32, shape (records, pulses)
+        Amplitude, the root of the texture.
+
+    References
+    ----------
+    Ward, Tough and Watts, "Sea Clutter: Scattering, the K Distribution and Radar Performance" (2006), ch. 5.
     """
-    swing = np.minimum(np.sqrt(np.log1p(1 / shape)), 2.0)  # log-normal with the gamma's variance
-    rate = 0.3 + 2.0 * draws.uniform()
-    phase = draws.value("phase_rad")
-    log_power = swing[:, None] * np.sin(TWO_PI * rate[:, None] * radar.times_s + phase[:, None])
-    return np.exp(0.5 * log_power).astype(np.float32)
+    rate_hz = draws.value("texture_hz", _SWELLS)
+    weights = draws.normal(2 * _SWELLS) / np.sqrt(_SWELLS)
+    # The swells are slow: 40 points a period of the fastest, drawn out to the pulses in between.
+    points = max(33, math.ceil(40 * LAWS["texture_hz"].high * radar.dwell_s))
+    coarse_s = np.linspace(0, radar.dwell_s, points)
+    turns = TWO_PI * rate_hz[:, :, None] * coarse_s
+    gaussian = (weights[:, :_SWELLS, None] * np.cos(turns) + weights[:, _SWELLS:, None] * np.sin(turns)).sum(axis=1)
+    texture = special.gammaincinv(shape[:, None], special.ndtr(gaussian)) / shape[:, None]
+    amplitude = np.sqrt(texture)
+    return np.stack([np.interp(radar.times_s, coarse_s, row) for row in amplitude]).astype(np.float32)

@@ -91,6 +91,7 @@ LAWS: dict[str, Law] = {
     "sea_velocity_mps": Law("uniform", -4.5, 4.5, "m/s", "Bragg and wind-driven lines"),
     "sea_width_mps": Law("log", 0.15, 1.5, "m/s", "measured sea spectra"),
     "texture_shape": Law("log", 0.1, 10.0, "1", "K distribution, nu 0.1-10"),
+    "texture_hz": Law("log", 0.2, 2.5, "Hz", "swells and gusts; decorrelation 0.1-1 s"),
     "person_mps": Law("uniform", -2.5, 2.5, "m/s", "walking to running"),
     "gait_hz": Law("uniform", 0.8, 2.2, "Hz", "1-2 Hz"),
     "vehicle_mps": Law("log", 1.0, 40.0, "m/s", "roads; sign drawn apart"),

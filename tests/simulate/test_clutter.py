@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 from bladewing.simulate import Radar
-from bladewing.simulate.clutter import billingsley, draw_ground, process_velocities, shaped_noise
+from bladewing.simulate.clutter import _texture, billingsley, draw_ground, process_velocities, shaped_noise
+from bladewing.simulate.laws import WIDTH, Draws
 from bladewing.simulate.receiver import NormalsOf
 
 RADAR = Radar(9.85e9, 2e3, 500)
@@ -54,6 +55,36 @@ def test_ground_rests_and_moves_in_billingsleys_shares():
     spectrum = abs(np.fft.fft(moving, n=len(v), axis=1)) ** 2
     inside = spectrum[:, abs(v) <= np.log(2) / b].sum() / spectrum.sum()
     assert inside == pytest.approx(0.5, abs=0.06)
+
+
+@pytest.mark.parametrize("shape", [0.3, 1.0, 6.0])
+def test_the_sea_has_a_gamma_texture_and_a_k_distributed_intensity(shape):
+    records = 4000
+    rng = np.random.default_rng(int(10 * shape))
+    radar = Radar(9.39e9, 1e3, 80)
+    draws = Draws(rng.random((records, WIDTH)))
+    amplitude = _texture(draws, radar, np.full(records, shape))
+    for pulse in (0, 41, 79):
+        texture = amplitude[:, pulse].astype(float) ** 2
+        # gamma of unit mean: variance 1 / nu; its fourth central moment is (3 + 6 / nu) / nu^2
+        assert texture.mean() == pytest.approx(1, abs=4.5 * np.sqrt(1 / shape / records))
+        spread = np.sqrt(((3 + 6 / shape) / shape**2 - 1 / shape**2) / records)
+        assert texture.var() == pytest.approx(1 / shape, abs=4.5 * spread + 0.01 / shape)
+    speckle = rng.exponential(size=records)
+    intensity = speckle * amplitude[:, 0].astype(float) ** 2
+    # K distribution: <I^2> / <I>^2 = 2 (1 + 1 / nu), within the sampling error of a heavy tail
+    ratio = np.mean(intensity**2) / np.mean(intensity) ** 2
+    assert ratio == pytest.approx(2 * (1 + 1 / shape), rel=0.35)
+
+
+def test_the_texture_is_slow():
+    radar = Radar(9.39e9, 1e3, 1000)
+    draws = Draws(np.random.default_rng(0).random((500, WIDTH)))
+    power = _texture(draws, radar, np.full(500, 2.0)).astype(float) ** 2
+    near = np.corrcoef(power[:, 500], power[:, 510])[0, 1]  # 10 ms
+    far = np.corrcoef(power[:, 0], power[:, -1])[0, 1]  # 1 s
+    assert near > 0.98
+    assert far < 0.6
 
 
 def test_the_ends_of_a_process_do_not_meet():

@@ -1,0 +1,59 @@
+"""What records are drawn from follows the table of laws, for any seed."""
+
+import numpy as np
+import pytest
+from bladewing.simulate import Radar, draw_records
+from bladewing.simulate.bird import wing_size, wingbeat_hz
+from bladewing.simulate.laws import LAWS, Draws
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+
+def distribution(law, values):
+    """Cumulative distribution of a law at sorted values."""
+    if law.kind == "log":
+        return np.log(values / law.low) / np.log(law.high / law.low)
+    share = (values - law.low) / (law.high - law.low)
+    return share ** (1 / 0.7) if law.kind == "rising" else share
+
+
+def distance(values, cumulative) -> float:
+    """Kolmogorov and Smirnov's distance, times the root of the number of values: above 3 once in 30 million."""
+    count = len(values)
+    steps = np.arange(count + 1) / count
+    return max(abs(cumulative - steps[:-1]).max(), abs(cumulative - steps[1:]).max()) * np.sqrt(count)
+
+
+@settings(max_examples=15)
+@given(seed=st.integers(0, 2**32))
+def test_every_law_is_drawn_as_it_stands(seed):
+    uniforms = np.random.default_rng(seed).random((3000, 1))
+    for name, law in LAWS.items():
+        values = np.sort(Draws(uniforms).value(name))
+        assert distance(values, distribution(law, values)) < 3, name
+
+
+@settings(max_examples=4)
+@given(seed=st.integers(0, 2**32))
+def test_rates_levels_and_lengths_of_records_follow_their_laws(seed):
+    radar = Radar(9.85e9, 5e3, 16)
+    truth = draw_records(radar, 1200, seed, kind="hexacopter").truth
+    tip = np.sort(2 * np.pi * truth["rotation_hz"] * truth["blade_length_m"])
+    # the mean of six rates spread by at most 18 % about the drawn one moves the law's edge by a few per cent
+    inside = (tip > LAWS["tip_mps"].low * 0.9) & (tip < LAWS["tip_mps"].high * 1.1)
+    assert inside.all()
+    for column, law in (("snr_db", "snr_db"), ("blade_length_m", "blade_length_m"), ("beta_rad", "uav_beta_rad")):
+        values = np.sort(truth[column])
+        assert distance(values, distribution(LAWS[law], values)) < 3, column
+    bird = draw_records(radar, 1200, seed, kind="flapping_bird").truth
+    mass = np.sort(bird["mass_kg"])
+    assert distance(mass, distribution(LAWS["bird_mass_kg"], mass)) < 3
+    expected_hz = wingbeat_hz(bird["mass_kg"], *wing_size(bird["mass_kg"]))
+    ratio = np.sort(bird["wingbeat_hz"] / expected_hz)
+    assert distance(ratio, distribution(LAWS["wingbeat_scatter"], ratio)) < 3 or bird["wingbeat_hz"].max() == 18.0
+
+
+def test_box_and_muller_give_normal_numbers():
+    values = np.sort(Draws(np.random.default_rng(1).random((20_000, 2))).normal())
+    assert values.mean() == pytest.approx(0, abs=4.5 / np.sqrt(20_000))
+    assert values.var() == pytest.approx(1, abs=4.5 * np.sqrt(2 / 20_000))
