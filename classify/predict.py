@@ -128,7 +128,16 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
     dwell_s
         Length of a dwell [s], above 0. Dwells follow one another without overlap; a rest shorter than a dwell is
         dropped, but a recording shorter than one dwell is taken whole.
+
+    Raises
+    ------
+    BadInput
+        The whole recording has fewer pulses than the model needs.
     """
+    needed, given = classifier.envelope.pulses_min, len(recording.iq)
+    if given < needed:
+        said = f"{given} pulses are fewer than the {needed} that the model needs: record more"
+        raise BadInput(f"{recording.name}: {said}")
     wanted = max(1, round(min(dwell_s * recording.prf_hz, len(recording.iq))))
     count = len(recording.iq) // wanted
     iq = recording.iq[: count * wanted].reshape(count, wanted)

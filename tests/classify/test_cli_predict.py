@@ -108,6 +108,15 @@ def test_a_dwell_too_short_is_unknown(run_json, sigmf_pair):
     assert first["reason"].startswith("20 pulses are fewer than 64: take 100 pulses, 0.005 s, or more")
 
 
+def test_a_recording_with_fewer_pulses_than_the_model_needs_is_bad_input(run, tmp_path):
+    options = ("--carrier-hz", 10e9, "--prf-hz", 10e3)
+    np.save(tmp_path / "short.npy", noise(63))
+    refused(run(tmp_path / "short.npy", *options), "short.npy: 63 pulses are fewer than the 64 that the model needs")
+    np.save(tmp_path / "long.npy", noise(64))
+    code, _, _ = run(tmp_path / "long.npy", *options)
+    assert code == 0
+
+
 def test_a_silent_dwell_is_unknown_and_left_out_of_the_track(run_json, sigmf_pair):
     iq = noise(3200)
     iq[:1600] = 0
