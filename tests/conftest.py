@@ -7,6 +7,12 @@ from hypothesis import HealthCheck, settings
 # One thread each: the tests' models are tiny, and threads that wait for a core cost more than they bring.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-# Machines are shared: how long an example takes says nothing.
-settings.register_profile("shared", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# Machines are shared: how long an example takes says nothing. Where CI is set every run draws the same examples, so
+# that a change is judged by what it changed; elsewhere each run looks for new ones.
+settings.register_profile(
+    "shared",
+    deadline=None,
+    derandomize=bool(os.environ.get("CI")),
+    suppress_health_check=[HealthCheck.too_slow],
+)
 settings.load_profile("shared")
