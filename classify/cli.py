@@ -27,6 +27,16 @@ _TRAIN_EXTRA = {"torch", "sklearn", "onnx", "onnxscript", "skl2onnx", "matplotli
 _TRACEBACK = "BLADEWING_TRACEBACK"
 
 
+# Options that every command over recordings takes.
+DwellS = Annotated[float, typer.Option(metavar="SECONDS", help="Length of a dwell [s].")]
+CarrierHz = Annotated[float | None, typer.Option(metavar="F", help="Carrier [Hz], where the file does not say.")]
+PrfHz = Annotated[float | None, typer.Option(metavar="F", help="PRF [Hz], where the file does not say.")]
+Variable = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Which array of an .npz or .mat file, if it holds several.")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="One JSON object a line: one a dwell, a closing one a recording.")]
+
+
 @app.command()
 def predict(
     recordings: Annotated[
@@ -41,17 +51,11 @@ def predict(
         str | None,
         typer.Option(metavar="NAME|FILE", help="A shipped model or an .onnx file.", show_default="spectrum-cnn"),
     ] = None,
-    dwell: Annotated[float, typer.Option(metavar="SECONDS", help="Length of a dwell [s].")] = 0.08,
-    carrier_hz: Annotated[
-        float | None, typer.Option(metavar="F", help="Carrier [Hz], where the file does not say.")
-    ] = None,
-    prf_hz: Annotated[float | None, typer.Option(metavar="F", help="PRF [Hz], where the file does not say.")] = None,
-    variable: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Which array of an .npz or .mat file, if it holds several.")
-    ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="One JSON object a line: one a dwell, a closing one a recording.")
-    ] = False,
+    dwell: DwellS = 0.08,
+    carrier_hz: CarrierHz = None,
+    prf_hz: PrfHz = None,
+    variable: Variable = None,
+    as_json: AsJson = False,
 ) -> None:
     """Say of each dwell of each recording: uav, bird, clutter or unknown, with probabilities and the reason."""
     from rich.console import Console
@@ -104,21 +108,15 @@ def measure(
             show_default=False,
         ),
     ] = None,
-    dwell: Annotated[float, typer.Option(metavar="SECONDS", help="Length of a dwell [s].")] = 0.08,
+    dwell: DwellS = 0.08,
     plot: Annotated[
         Path | None,
         typer.Option(metavar="FILE.svg", help="Draw the clearest dwell: spectrum, comb, band and notch."),
     ] = None,
-    carrier_hz: Annotated[
-        float | None, typer.Option(metavar="F", help="Carrier [Hz], where the file does not say.")
-    ] = None,
-    prf_hz: Annotated[float | None, typer.Option(metavar="F", help="PRF [Hz], where the file does not say.")] = None,
-    variable: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Which array of an .npz or .mat file, if it holds several.")
-    ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="One JSON object a line: one a dwell, a closing one a recording.")
-    ] = False,
+    carrier_hz: CarrierHz = None,
+    prf_hz: PrfHz = None,
+    variable: Variable = None,
+    as_json: AsJson = False,
 ) -> None:
     """Measure the rotor in each dwell, with error bars: body velocity, chopping, single rotors, band, blade."""
     from rich.console import Console
