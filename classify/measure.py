@@ -242,9 +242,8 @@ def measure_recording(recording: Recording, settings: Settings) -> Measured:
     """
     if len(recording.iq) < 2:
         raise BadInput(f"{recording.name}: 1 pulse: a measurement needs at least 2")
-    pulses = max(2, round(min(settings.dwell_s * recording.prf_hz, len(recording.iq))))
-    count = len(recording.iq) // pulses
-    iq = recording.iq[: count * pulses].reshape(count, pulses)
+    iq = recording.dwells(settings.dwell_s, least=2)
+    count, pulses = iq.shape
     values = measure(
         iq,
         carrier_hz=recording.carrier_hz,

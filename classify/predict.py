@@ -138,9 +138,8 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
     if given < needed:
         said = f"{given} pulses are fewer than the {needed} that the model needs: record more"
         raise BadInput(f"{recording.name}: {said}")
-    wanted = max(1, round(min(dwell_s * recording.prf_hz, len(recording.iq))))
-    count = len(recording.iq) // wanted
-    iq = recording.iq[: count * wanted].reshape(count, wanted)
+    iq = recording.dwells(dwell_s)
+    count, wanted = iq.shape
     dwells = classifier.predict(iq, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
     start_s = recording.start_s + np.arange(count) * wanted / recording.prf_hz
     track = fuse(dwells.probabilities, dwells.labels, accept=classifier.accept)

@@ -37,6 +37,25 @@ class Recording:
     prf_hz: float
     start_s: float = 0.0
 
+    def dwells(self, dwell_s: float, least: int = 1) -> NDArray[np.complex64]:
+        """Cut the recording into dwells that follow one another; a rest shorter than a dwell is dropped.
+
+        Parameters
+        ----------
+        dwell_s
+            Length of a dwell [s], above 0; a recording shorter than one dwell is taken whole.
+        least
+            Fewest pulses of a dwell; the recording must hold as many.
+
+        Returns
+        -------
+        ndarray
+            Shape (dwells, pulses), complex64, a view.
+        """
+        pulses = max(least, round(min(dwell_s * self.prf_hz, len(self.iq))))
+        count = len(self.iq) // pulses
+        return self.iq[: count * pulses].reshape(count, pulses)
+
 
 def load_recording(
     path: str | os.PathLike[str],
