@@ -106,11 +106,12 @@ def weights(mask: Mask) -> NDArray[np.float32]:
     return mask.astype(np.float32, copy=False)
 
 
-def residual(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
-    """Power over the floor outside the notches, in units of the floor, shape (..., bins); 0 inside and below noise."""
+def residual(spectrum: Spectrum, mask: Mask | None = None) -> NDArray[np.float32]:
+    """Power over the floor outside the notches (if any), in units of the floor, shape (..., bins); 0 below noise."""
     excess = spectrum.relative_power - np.float32(1)
     np.maximum(excess, np.float32(0), out=excess)
-    excess *= weights(mask)
+    if mask is not None:
+        excess *= weights(mask)
     return excess
 
 
