@@ -37,6 +37,12 @@ VALUES = (
     "rotation_hz_std",
     "blade_length_m",
     "blade_length_m_std",
+    "main_chopping_hz",
+    "main_chopping_hz_std",
+    "tail_chopping_hz",
+    "tail_chopping_hz_std",
+    "gear_ratio",
+    "gear_ratio_std",
 )
 
 
@@ -110,15 +116,20 @@ class Measured:
                 "length_is_lower_bound": self.values.length_is_lower_bound,
                 "alternatives": self.values.alternatives((n,)),
                 "reason": str(self.values.reason[n]) or None,
+                "gear_reason": str(self.values.gear_reason[n]) or None,
             }
         yield {"file": self.recording.name, "recording": self.together()}
 
     def together(self) -> dict[str, Any]:
-        """Medians over the dwells that hold a comb, and how many those are."""
+        """Medians over the dwells that hold a comb, or both of a helicopter's, and how many those are."""
         held = np.isfinite(self.values.chopping_hz)
         names = ("body_velocity_mps", "chopping_hz", "bandwidth_hz", "tip_speed_mps", "rotation_hz", "blade_length_m")
         medians = {name: _number(np.median(getattr(self.values, name)[held])) if held.any() else None for name in names}
-        return {"dwells": len(self.iq), "with_comb": int(held.sum()), **medians}
+        geared = np.isfinite(self.values.gear_ratio)
+        pair = ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
+        gear = {name: _number(np.median(getattr(self.values, name)[geared])) if geared.any() else None for name in pair}
+        counts = {"dwells": len(self.iq), "with_comb": int(held.sum()), "with_second_comb": int(geared.sum())}
+        return {**counts, **medians, **gear}
 
     def print(self, console: "Console") -> None:
         """Write a table, one line a dwell, and the line of the recording."""
@@ -176,7 +187,24 @@ class Measured:
                 for c in v.alternatives((clear,))[:4]
             )
             rotor = "blades x rate: " + " or ".join(options)
-        return f"comb in {all_together['with_comb']} of {all_together['dwells']} dwells; {rotor}; {body}"
+        return f"comb in {all_together['with_comb']} of {all_together['dwells']} dwells; {rotor}; {body}{self.gear()}"
+
+    def gear(self) -> str:
+        """A helicopter's main and tail comb and their ratio in words, of the dwell with the smallest error; or ""."""
+        v = self.values
+        geared = np.isfinite(v.gear_ratio)
+        # a single dwell of many may be chance
+        if geared.sum() <= 0.5 * np.isfinite(v.chopping_hz).sum():
+            return ""
+        n = int(np.nanargmin(v.gear_ratio_std))
+        main, tail, ratio = (
+            with_error(getattr(v, name)[n], getattr(v, f"{name}_std")[n])
+            for name in ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
+        )
+        return (
+            f"; helicopter in {geared.sum()} dwells: chopping main {main} Hz, tail {tail} Hz, ratio {ratio} : 1 "
+            "(the gear's where both have as many blades)"
+        )
 
     def clearest(self) -> int:
         """The dwell whose comb stands highest over the noise; the first one where there is none."""
