@@ -1,7 +1,8 @@
 """The paper's measured UAVs by this product's measurements: truth, the paper's value and ours.
 
-The paper turns its bandwidths, chopping frequencies and shifts into blade lengths and velocities. What it prints is `PRINTED_FACTOR` times what its own equations (26 and 2 v / wavelength) give for its frequencies at 9.85 GHz, as if
-the carrier had been 8.94 GHz. Both stand in the tables.
+The paper turns its bandwidths, chopping frequencies and shifts into blade lengths and velocities. What it prints is
+`PRINTED_FACTOR` times what its own equations (26 and 2 v / wavelength) give for its frequencies at 9.85 GHz, as if the
+carrier had been 8.94 GHz. Both stand in the tables.
 """
 
 import math

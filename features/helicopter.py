@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .comb import Comb
-from .comb_fit import LEAST_LEVEL, CombFit, fit_comb, line_matrix
+from .comb_fit import LEAST_LEVEL, MARGIN_ORDERS, CombFit, dirichlet, fit_comb, line_matrix, smoothed
 from .comb_search import FINE_STEPS, Candidate, line_evidence, score, spacing_limits
 from .periodogram import BLOCK_BINS, Periodogram, local_level
 from .rotors import Rotors, separate_rotors
@@ -29,10 +29,17 @@ MULTIPLE_SHARE = 0.9
 
 #: The lines that a fraction of the spacing adds must not reach this share of its lines' mean power over the noise.
 FRACTIONS = (2, 3, 4, 5, 6, 7, 8)
-FRACTION_SHARE = 0.25
+FRACTION_SHARE = 0.12
 
 #: Places this near to a line of the first comb do not count [bins].
 SHADOW_BINS = 1.3
+
+#: Lines of the two combs nearer than this tell no frequency [bins]; Gauss-Newton steps of both combs together.
+MEETING_BINS = 1.5
+JOINT_STEPS = 4
+
+#: Keeps the amplitudes of lines that meet finite, as a share of a line's power.
+LEAST_RIDGE = 1e-4
 
 #: Candidates looked at closely.
 CLOSER = 4
@@ -113,6 +120,7 @@ def _second_comb(data: Periodogram, comb: Comb) -> tuple[Gear | None, str]:
     """The second comb of a record, or why there is none."""
     if comb.fit.spacing * data.pulses < 2 * SHADOW_BINS + 1:
         return None, "dwell too short: a second comb could not be told from the first one's lines"
+    comb = _about_body(data, comb)
     rest, hidden = _left_over(data, comb.fit)
     evidence = _evidence(rest, hidden)
     limits = spacing_limits(data.pulses, data.prf_hz)
@@ -123,18 +131,89 @@ def _second_comb(data: Periodogram, comb: Comb) -> tuple[Gear | None, str]:
     if rival > 0:
         return None, f"no second comb: the lines left over repeat every {rival * data.prf_hz:.1f} Hz as well"
     second = fit_comb(_clear_of(rest, best, comb.fit), best)
-    first = second and fit_comb(_clear_of(data.without(_lines(data, second)), comb.fit, second), _again(comb.fit))
-    second = first and fit_comb(_clear_of(_left_over(data, first)[0], best, first), best)
-    if first is None or second is None:
+    if second is None:
         return None, "no second comb: fewer than three lines of it are clear of the first one's"
+    first, second = _together(data, comb.fit, second)
     gear = Gear(Comb(first, comb.per_turn), second, data.without(_lines(data, second)))
     if not GEAR_RANGE[0] <= gear.ratio <= GEAR_RANGE[1]:
         return None, "no second comb: its fit left the range of gear ratios"
     return gear, ""
 
 
-def _again(fit: CombFit) -> Candidate:
-    return Candidate(fit.spacing, fit.score, int(fit.orders.min()), int(fit.orders.max()), fit.centre)
+def _about_body(data: Periodogram, comb: Comb) -> Comb:
+    """The comb counted from the body's line: any of its lines serves itself as centre, but not the other rotor."""
+    fit = comb.fit
+    for centre in data.centres:
+        shift = round((centre - fit.centre) / fit.spacing)
+        if abs(fit.centre + shift * fit.spacing - centre) * data.pulses < 1.0:
+            fit = replace(fit, centre=fit.centre + shift * fit.spacing, orders=fit.orders - shift)
+            break
+    return Comb(fit, comb.per_turn)
+
+
+def _together(data: Periodogram, first: CombFit, second: CombFit) -> tuple[CombFit, CombFit]:
+    """Fit both combs at once, about one centre.
+
+    As `fit_comb` does for one: fitted in turn, each keeps what the other holds of lines that nearly meet. Such lines
+    take part in the amplitudes, not in the frequencies.
+    """
+    pulses, fits = data.pulses, (first, second)
+    time = np.arange(pulses) - (pulses - 1) / 2
+    moment = (pulses**2 - 1) / 12
+    centre, spacings = first.centre, np.array([first.spacing, second.spacing])
+    # what the lines past the ends hold must not leak into the others
+    ranges = [np.arange(fit.orders.min() - MARGIN_ORDERS, fit.orders.max() + MARGIN_ORDERS + 1) for fit in fits]
+    ranges = [n[np.abs(n) * fit.spacing < 0.49] for n, fit in zip(ranges, fits, strict=True)]
+    ranges = [n[~data.removed(centre + fit.spacing * n) & (n != 0)] for n, fit in zip(ranges, fits, strict=True)]
+    size = len(ranges[0])
+    # columns: the centre, and each comb's spacing
+    design = np.ones((3, size + len(ranges[1])))
+    design[1:] = 0
+    design[1, :size], design[2, size:] = ranges
+    halves = ((slice(size), ranges[0]), (slice(size, None), ranges[1]))
+    for _ in range(JOINT_STEPS):
+        frequency = centre + spacings @ design[1:]
+        apart = np.abs(frequency[:size, None] - frequency[size:])
+        used = data.usable(frequency)
+        used[:size] &= apart.min(axis=1) * pulses > MEETING_BINS
+        used[size:] &= apart.min(axis=0) * pulses > MEETING_BINS
+        parts = [line_matrix(pulses, centre, s, n) for s, n in zip(spacings, ranges, strict=True)]
+        lines = np.concatenate(parts)
+        seen = lines.conj() @ data.samples / pulses
+        gram = dirichlet(frequency, pulses)
+        # powers by the joint fit too: a weak line beside a strong one holds mostly what that one leaks
+        free = np.linalg.solve(gram + LEAST_RIDGE * np.eye(len(gram)), seen)
+        level = np.maximum(data.level_of(data.samples - free @ lines)(frequency), LEAST_LEVEL)
+        power = np.where(used, np.abs(free) ** 2 * pulses / level, 0.0)
+        snr = np.concatenate([smoothed(power[h], n) / np.maximum(smoothed(used[h] * 1.0, n), 1e-9) for h, n in halves])
+        snr = np.maximum(snr - 1, 1e-3)
+        amplitudes = np.linalg.solve(gram + np.diag(1 / snr), seen)
+        rest = data.samples - amplitudes @ lines
+        slope = (lines.conj() @ (time * rest)) / pulses
+        pull = np.where(used, (amplitudes.conj() * slope).imag / level * pulses, 0.0)
+        weight = np.where(used, np.abs(amplitudes) ** 2 / level * pulses * moment, 0.0)
+        normal = (design * weight) @ design.T
+        step = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(3), design @ pull) / (2 * np.pi)
+        limit = 0.5 / pulses / np.array([1, np.abs(ranges[0]).max(), np.abs(ranges[1]).max()])
+        step = np.clip(step, -limit, limit)
+        centre, spacings = centre + step[0], spacings + step[1:]
+    effective = np.where(used, snr**2 / (1 + snr), 0.0)
+    information = (design * (2 * (2 * np.pi) ** 2 * effective * moment)) @ design.T
+    std = np.sqrt(np.diag(np.linalg.inv(information + 1e-12 * np.trace(information) * np.eye(3))))
+    out = [
+        replace(
+            fit,
+            spacing=float(spacings[number]),
+            centre=float(centre),
+            spacing_std=float(std[1 + number]),
+            centre_std=float(std[0]),
+            orders=orders,
+            amplitudes=amplitudes[half],
+            snr=snr[half],
+        )
+        for number, (fit, (half, orders)) in enumerate(zip(fits, halves, strict=True))
+    ]
+    return out[0], out[1]
 
 
 def _clear_of(rest: Periodogram, mine: Candidate | CombFit, other: CombFit) -> Periodogram:
