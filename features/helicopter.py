@@ -137,6 +137,12 @@ def _second_comb(data: Periodogram, comb: Comb) -> tuple[Gear | None, str]:
     gear = Gear(Comb(first, comb.per_turn), second, data.without(_lines(data, second)))
     if not GEAR_RANGE[0] <= gear.ratio <= GEAR_RANGE[1]:
         return None, "no second comb: its fit left the range of gear ratios"
+    # a whole ratio: every line of the one falls on one of the other, and unequal blades do the same
+    (main, _), (tail, _) = gear.rates
+    off = abs(gear.ratio - round(gear.ratio)) * main
+    reach = max(-best.low, best.high) * best.spacing
+    if off * reach / tail * data.pulses < MEETING_BINS:
+        return None, f"no second comb: {gear.ratio:.3f} to 1 is a whole ratio, as of unequal blades"
     return gear, ""
 
 
@@ -184,10 +190,12 @@ def _together(data: Periodogram, first: CombFit, second: CombFit) -> tuple[CombF
         # powers by the joint fit too: a weak line beside a strong one holds mostly what that one leaks
         free = np.linalg.solve(gram + LEAST_RIDGE * np.eye(len(gram)), seen)
         level = np.maximum(data.level_of(data.samples - free @ lines)(frequency), LEAST_LEVEL)
-        power = np.where(used, np.abs(free) ** 2 * pulses / level, 0.0)
-        snr = np.concatenate([smoothed(power[h], n) / np.maximum(smoothed(used[h] * 1.0, n), 1e-9) for h, n in halves])
+        power = np.where(used, np.abs(free) ** 2 * pulses / level, 0.0).astype(np.float64)
+        snr = np.concatenate(
+            [smoothed(power[h], n) / np.maximum(smoothed(used[h].astype(np.float64), n), 1e-9) for h, n in halves]
+        )
         snr = np.maximum(snr - 1, 1e-3)
-        amplitudes = np.linalg.solve(gram + np.diag(1 / snr), seen)
+        amplitudes = np.asarray(np.linalg.solve(gram + np.diag(1 / snr), seen), np.complex128)
         rest = data.samples - amplitudes @ lines
         slope = (lines.conj() @ (time * rest)) / pulses
         pull = np.where(used, (amplitudes.conj() * slope).imag / level * pulses, 0.0)
