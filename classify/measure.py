@@ -202,8 +202,8 @@ class Measured:
             for name in ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
         )
         return (
-            f"; helicopter in {geared.sum()} dwells: chopping main {main} Hz, tail {tail} Hz, ratio {ratio} : 1 "
-            "(the gear's where both have as many blades)"
+            f"; helicopter in {geared.sum()} of {len(geared)} dwells: chopping main {main} Hz, tail {tail} Hz, "
+            f"ratio {ratio} : 1 (the gear's where both have as many blades)"
         )
 
     def clearest(self) -> int:

@@ -48,6 +48,8 @@ def test_noise_has_nulls_and_a_reason(folder, capsys):
     dwell, *_, closing = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert dwell["chopping_hz"] is None
     assert dwell["rotor_rates_hz"] == dwell["alternatives"] == []
+    assert dwell["gear_ratio"] is None
+    assert dwell["gear_reason"] == "no comb"
     assert dwell["reason"].startswith("no comb")
     assert closing["recording"]["with_comb"] == 0
 
@@ -69,6 +71,24 @@ def test_the_plot_is_svg_with_the_comb_on_it(folder, tmp_path, capsys):
     assert "notch" in titles
     assert any(t.startswith("band ") for t in titles)
     assert sum(e.get("stroke") == "#c0392b" for e in root.iter()) > 20
+
+
+def test_a_helicopter_shows_both_combs_in_words_json_and_plot(tmp_path, capsys):
+    assert main(["simulate", "helicopter", "--out", str(tmp_path / "heli"), "--seed", "1"]) == 0
+    recording, plot = str(tmp_path / "heli.sigmf-meta"), tmp_path / "heli.svg"
+    capsys.readouterr()
+    assert main(["measure", recording, "--plot", str(plot)]) == 0
+    assert "helicopter in 1 of 1 dwells: chopping main 82.000" in capsys.readouterr().out
+    assert main(["measure", recording, "--json"]) == 0
+    dwell, closing = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert dwell["gear_ratio"] == pytest.approx(4.73, abs=6 * dwell["gear_ratio_std"])
+    assert dwell["tail_chopping_hz"] == pytest.approx(4.73 * 82, abs=6 * dwell["tail_chopping_hz_std"])
+    assert dwell["gear_reason"] is None
+    assert closing["recording"]["with_second_comb"] == 1
+    assert closing["recording"]["gear_ratio"] == dwell["gear_ratio"]
+    words = [e.text for e in ET.fromstring(plot.read_text()).iter() if e.tag.endswith("text")]
+    assert "2nd comb" in words
+    assert any("ratio 4.730" in word for word in words)
 
 
 @pytest.mark.parametrize(
