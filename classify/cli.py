@@ -221,7 +221,7 @@ def simulate(
         raise BadInput(error.problems[-1]) from None
     for warning in found.warnings():
         _complain(f"{scene}: {warning}", kind="warning")
-    plan = None if full else found.plan(tolerance_db=tolerance_db)
+    plan = None if full else found.plan(seed, tolerance_db=tolerance_db)
     if explain:
         print(plan.explain() if plan else "full fidelity: nothing is left out", flush=True)
     if out is not None:
