@@ -54,7 +54,10 @@ class ReceiverBounds:
     @cached_property
     def _signal(self) -> NDArray[np.complex64]:
         """What reaches the antenna, without range curvature along the blades."""
-        scene, radar, times = self._scene, self._scene.sight, pulse_times_s(self._scene, self._seed)
+        return self._signal_at(pulse_times_s(self._scene, self._seed))
+
+    def _signal_at(self, times: NDArray[np.float64]) -> NDArray[np.complex64]:
+        scene, radar = self._scene, self._scene.sight
         straight = Fidelity(frozenset(UAV_EFFECTS) - {"blade_curvature"}, None)
         signal = np.zeros(radar.pulses, np.complex128)
         for uav in scene.uavs:
@@ -92,7 +95,7 @@ class ReceiverBounds:
         return float(np.prod([self.gain(effect) for effect in self.effects], initial=1.0))
 
     def own(self, effect: str) -> float:
-        """Most that an effect of `CHAIN` changes in all, what the converter rounds anew aside."""
+        """Most that an effect of `CHAIN` changes in all; what the converter rounds anew is not counted."""
         if effect == "converter":
             return self.rounding()
         place = self.effects.index(effect)
@@ -123,14 +126,19 @@ class ReceiverBounds:
         return float(step * np.sqrt(len(iq) / 2) + cut + missed * clips)
 
     def jitter(self) -> float:
-        """Most that the even instants in place of the jittered ones change at the antenna."""
+        """Most that the even instants in place of the jittered ones change in all; what the converter rounds anew is not counted.
+
+        The smaller of what the blades' turn and the paths can do, and what the closed form was seen to do.
+        """
         radar = self._scene.sight
         even, true = radar.times_s, pulse_times_s(self._scene, self._seed)
         changed = sum((bounds.jitter(even) for bounds in self._uavs.values()), np.zeros(radar.pulses))
         every = Fidelity(frozenset(BIRD_EFFECTS), None)
         for bird in self._scene.birds:
             changed += np.abs(bird_echo(bird, radar, true, every) - bird_echo(bird, radar, even, every))
-        return _norm(changed)
+        before = tuple(effect for effect in self.effects if effect != "converter")
+        seen = self.reception.receive(self._signal, before) - self.reception.receive(self._signal_at(even), before)
+        return min(self.total_gain * _norm(changed), _norm(seen) + 2 * self.total_gain * self._missed)
 
 
 def _norm(values: Amplitude | NDArray[np.complex64]) -> float:

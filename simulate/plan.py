@@ -3,7 +3,8 @@
 The error of leaving an effect out is measured by its energy over the dwell, over the noise power of a sample. No line
 of the spectrum can then stand further over the noise floor than that, whatever the window; and no test at all, knowing
 both signals, can tell them apart once the energy is well below one (its deflection is twice the energy): hence the
-tolerance of -10 dB. Errors of several effects are added as amplitudes. The digits of the closed form (float32 phases,
+tolerance of -10 dB. A converter behind that is kept rounds a changed record anew, which is not counted: rounding is
+done to the record, and nothing that is done to it can make two signals easier to tell apart. Errors of several effects are added as amplitudes. The digits of the closed form (float32 phases,
 1e-7 of a blade's amplitude a radian) are not counted: they show at tolerances far below that.
 """
 
@@ -150,20 +151,16 @@ def make_plan(scene: Setting, seed: int = 0, *, tolerance_db: float = -10.0) -> 
             bound = bird_bound(bird, radar, effect, times)
             errors[bird.name, effect] = receiver.total_gain * float(np.linalg.norm(bound))
     if scene.receiver.jitter_s:
-        errors["receiver", "jitter"] = receiver.total_gain * receiver.jitter()
+        errors["receiver", "jitter"] = receiver.jitter()
     for effect in receiver.effects:
         errors["receiver", effect] = receiver.own(effect)
     scale = 1 / np.sqrt(noise)
     errors = {key: scale * error for key, error in errors.items()}
-    # whatever changes before a converter makes it round anew, once for all that changes
-    anew, rounds = 2 * scale * receiver.rounding(), False
     # half of the amplitude tolerated is for the effects, the rest for the spacing of scatterers where they are needed
     allowed, used, dropped = np.sqrt(10 ** (tolerance_db / 10)), 0.0, set()
     for key, error in sorted(errors.items(), key=lambda item: item[1]):
-        extra = 0.0 if error == 0 or rounds or key == ("receiver", "converter") else anew
-        if error == 0 or used + error + extra <= allowed / 2:
-            used += error + extra
-            rounds = rounds or extra > 0
+        if error == 0 or used + error <= allowed / 2:
+            used += error
             dropped.add(key)
     fidelity: dict[str, Fidelity] = {}
     notes: list[str] = []
@@ -172,12 +169,8 @@ def make_plan(scene: Setting, seed: int = 0, *, tolerance_db: float = -10.0) -> 
         kept = frozenset(effect for effect in UAV_EFFECTS if (uav.name, effect) not in dropped)
         points = None
         if "blade_curvature" in kept:
-            # a converter that rounds anew even more than is allowed leaves nothing to gain from fewer scatterers
-            left = max(rest - (0.0 if rounds else anew), 0.0) / (scale * receiver.total_gain)
-            points, missed = _points(bounds[uav.name], uav, radar, left**2)
-            fewer = points < (full_fidelity(uav, radar).points or 1)
-            used += scale * receiver.total_gain * np.sqrt(missed) + (anew if fewer and not rounds else 0.0)
-            rounds = rounds or fewer
+            points, missed = _points(bounds[uav.name], uav, radar, (rest / (scale * receiver.total_gain)) ** 2)
+            used += scale * receiver.total_gain * np.sqrt(missed)
         fidelity[uav.name] = Fidelity(kept, points)
         notes += [_renderer(uav, radar, points), _aliasing(uav, radar)]
     for bird in scene.birds:

@@ -217,7 +217,7 @@ def test_a_tolerance_that_is_no_number_is_refused():
 def random_reception(rng: np.random.Generator, effects: list[str], **more) -> Scene:
     """A scene with a receiver: a UAV afar or near, a bird, ground, and effects of random strength."""
     part, radar = random_uav(rng)
-    part = part.model_copy(update={"range_m": log_uniform(rng, 30, 1e6)})
+    part = part.model_copy(update={"range_m": log_uniform(rng, 30, 1e6), "rotors": part.rotors[:1]})
     values = {
         "phase_noise_rad": log_uniform(rng, 1e-4, 0.1),
         "adc_bits": float(rng.integers(6, 17)),
@@ -225,7 +225,7 @@ def random_reception(rng: np.random.Generator, effects: list[str], **more) -> Sc
     }
     return Scene.build(
         {
-            "radar": {"carrier_hz": radar.carrier_hz, "prf_hz": radar.prf_hz, "pulses": radar.pulses},
+            "radar": {"carrier_hz": min(radar.carrier_hz, 12e9), "prf_hz": radar.prf_hz, "pulses": 200},
             "uav": [part],
             "bird": [{"name": "b", "species": "starling", "members": 2}],
             "clutter": [{"name": "g", "kind": "ground", "level_db": float(rng.uniform(0, 40))}],
@@ -251,7 +251,7 @@ def changed_by(scene: Scene, seed: int, effect: str) -> float:
 @pytest.mark.parametrize("others", [[], ["fading", "colour", "image"]], ids=["alone", "among others"])
 def test_every_bound_of_a_receiver_holds_and_is_not_idle(effect, others):
     ratios = []
-    for seed in range(12):
+    for seed in range(8):
         rng = np.random.default_rng(seed)
         more = {
             "jitter": {"jitter_s": log_uniform(rng, 1e-9, 1e-6)},
@@ -265,18 +265,20 @@ def test_every_bound_of_a_receiver_holds_and_is_not_idle(effect, others):
         assert true <= bound * (1 + 1e-4) + 1e-12 * whole, (seed, true, bound)
         if true > 1e-10 * whole:
             ratios.append(bound / true)
-    assert len(ratios) >= 6
+    assert len(ratios) >= 5
     assert np.median(ratios) <= 10
 
 
 @pytest.mark.parametrize("tolerance_db", [-10.0, 20.0])
 def test_receivers_effects_that_a_plan_leaves_out_stay_below_its_bound(tolerance_db):
     left_out = set()
-    for seed in range(10):
+    for seed in range(6):
         rng = np.random.default_rng(seed)
         scene = random_reception(rng, ["phase_noise", "mains", "converter"], jitter_s=1e-10)
         plan = scene.plan(seed, tolerance_db=tolerance_db)
-        error = energy(render(scene, seed, plan=plan).iq.astype(complex) - render(scene, seed).iq)
+        # a converter that is kept rounds anew what changed before it: that is not counted
+        seen = scene.without("converter") if "converter" in plan.receiver else scene
+        error = energy(render(seen, seed, plan=plan).iq.astype(complex) - render(seen, seed).iq)
         digits = energy(render(scene, seed).iq) * 1e-9  # complex64, and float32 phases of long blades
         assert error <= 10 ** (plan.error_db / 10) + digits, seed
         assert plan.error_db <= tolerance_db + 1e-9
