@@ -126,7 +126,7 @@ class ReceiverBounds:
         return float(step * np.sqrt(len(iq) / 2) + cut + missed * clips)
 
     def jitter(self) -> float:
-        """Most that the even instants in place of the jittered ones change in all; what the converter rounds anew is not counted.
+        """Most that the even instants in place of the jittered ones change in all, without what is rounded anew.
 
         The smaller of what the blades' turn and the paths can do, and what the closed form was seen to do.
         """

@@ -3,9 +3,11 @@
 The error of leaving an effect out is measured by its energy over the dwell, over the noise power of a sample. No line
 of the spectrum can then stand further over the noise floor than that, whatever the window; and no test at all, knowing
 both signals, can tell them apart once the energy is well below one (its deflection is twice the energy): hence the
-tolerance of -10 dB. A converter behind that is kept rounds a changed record anew, which is not counted: rounding is
-done to the record, and nothing that is done to it can make two signals easier to tell apart. Errors of several effects are added as amplitudes. The digits of the closed form (float32 phases,
-1e-7 of a blade's amplitude a radian) are not counted: they show at tolerances far below that.
+tolerance of -10 dB. Errors of several effects are added as amplitudes.
+
+Two things are not counted. A converter that is kept rounds a changed record anew: rounding is done to the record, and
+nothing that is done to it makes two signals easier to tell apart. And the digits of the closed form (float32 phases,
+1e-7 of a blade's amplitude a radian) show at tolerances far below that.
 """
 
 from dataclasses import dataclass
