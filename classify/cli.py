@@ -26,6 +26,7 @@ _UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])
 _TRAIN_EXTRA = {"torch", "sklearn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2"}
 _TRACEBACK = "BLADEWING_TRACEBACK"
 
+Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]
 
 # Options that every command over recordings takes.
 DwellS = Annotated[float, typer.Option(metavar="SECONDS", help="Length of a dwell [s].")]
@@ -153,15 +154,35 @@ def train(
     records: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Synthetic records to train on.", show_default=False)
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")
-    ] = None,
+    seed: Seed = None,
     quick: Annotated[bool, typer.Option("--quick", help="Few records and epochs: a try, not a model to use.")] = False,
+    data: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Read the records from what `bladewing dataset` wrote, instead of drawing."),
+    ] = None,
 ) -> None:
     """Train all models on synthetic records and write them as ONNX."""
     from .train import run_training
 
-    run_training(out, records=records, seed=seed, quick=quick, config=config, progress=True)
+    run_training(out, records=records, seed=seed, quick=quick, config=config, data=data, progress=True)
+
+
+@app.command()
+def dataset(
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the data set: new, or to be gone on with.")],
+    records: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Records to train on; the other sets follow from it.")
+    ],
+    seed: Seed = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.toml", help="Settings of a training; the options given here come first."),
+    ] = None,
+) -> None:
+    """Write the records of a training to disk; interrupted, the same command goes on."""
+    from .dataset import run_dataset
+
+    run_dataset(out, records=records, seed=seed, config=config, progress=True)
 
 
 @app.command()
