@@ -23,7 +23,7 @@ app = typer.Typer(
 # The parent of all usage errors has no public name that old and new versions of typer share.
 _UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])
 
-_TRAIN_EXTRA = {"torch", "sklearn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2"}
+_TRAIN_EXTRA = {"torch", "sklearn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2", "mpmath"}
 _TRACEBACK = "BLADEWING_TRACEBACK"
 
 Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]
@@ -248,6 +248,17 @@ def simulate(
     if out is not None:
         written = write_rendering(out, render(found, seed, plan=plan), found, seed)
         print("\n".join(str(path) for path in written), flush=True)
+
+
+@app.command()
+def stability(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where stability.json, .md and .html go.")] = Path("out"),
+    quick: Annotated[bool, typer.Option("--quick", help="Leave out what takes minutes.")] = False,
+) -> None:
+    """Take every stage to its extremes: errors against a more precise oracle, and the guard that acts there."""
+    from .stability import run_stability
+
+    run_stability(out, quick=quick, progress=True)
 
 
 @app.command()

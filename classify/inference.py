@@ -15,6 +15,7 @@ import numpy as np
 import onnxruntime
 from bladewing.features.inputs import model_inputs
 from bladewing.features.schema import INPUT_SHAPES, schema_hash
+from bladewing.features.spectrum import LEAST_PART, largest_part
 from bladewing.models import DEFAULT_MODEL
 from bladewing.models.seal import verify
 from numpy.typing import ArrayLike, NDArray
@@ -189,10 +190,12 @@ class Classifier:
         if outside is not None:
             reasons = np.full(len(records), outside)
         else:
-            live = np.flatnonzero(records.any(axis=-1))
+            largest = largest_part(records)
+            live = np.flatnonzero(largest >= LEAST_PART)
             probabilities[live] = self._probabilities(records, live, carrier_hz, prf_hz)
             labels[live], why = decide(probabilities[live], self.accept)
             texts = np.full(len(records), "no signal: every sample is 0", dtype=object)
+            texts[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
             texts[live] = why
             reasons = texts.astype(np.str_)
         return Prediction(
