@@ -1,5 +1,6 @@
 """The command line. Exit codes: 0 done, 1 unexpected, 2 bad input, 130 interrupted; errors are one line on stderr."""
 
+import errno
 import json
 import os
 import sys
@@ -24,6 +25,11 @@ app = typer.Typer(
 _UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])
 
 _TRAIN_EXTRA = {"torch", "sklearn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2", "mpmath"}
+# A disk that is full, read-only or out of bounds is the user's to mend.
+_DISK_ERRORS = {
+    errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EFBIG, errno.ENOTDIR, errno.EISDIR,
+    errno.EEXIST, errno.ENAMETOOLONG, errno.ENOENT,
+}  # fmt: skip
 _TRACEBACK = "BLADEWING_TRACEBACK"
 
 Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]
@@ -304,6 +310,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if error.name not in _TRAIN_EXTRA:
             return _unexpected(error)
         _complain(f"{error.name} is not installed, this command needs it: pip install 'bladewing[train]'")
+        return 2
+    except MemoryError:
+        _complain("more memory is needed than there is: give less at once (a shorter recording, fewer records)")
+        return 2
+    except OSError as error:
+        if error.errno not in _DISK_ERRORS:
+            return _unexpected(error)
+        name = f"{error.filename}: " if error.filename else ""
+        _complain(f"{name}{error.strerror}: make room or give another place; what stood there is unchanged")
         return 2
     except Exception as error:
         return _unexpected(error)

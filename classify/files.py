@@ -8,6 +8,8 @@ import stat
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from .errors import BadInput
+
 try:
     import fcntl
 except ImportError:  # Windows: writers are not kept apart there
@@ -122,6 +124,30 @@ def _sync_folder(folder: Path) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
+
+
+def result_folder(path: str | os.PathLike[str]) -> Path:
+    """Make the folder that results will go to, and see that it can be written to before any work is done.
+
+    Raises
+    ------
+    BadInput
+        It cannot be made, or not be written to.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be made a folder: {error.strerror}: give another place") from None
+    probe = folder / f".bladewing-{secrets.token_hex(8)}.tmp"
+    try:
+        _write_new(probe, b"")
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written to: {error.strerror}: give another place") from None
+    finally:
+        with contextlib.suppress(OSError):
+            probe.unlink()
+    return folder
 
 
 #: Journal of a change of several files that was decided but maybe not finished.

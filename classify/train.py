@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .dataset import DataSet, Plan
 from .envelope import Envelope
 from .errors import BadInput
-from .files import write_together
+from .files import result_folder, write_together
 from .gather import Gathered, gather, gather_from
 from .labels import CLASSES
 from .progress import Progress
@@ -78,10 +78,7 @@ def run_training(
     settings = training_config(config, records=records, seed=seed, quick=quick, stored=held)
     if stored is not None and stored.plan != Plan.of(settings):
         raise BadInput(f"{data}: holds sets of {stored.plan.records}, a training takes {settings.sets}: write it again")
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(f"{out}: cannot be made a folder: {error.strerror}: give another --out") from None
+    result_folder(out)
     # Threads that spin while they wait make training several times slower beside another busy process.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     started = time.perf_counter()

@@ -7,7 +7,9 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from .bounds import MOST_TEXT_BYTES
 from .errors import BadInput
+from .files import read_bounded
 
 #: What `--quick` changes: enough to see every step work, not a model to use.
 QUICK = {"records": 3000, "epochs": 3, "iterations": 20}
@@ -104,8 +106,8 @@ def training_config(
 
 def _read(file: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        return tomllib.loads(read_bounded(file, MOST_TEXT_BYTES).decode())
     except OSError as error:
         raise BadInput(f"{file}: cannot be read: {error.strerror}: give the path of a TOML file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # too large, not UTF-8, not TOML, or nested beyond reason
         raise BadInput(f"{file}: not TOML: {error}") from None

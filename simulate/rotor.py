@@ -117,13 +117,11 @@ def rotor_echo(
     )
     blades = Blades.of(lead, wavelength_m, blade_length_m, beta_rad, root_m, blade_amplitudes, edge_asymmetry)
     pulses = angle.shape[-1]
-    if (
-        2 * TWO_PI / wavelength_m * np.max(np.asarray(blade_length_m) * np.abs(np.cos(beta_rad)), initial=0)
-        > LARGEST_GAMMA
-    ):
-        return _double_echo(
-            angle, wavelength_m, *np.atleast_1d(blade_length_m, beta_rad, root_m), blade_amplitudes, edge_asymmetry
-        ).reshape(*lead, pulses)
+    reach_m = np.max(np.asarray(blade_length_m) * np.abs(np.cos(beta_rad)), initial=0)
+    if 2 * TWO_PI / wavelength_m * reach_m > LARGEST_GAMMA:
+        shapes = np.atleast_1d(blade_length_m), np.atleast_1d(beta_rad), np.atleast_1d(root_m)
+        echo = _double_echo(angle, wavelength_m, *shapes, blade_amplitudes, edge_asymmetry)
+        return echo.reshape(*lead, pulses)
     angle = np.broadcast_to(angle, (*lead, pulses)).reshape(-1, pulses)
     out = np.empty(angle.shape, np.complex64)
     wide = max(1, min(pulses, TILE_SAMPLES))

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .render import Rendering
 
 _SOUND_MPS = 340.0
+_MOST_BYTES = 16 << 20
 
 #: Names that random streams of the receiver go by.
 _RESERVED = ("noise", "jitter", "receiver")
@@ -132,6 +133,8 @@ class Scene(BaseModel):
         if not file.exists() and name in shipped():
             file = files("bladewing.simulate") / "scenes" / f"{name}.toml"
         try:
+            if isinstance(file, Path) and file.exists() and not (file.is_file() and file.stat().st_size <= _MOST_BYTES):
+                raise ValueError(f"it must be a file of at most {_MOST_BYTES} bytes")
             values = tomllib.loads(file.read_text(encoding="utf-8"))
         except OSError as error:
             raise SceneError(
@@ -140,7 +143,7 @@ class Scene(BaseModel):
                     + ", ".join(shipped())
                 ]
             ) from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        except (ValueError, RecursionError) as error:  # not UTF-8, not TOML, or nested beyond reason
             raise SceneError([f"{name}: not TOML: {error}"]) from None
         return cls.build(values, name)
 

@@ -7,8 +7,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInput
-from ..files import write_together
+from ..files import result_folder, write_together
 from ..progress import Progress
 from .cell import Cell
 
@@ -38,10 +37,7 @@ def run_stability(out: Path, *, quick: bool = False, progress: bool = True) -> d
     BadInput
         The folder cannot be made.
     """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(f"{out}: cannot be made a folder: {error.strerror}: give another --out") from None
+    result_folder(out)
     found: list[Cell] = []
     parts = _parts()
     with Progress(visible=progress) as bars:
