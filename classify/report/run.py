@@ -24,6 +24,7 @@ from ..files import read_bounded, result_folder, settle, write_together
 from ..inference import Classifier
 from ..labels import CLASSES
 from ..progress import Progress
+from ..stability.run import worst_of_each
 from . import cost, evaluate, scores, stft, storage, trade
 from .examples import OVERLAP, WINDOW, show_examples
 from .machine import describe_machine
@@ -213,6 +214,7 @@ def run_report(out: Path, *, models: Path | None, quick: bool, seed: int = 0, pr
         raise BadInput(f"seed={seed}: must be 0 or more")
     found = load_models(models)
     out = result_folder(out)
+    stability = worst_of_each(out)
     started, clock = datetime.now(UTC), time.perf_counter()
     with Progress(visible=progress) as bars:
         body = measure(found, QUICK if quick else FULL, seed=seed, progress=bars)
@@ -223,7 +225,8 @@ def run_report(out: Path, *, models: Path | None, quick: bool, seed: int = 0, pr
             "seed": seed,
             "seconds": round(time.perf_counter() - clock, 1),
         }
-        text = _json({"schema_version": SCHEMA_VERSION, "made": made, **body})
+        extremes = {} if stability is None else {"stability": stability}
+        text = _json({"schema_version": SCHEMA_VERSION, "made": made, **body, **extremes})
         # The page is drawn from the very text that is stored, so that whoever has the file can draw it again.
         report: dict[str, Any] = json.loads(text)
         page = draw_page(report)

@@ -3,11 +3,14 @@
 import html
 import json
 from collections.abc import Callable, Iterator
+from dataclasses import fields
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from ..files import result_folder, write_together
+from ..bounds import MOST_TEXT_BYTES
+from ..errors import BadInput
+from ..files import read_bounded, result_folder, write_together
 from ..progress import Progress
 from .cell import Cell
 
@@ -58,6 +61,47 @@ def run_stability(out: Path, *, quick: bool = False, progress: bool = True) -> d
     return table
 
 
+def worst_of_each(folder: Path) -> list[dict[str, Any]] | None:
+    """The worst cell of every stage and parameter of a table written earlier, for the report.
+
+    Parameters
+    ----------
+    folder : Path
+        Where ``stability.json`` may lie.
+
+    Returns
+    -------
+    list of dict or None
+        The cell nearest to its limit, with ``cells`` and ``held``: how many there are, and how many hold. None where
+        there is no table.
+
+    Raises
+    ------
+    BadInput
+        The file is not such a table.
+    """
+    path = folder / "stability.json"
+    try:
+        table = json.loads(read_bounded(path, MOST_TEXT_BYTES))
+        if table["format"] != FORMAT:
+            raise ValueError(f"format {table['format']!r}, this version reads {FORMAT}")
+        names = {field.name for field in fields(Cell)}
+        cells = [Cell(**{name: cell[name] for name in names}) for cell in table["cells"]]
+        found = []
+        for _, group in groupby(cells, key=lambda cell: (cell.stage, cell.parameter)):
+            same = list(group)
+            worst = max(same, key=lambda cell: (not cell.holds, (cell.error or 0.0) / (cell.limit or 1.0)))
+            held = sum(cell.holds for cell in same)
+            found.append({**worst.as_dict(), "shown": _shown(worst), "cells": len(same), "held": held})
+        return found
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise BadInput(
+            f"{path}: not a stability table ({error}): run `bladewing stability` again, or remove it"
+        ) from None
+
+
 def _parts() -> dict[str, Callable[[bool], Iterator[Cell]]]:
     from . import chain, networks, spectra, waves
 
@@ -79,8 +123,7 @@ _HEADS = ("parameter", "at", "error", "allowed", "holds", "guard")
 
 
 def _row(cell: Cell) -> tuple[str, ...]:
-    allowed = "any" if cell.limit == float("inf") else f"{cell.limit:g}"
-    return cell.parameter, cell.value, _shown(cell), allowed, "yes" if cell.holds else "NO", cell.guard
+    return cell.parameter, cell.value, _shown(cell), f"{cell.limit:g}", "yes" if cell.holds else "NO", cell.guard
 
 
 def markdown(cells: list[Cell]) -> str:

@@ -4,6 +4,7 @@ import warnings
 import numpy as np
 import pytest
 from bladewing.classify.cli import main
+from bladewing.classify.errors import BadInput
 from bladewing.classify.stability import run, spectra, waves
 from bladewing.classify.stability.cell import Cell, sweep
 from bladewing.simulate.rotor import LARGEST_GAMMA, rotor_echo
@@ -95,3 +96,16 @@ def test_the_command_writes_the_table_whole(tmp_path, monkeypatch, capsys):
     said = capsys.readouterr().err
     assert "does not hold: comb, SNR 200 dB: 0.5" in said
     assert "2 of 3 cells hold" in said
+    worst = run.worst_of_each(tmp_path)
+    assert [(row["stage"], row["cells"], row["held"], row["shown"]) for row in worst] == [
+        ("blade", 2, 2, "2e-07"),
+        ("comb", 1, 0, "0.5"),
+    ]
+
+
+def test_what_is_no_table_is_refused_and_none_is_none(tmp_path):
+    assert run.worst_of_each(tmp_path) is None
+    for text in ('{"format": 1, "cells": [{"stage": 3}]}', "[]", '{"format": 2, "cells": []}', "["):
+        (tmp_path / "stability.json").write_text(text)
+        with pytest.raises(BadInput, match=r"stability\.json: not a stability table"):
+            run.worst_of_each(tmp_path)

@@ -110,10 +110,10 @@ MUTATIONS = (
         "tests/classify/test_hostile_files.py -k bomb",
     ),
     Mutation(
-        "types within MATLAB arrays are checked",
-        "classify/mat_file.py",
-        "if kind not in _NUMBER_BYTES:",
-        "if False:",
+        "types and sizes within MATLAB arrays are checked",
+        "classify/arrays.py",
+        "            require_sound(path)",
+        "            pass",
         "tests/classify/test_hostile_files.py -k scipy_would_follow",
     ),
     Mutation(
