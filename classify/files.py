@@ -80,7 +80,12 @@ def only_writer(folder: str | os.PathLike[str], *, wait: bool = True) -> Iterato
         return
     descriptor = os.open(folder, os.O_RDONLY)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError:
+            raise
+        except OSError:  # a file system without locks: writers are not kept apart there
+            pass
         yield
     finally:
         os.close(descriptor)
