@@ -1,5 +1,6 @@
 """The command line. Exit codes: 0 done, 1 unexpected, 2 bad input, 130 interrupted; errors are one line on stderr."""
 
+import errno
 import json
 import os
 import sys
@@ -23,9 +24,15 @@ app = typer.Typer(
 # The parent of all usage errors has no public name that old and new versions of typer share.
 _UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])
 
-_TRAIN_EXTRA = {"torch", "sklearn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2"}
+_TRAIN_EXTRA = {"torch", "sklearn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2", "mpmath"}
+# A disk that is full, read-only or out of bounds is the user's to mend.
+_DISK_ERRORS = {
+    errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EFBIG, errno.ENOTDIR, errno.EISDIR,
+    errno.EEXIST, errno.ENAMETOOLONG, errno.ENOENT,
+}  # fmt: skip
 _TRACEBACK = "BLADEWING_TRACEBACK"
 
+Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]
 
 # Options that every command over recordings takes.
 DwellS = Annotated[float, typer.Option(metavar="SECONDS", help="Length of a dwell [s].")]
@@ -153,15 +160,35 @@ def train(
     records: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Synthetic records to train on.", show_default=False)
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")
-    ] = None,
+    seed: Seed = None,
     quick: Annotated[bool, typer.Option("--quick", help="Few records and epochs: a try, not a model to use.")] = False,
+    data: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Read the records from what `bladewing dataset` wrote, instead of drawing."),
+    ] = None,
 ) -> None:
     """Train all models on synthetic records and write them as ONNX."""
     from .train import run_training
 
-    run_training(out, records=records, seed=seed, quick=quick, config=config, progress=True)
+    run_training(out, records=records, seed=seed, quick=quick, config=config, data=data, progress=True)
+
+
+@app.command()
+def dataset(
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the data set: new, or to be gone on with.")],
+    records: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Records to train on; the other sets follow from it.")
+    ],
+    seed: Seed = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.toml", help="Settings of a training; the options given here come first."),
+    ] = None,
+) -> None:
+    """Write the records of a training to disk; interrupted, the same command goes on."""
+    from .dataset import run_dataset
+
+    run_dataset(out, records=records, seed=seed, config=config, progress=True)
 
 
 @app.command()
@@ -230,6 +257,17 @@ def simulate(
 
 
 @app.command()
+def stability(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where stability.json, .md and .html go.")] = Path("out"),
+    quick: Annotated[bool, typer.Option("--quick", help="Leave out what takes minutes.")] = False,
+) -> None:
+    """Take every stage to its extremes: errors against a more precise oracle, and the guard that acts there."""
+    from .stability import run_stability
+
+    run_stability(out, quick=quick, progress=True)
+
+
+@app.command()
 def tables(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where tables.md and tables.json go.")] = Path("out"),
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Root of the scenes' noise.")] = 0,
@@ -272,6 +310,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if error.name not in _TRAIN_EXTRA:
             return _unexpected(error)
         _complain(f"{error.name} is not installed, this command needs it: pip install 'bladewing[train]'")
+        return 2
+    except MemoryError:
+        _complain("more memory is needed than there is: give less at once (a shorter recording, fewer records)")
+        return 2
+    except OSError as error:
+        if error.errno not in _DISK_ERRORS:
+            return _unexpected(error)
+        name = f"{error.filename}: " if error.filename else ""
+        _complain(f"{name}{error.strerror}: make room or give another place; what stood there is unchanged")
         return 2
     except Exception as error:
         return _unexpected(error)

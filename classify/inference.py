@@ -15,12 +15,15 @@ import numpy as np
 import onnxruntime
 from bladewing.features.inputs import model_inputs
 from bladewing.features.schema import INPUT_SHAPES, schema_hash
+from bladewing.features.spectrum import LEAST_PART, largest_part
 from bladewing.models import DEFAULT_MODEL
-from bladewing.models.seal import verify
+from bladewing.models.seal import read_metadata, verify
 from numpy.typing import ArrayLike, NDArray
 
+from .bounds import MOST_MODEL_BYTES
 from .envelope import Envelope
 from .errors import BadInput
+from .files import read_bounded
 from .labels import CLASSES, UNKNOWN, decide
 from .samples import complex_samples, positive
 
@@ -103,12 +106,14 @@ class Classifier:
         if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
             raise BadInput(f"threads is {threads!r}: it must be a whole number of 1 or more")
         try:
-            verify(onnx_bytes)  # before anything of the file is run
+            verify(onnx_bytes)  # before anything of the file is opened, and so is what it says of itself
+            self.metadata = MappingProxyType(read_metadata(onnx_bytes))
         except ValueError as error:
             raise BadInput(f"{source}: {error}") from None
-        self._session = _open_session(onnx_bytes, source, threads)
-        self.metadata = MappingProxyType(dict(self._session.get_modelmeta().custom_metadata_map))
         self.envelope, self.accept = _read_metadata(self.metadata, source)
+        self._session = _open_session(onnx_bytes, source, threads)
+        if dict(self._session.get_modelmeta().custom_metadata_map) != dict(self.metadata):
+            raise BadInput(f"{source}: damaged metadata: onnxruntime reads others: train it again")
         self.inputs = _read_inputs(self._session, source)
 
     @classmethod
@@ -135,13 +140,13 @@ class Classifier:
         if path.is_dir():
             raise BadInput(f"{given} is a directory: name the .onnx file in it")
         try:
-            content = path.read_bytes()
+            content = read_bounded(path, MOST_MODEL_BYTES)
         except (FileNotFoundError, NotADirectoryError):
             shipped = ", ".join(model_names()) or "none"
             raise BadInput(
                 f"no model {given!r}: give the path of an .onnx file or one of the shipped: {shipped}"
             ) from None
-        except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        except (OSError, ValueError) as error:  # ValueError: a NUL in the name, no file, too large
             raise BadInput(f"{given}: the model cannot be read: {getattr(error, 'strerror', None) or error}") from None
         return cls(content, source=given, threads=threads)
 
@@ -189,10 +194,12 @@ class Classifier:
         if outside is not None:
             reasons = np.full(len(records), outside)
         else:
-            live = np.flatnonzero(records.any(axis=-1))
+            largest = largest_part(records)
+            live = np.flatnonzero(largest >= LEAST_PART)
             probabilities[live] = self._probabilities(records, live, carrier_hz, prf_hz)
             labels[live], why = decide(probabilities[live], self.accept)
             texts = np.full(len(records), "no signal: every sample is 0", dtype=object)
+            texts[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
             texts[live] = why
             reasons = texts.astype(np.str_)
         return Prediction(
@@ -218,7 +225,12 @@ def _open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.I
     options.inter_op_num_threads = 1
     options.log_severity_level = 4  # its messages come as exceptions; nothing else may reach the user's terminal
     try:
-        return onnxruntime.InferenceSession(onnx_bytes, options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(
+            onnx_bytes,
+            options,
+            providers=["CPUExecutionProvider"],
+            enable_fallback=0,  # which would print, and try the same again
+        )
     except Exception as error:  # its exceptions share no base class
         raise BadInput(f"{source}: onnxruntime {onnxruntime.__version__} cannot open the model: {error}") from None
 
@@ -244,7 +256,7 @@ def _read_metadata(metadata: Mapping[str, str], source: str) -> tuple[Envelope, 
         uav, bird, clutter = (float(limit) for limit in accept)
         if not all(np.isfinite((uav, bird, clutter))):
             raise ValueError(f"accept is {accept}, it must be three finite numbers")
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise BadInput(f"{source}: damaged metadata: {error}: train it again") from None
     return envelope, (uav, bird, clutter)
 

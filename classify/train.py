@@ -15,10 +15,11 @@ from bladewing.features import INPUT_SHAPES, schema_hash
 from bladewing.models import LADDER
 from numpy.typing import NDArray
 
+from .dataset import DataSet, Plan
 from .envelope import Envelope
 from .errors import BadInput
-from .files import write_together
-from .gather import Gathered, gather
+from .files import result_folder, write_together
+from .gather import Gathered, gather, gather_from
 from .labels import CLASSES
 from .progress import Progress
 from .training_config import TrainingConfig, training_config
@@ -46,6 +47,7 @@ def run_training(
     seed: int | None = None,
     quick: bool = False,
     config: Path | None = None,
+    data: Path | None = None,
     progress: bool = True,
 ) -> dict[str, Any]:
     """Train the models of the ladder on synthetic records and write them to a folder.
@@ -56,6 +58,8 @@ def run_training(
         Folder for `<name>.onnx` and `train.json`; made if it is missing. All files change together at the end.
     records, seed, quick, config
         See `training_config`.
+    data : Path, optional
+        A data set (see `dataset`) to read the records from instead of drawing them; the models are the same.
     progress : bool
         Show progress and a table on the terminal.
 
@@ -67,18 +71,19 @@ def run_training(
     Raises
     ------
     BadInput
-        If a setting is wrong or the folder cannot be written.
+        If a setting is wrong, the data set cannot be used, or the folder cannot be written.
     """
-    settings = training_config(config, records=records, seed=seed, quick=quick)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(f"{out}: cannot be made a folder: {error.strerror}: give another --out") from None
+    stored = None if data is None else DataSet(data)
+    held = None if stored is None else {"records": stored.plan.records["train"], "seed": stored.plan.seed}
+    settings = training_config(config, records=records, seed=seed, quick=quick, stored=held)
+    if stored is not None and stored.plan != Plan.of(settings):
+        raise BadInput(f"{data}: holds sets of {stored.plan.records}, a training takes {settings.sets}: write it again")
+    result_folder(out)
     # Threads that spin while they wait make training several times slower beside another busy process.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     started = time.perf_counter()
     with Progress(visible=progress) as bars:
-        sets = _gather(settings, bars)
+        sets = _gather(settings, stored, bars)
         gathered_s = time.perf_counter() - started
         files: dict[str, bytes] = {}
         models: dict[str, dict[str, Any]] = {}
@@ -88,10 +93,7 @@ def run_training(
     account = {
         "format": 1,
         "settings": settings.model_dump(mode="json"),
-        "records": {
-            "train": settings.records,
-            **dict.fromkeys(("validate", "calibrate", "test"), settings.held_out),
-        },
+        "records": settings.sets,
         "seconds": {"gather": round(gathered_s, 1), "all": round(time.perf_counter() - started, 1)},
         "false_alarm": settings.false_alarm,
         "models": models,
@@ -105,21 +107,23 @@ def run_training(
     return account
 
 
-def _gather(settings: TrainingConfig, bars: Progress) -> Sets:
-    """Draw the four sets, with only the inputs that the chosen models read."""
+def _gather(settings: TrainingConfig, stored: DataSet | None, bars: Progress) -> Sets:
+    """Draw or read the four sets, with only the inputs that the chosen models read."""
     names = tuple(name for name in INPUT_SHAPES if any(name in LADDER[model] for model in settings.models))
-    counts = {"train": settings.records, **dict.fromkeys(("validate", "calibrate", "test"), settings.held_out)}
-    total, done = sum(counts.values()), 0
+    total, done = sum(settings.sets.values()), 0
     sets = {}
-    with bars.phase(f"draw {total} records", total) as on_done:
-        for purpose, count in counts.items():
+    with bars.phase(f"{'draw' if stored is None else 'read'} {total} records", total) as on_done:
+        for purpose, count in settings.sets.items():
 
             def on_records(number: int) -> None:
                 nonlocal done
                 done += number
                 on_done(done)
 
-            sets[purpose] = gather(settings.seed, purpose, count, names=names, on_records=on_records)
+            if stored is None:
+                sets[purpose] = gather(settings.seed, purpose, count, names=names, on_records=on_records)
+            else:
+                sets[purpose] = gather_from(stored.sources(purpose), names=names, on_records=on_records)
     return Sets(**sets)
 
 

@@ -1,12 +1,15 @@
 """The settings of a training: one validated table, from defaults, a TOML file and the command line."""
 
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from .bounds import MOST_TEXT_BYTES
 from .errors import BadInput
+from .files import read_bounded
 
 #: What `--quick` changes: enough to see every step work, not a model to use.
 QUICK = {"records": 3000, "epochs": 3, "iterations": 20}
@@ -40,9 +43,19 @@ class TrainingConfig(BaseModel):
         """Records of each of the three sets that are not trained on: validation, calibration and test."""
         return max(600, min(self.records // 6, 30_000))
 
+    @property
+    def sets(self) -> dict[str, int]:
+        """Records of each set: purpose (see `bladewing.simulate.stream`) to number."""
+        return {"train": self.records, **dict.fromkeys(("validate", "calibrate", "test"), self.held_out)}
+
 
 def training_config(
-    file: Path | None = None, *, records: int | None = None, seed: int | None = None, quick: bool = False
+    file: Path | None = None,
+    *,
+    records: int | None = None,
+    seed: int | None = None,
+    quick: bool = False,
+    stored: Mapping[str, int] | None = None,
 ) -> TrainingConfig:
     """Put the settings together: defaults, then `--quick`, then the file, then the options.
 
@@ -54,6 +67,8 @@ def training_config(
         Override the file.
     quick : bool
         Start from few records and epochs.
+    stored : mapping of str to int, optional
+        Records and seed of the data set that is trained on; the file and the options may only say the same.
 
     Returns
     -------
@@ -66,11 +81,13 @@ def training_config(
     """
     from bladewing.models import LADDER
 
-    values: dict[str, Any] = dict(QUICK) if quick else {}
-    if file is not None:
-        values |= _read(file)
+    values: dict[str, Any] = {} if file is None else _read(file)
     values |= {name: value for name, value in (("records", records), ("seed", seed)) if value is not None}
     where = str(file) if file is not None else "training settings"
+    for name, held in (stored or {}).items():
+        if values.setdefault(name, held) != held:
+            raise BadInput(f"{where}: {name} is {values[name]!r}, but the data set has {held}: leave it out")
+    values = (QUICK if quick else {}) | values
     try:
         config = TrainingConfig(**values)
     except ValidationError as error:
@@ -89,8 +106,8 @@ def training_config(
 
 def _read(file: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        return tomllib.loads(read_bounded(file, MOST_TEXT_BYTES).decode())
     except OSError as error:
         raise BadInput(f"{file}: cannot be read: {error.strerror}: give the path of a TOML file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # too large, not UTF-8, not TOML, or nested beyond reason
         raise BadInput(f"{file}: not TOML: {error}") from None

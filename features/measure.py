@@ -14,7 +14,7 @@ from .periodogram import Periodogram, prepare
 from .rotor_band import fit_edge
 from .rotors import MAX_ROTORS
 from .smearing import smearing_index
-from .spectrum import Spectrum, doppler_spectrum
+from .spectrum import LEAST_PART, Spectrum, doppler_spectrum, largest_part
 
 #: Threshold of the paper's bandwidth rule over the noise [dB]: it took 20 on measured data, 30 on simulated.
 PAPER_THRESHOLD_DB = 20.0
@@ -193,6 +193,8 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     out["rotor_rates_hz"] = out["rotor_rates_hz_std"] = np.full(MAX_ROTORS, np.nan)
     out["rotors_resolved"] = False
     out["gear_reason"] = "no comb"
+    if 0 < largest_part(iq) < LEAST_PART:
+        return out | {"reason": "no digits left in samples this small: raise the gain"}
     data = prepare(iq, carrier_hz=spectrum.carrier_hz, prf_hz=spectrum.prf_hz)
     if data is None:
         return out | {"reason": "no signal"}

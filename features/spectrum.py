@@ -133,15 +133,23 @@ def centred_power(iq: NDArray[np.complex64], bins: int | None = None) -> NDArray
     return power if even else fft.fftshift(power, axes=-1)
 
 
+#: A record whose largest part is below this has lost its digits among float32's denormal numbers: 9 bits are left here.
+LEAST_PART = 2.0**-140
+
+
+def largest_part(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """Largest real or imaginary part of each record, by magnitude, shape (...)."""
+    parts = np.ascontiguousarray(iq).view(np.float32)
+    return np.maximum(parts.max(axis=-1), -parts.min(axis=-1))
+
+
 def unit_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
     """Power of two that brings each record's largest part into [0.5, 1), shape (..., 1); 1 for an all-zero record.
 
     A power of two changes no digit, so results do not depend on the gain; the square of the scaled samples can neither
     overflow nor vanish.
     """
-    parts = np.ascontiguousarray(iq).view(np.float32)
-    largest = np.maximum(parts.max(axis=-1), -parts.min(axis=-1))
-    _, exponent = np.frexp(largest)
+    _, exponent = np.frexp(largest_part(iq))
     return np.ldexp(np.float32(1), -np.clip(exponent, -126, 126))[..., None].astype(np.float32)
 
 

@@ -13,6 +13,8 @@ from .plan import Plan, make_plan
 from .render import Rendering, render
 from .setting import Setting
 
+_MOST_BYTES = 16 << 20
+
 
 class SceneError(ValueError):
     """A scene that cannot be: one line a problem, each with the field, the value and the rule.
@@ -71,6 +73,8 @@ class Scene(Setting):
         if not file.exists() and name in shipped():
             file = files("bladewing.simulate") / "scenes" / f"{name}.toml"
         try:
+            if isinstance(file, Path) and file.exists() and not (file.is_file() and file.stat().st_size <= _MOST_BYTES):
+                raise ValueError(f"it must be a file of at most {_MOST_BYTES} bytes")
             values = tomllib.loads(file.read_text(encoding="utf-8"))
         except OSError as error:
             raise SceneError(
@@ -79,7 +83,7 @@ class Scene(Setting):
                     + ", ".join(shipped())
                 ]
             ) from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        except (ValueError, RecursionError) as error:  # not UTF-8, not TOML, or nested beyond reason
             raise SceneError([f"{name}: not TOML: {error}"]) from None
         return cls.build(values, name)
 

@@ -18,11 +18,13 @@ from bladewing.features.inputs import model_inputs
 from bladewing.features.schema import INPUT_SHAPES
 from bladewing.simulate import Radar, draw_records
 
+from ..bounds import MOST_MODEL_BYTES
 from ..errors import BadInput
-from ..files import settle, write_together
+from ..files import read_bounded, result_folder, settle, write_together
 from ..inference import Classifier
 from ..labels import CLASSES
 from ..progress import Progress
+from ..stability.run import worst_of_each
 from . import cost, evaluate, scores, stft, storage, trade
 from .examples import OVERLAP, WINDOW, show_examples
 from .machine import describe_machine
@@ -164,12 +166,19 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
         raise BadInput(f"{folder}: not a folder: give the one that `bladewing train --out` wrote")
     else:
         settle(folder)
-        found = {path.stem: path.read_bytes() for path in folder.glob("*.onnx")}
+        found = {path.stem: _content(path) for path in folder.glob("*.onnx")}
     if not found:
         where = folder if folder is not None else "the installed package"
         raise BadInput(f"{where}: holds no .onnx file: run `bladewing train --out {folder or 'DIR'}` first")
     order = {name: place for place, name in enumerate(LADDER)}
     return {name: found[name] for name in sorted(found, key=lambda name: (order.get(name, len(order)), name))}
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return read_bounded(path, MOST_MODEL_BYTES)
+    except (OSError, ValueError) as error:
+        raise BadInput(f"{path}: the model cannot be read: {getattr(error, 'strerror', None) or error}") from None
 
 
 def run_report(out: Path, *, models: Path | None, quick: bool, seed: int = 0, progress: bool = True) -> dict[str, Any]:
@@ -203,9 +212,9 @@ def run_report(out: Path, *, models: Path | None, quick: bool, seed: int = 0, pr
     """
     if seed < 0:
         raise BadInput(f"seed={seed}: must be 0 or more")
-    out = Path(out)
     found = load_models(models)
-    out.mkdir(parents=True, exist_ok=True)
+    out = result_folder(out)
+    stability = worst_of_each(out)
     started, clock = datetime.now(UTC), time.perf_counter()
     with Progress(visible=progress) as bars:
         body = measure(found, QUICK if quick else FULL, seed=seed, progress=bars)
@@ -216,7 +225,8 @@ def run_report(out: Path, *, models: Path | None, quick: bool, seed: int = 0, pr
             "seed": seed,
             "seconds": round(time.perf_counter() - clock, 1),
         }
-        text = _json({"schema_version": SCHEMA_VERSION, "made": made, **body})
+        extremes = {} if stability is None else {"stability": stability}
+        text = _json({"schema_version": SCHEMA_VERSION, "made": made, **body, **extremes})
         # The page is drawn from the very text that is stored, so that whoever has the file can draw it again.
         report: dict[str, Any] = json.loads(text)
         page = draw_page(report)
