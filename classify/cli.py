@@ -34,6 +34,10 @@ PrfHz = Annotated[float | None, typer.Option(metavar="F", help="PRF [Hz], where 
 Variable = Annotated[
     str | None, typer.Option(metavar="NAME", help="Which array of an .npz or .mat file, if it holds several.")
 ]
+ModelName = Annotated[
+    str | None,
+    typer.Option(metavar="NAME|FILE", help="A shipped model or an .onnx file.", show_default="spectrum-cnn"),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object a line: one a dwell, a closing one a recording.")]
 
 
@@ -47,10 +51,7 @@ def predict(
             show_default=False,
         ),
     ],
-    model: Annotated[
-        str | None,
-        typer.Option(metavar="NAME|FILE", help="A shipped model or an .onnx file.", show_default="spectrum-cnn"),
-    ] = None,
+    model: ModelName = None,
     dwell: DwellS = 0.08,
     carrier_hz: CarrierHz = None,
     prf_hz: PrfHz = None,
@@ -162,6 +163,21 @@ def train(
     from .train import run_training
 
     run_training(out, records=records, seed=seed, quick=quick, config=config, progress=True)
+
+
+@app.command()
+def export(
+    out: Annotated[Path, typer.Argument(metavar="OUT.onnx", help="The graph to write.", show_default=False)],
+    carrier_hz: Annotated[float, typer.Option(metavar="F", help="Carrier [Hz].", show_default=False)],
+    prf_hz: Annotated[float, typer.Option(metavar="F", help="PRF [Hz].", show_default=False)],
+    pulses: Annotated[int, typer.Option(metavar="N", min=1, help="Pulses of a record.", show_default=False)],
+    model: ModelName = None,
+) -> None:
+    """Write one self-contained ONNX graph for a radar: raw IQ in, probabilities and label out, onnxruntime alone."""
+    from .export import export_raw_iq
+
+    worst = export_raw_iq(out, carrier_hz=carrier_hz, prf_hz=prf_hz, pulses=pulses, model=model)
+    print(f"Wrote {out}: iq (batch, {pulses}, 2) to probabilities and label, within {worst:.0e} of predict", flush=True)
 
 
 @app.command()

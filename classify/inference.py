@@ -60,6 +60,29 @@ def model_names() -> tuple[str, ...]:
     return tuple(sorted(names, key=lambda name: (name != DEFAULT_MODEL, name)))
 
 
+def read_model(name_or_path: str | os.PathLike[str] | None = None) -> tuple[bytes, str]:
+    """Read a shipped model or a file, as `Classifier.load` takes them: the content, and what messages call it.
+
+    Raises
+    ------
+    BadInput
+        There is no such model, or it cannot be read.
+    """
+    given = DEFAULT_MODEL if name_or_path is None else os.fspath(name_or_path)
+    if given in model_names():
+        return resources.files("bladewing.models.pretrained").joinpath(f"{given}.onnx").read_bytes(), given
+    path = Path(given)
+    if path.is_dir():
+        raise BadInput(f"{given} is a directory: name the .onnx file in it")
+    try:
+        return path.read_bytes(), given
+    except (FileNotFoundError, NotADirectoryError):
+        shipped = ", ".join(model_names()) or "none"
+        raise BadInput(f"no model {given!r}: give the path of an .onnx file or one of the shipped: {shipped}") from None
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        raise BadInput(f"{given}: the model cannot be read: {getattr(error, 'strerror', None) or error}") from None
+
+
 class Classifier:
     """A model ready to answer. Use `Classifier.load`.
 
@@ -127,23 +150,8 @@ class Classifier:
         BadInput
             There is no such model, or it is not one that can be used (see `Classifier`).
         """
-        given = DEFAULT_MODEL if name_or_path is None else os.fspath(name_or_path)
-        if given in model_names():
-            content = resources.files("bladewing.models.pretrained").joinpath(f"{given}.onnx").read_bytes()
-            return cls(content, source=given, threads=threads)
-        path = Path(given)
-        if path.is_dir():
-            raise BadInput(f"{given} is a directory: name the .onnx file in it")
-        try:
-            content = path.read_bytes()
-        except (FileNotFoundError, NotADirectoryError):
-            shipped = ", ".join(model_names()) or "none"
-            raise BadInput(
-                f"no model {given!r}: give the path of an .onnx file or one of the shipped: {shipped}"
-            ) from None
-        except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-            raise BadInput(f"{given}: the model cannot be read: {getattr(error, 'strerror', None) or error}") from None
-        return cls(content, source=given, threads=threads)
+        content, source = read_model(name_or_path)
+        return cls(content, source=source, threads=threads)
 
     def predict(self, iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Prediction:
         """Tell UAV, bird and clutter apart.
