@@ -36,7 +36,11 @@ Variable = Annotated[
 ]
 ModelName = Annotated[
     str | None,
-    typer.Option(metavar="NAME|FILE", help="A shipped model or an .onnx file.", show_default="spectrum-cnn"),
+    typer.Option(
+        metavar="NAME|FILE",
+        help="A shipped model, an .onnx file, or fast, balanced or best.",
+        show_default="spectrum-cnn",
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object a line: one a dwell, a closing one a recording.")]
 
@@ -52,6 +56,14 @@ def predict(
         ),
     ],
     model: ModelName = None,
+    budget_us: Annotated[
+        float | None,
+        typer.Option(
+            metavar="N",
+            help="Instead of a model: the most accurate one within N us a dwell (2048 pulses, in batches).",
+            show_default=False,
+        ),
+    ] = None,
     dwell: DwellS = 0.08,
     carrier_hz: CarrierHz = None,
     prf_hz: PrfHz = None,
@@ -65,7 +77,7 @@ def predict(
     from .inference import Classifier
 
     dwell_s = work.checked_dwell_s(dwell)
-    classifier = Classifier.load(model)
+    classifier = Classifier.load(model, budget_us=budget_us)
     said: Counter[str] = Counter()
     unreadable = 0
     for result in work.answers(

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from .envelope import Envelope
 from .errors import BadInput
 from .labels import CLASSES, UNKNOWN, decide
+from .ladder import PLACES, by_budget, by_place, measured_fft_us, shipped_account
 from .samples import complex_samples, positive
 
 __all__ = ["Classifier", "Envelope", "Prediction", "model_names"]
@@ -60,7 +61,7 @@ def model_names() -> tuple[str, ...]:
     return tuple(sorted(names, key=lambda name: (name != DEFAULT_MODEL, name)))
 
 
-def read_model(name_or_path: str | os.PathLike[str] | None = None) -> tuple[bytes, str]:
+def read_model(name_or_path: str | os.PathLike[str] | None = None, budget_us: float | None = None) -> tuple[bytes, str]:
     """Read a shipped model or a file, as `Classifier.load` takes them: the content, and what messages call it.
 
     Raises
@@ -69,6 +70,12 @@ def read_model(name_or_path: str | os.PathLike[str] | None = None) -> tuple[byte
         There is no such model, or it cannot be read.
     """
     given = DEFAULT_MODEL if name_or_path is None else os.fspath(name_or_path)
+    if budget_us is not None:
+        if name_or_path is not None:
+            raise BadInput(f"model {given!r} and a budget of {budget_us:g} us: give one of them")
+        given = by_budget(positive(budget_us, "budget_us"), shipped_account(), measured_fft_us())
+    elif given in PLACES:
+        given = by_place(given, shipped_account())
     if given in model_names():
         return resources.files("bladewing.models.pretrained").joinpath(f"{given}.onnx").read_bytes(), given
     path = Path(given)
@@ -135,22 +142,32 @@ class Classifier:
         self.inputs = _read_inputs(self._session, source)
 
     @classmethod
-    def load(cls, name_or_path: str | os.PathLike[str] | None = None, threads: int = 1) -> "Classifier":
+    def load(
+        cls,
+        name_or_path: str | os.PathLike[str] | None = None,
+        threads: int = 1,
+        *,
+        budget_us: float | None = None,
+    ) -> "Classifier":
         """Load a shipped model by its name, or any bladewing model by its path.
 
         Parameters
         ----------
         name_or_path
-            One of `model_names()`, or a file; by default the shipped default model.
+            One of `model_names()`; "fast", "balanced" or "best" (see `ladder`); or a file. By default the shipped
+            default model.
         threads
             CPU threads that one call may use.
+        budget_us
+            Instead of a name: the most accurate shipped model that takes at most this for a record of 2048 pulses in
+            batches of 64 on one thread of this machine [us].
 
         Raises
         ------
         BadInput
             There is no such model, or it is not one that can be used (see `Classifier`).
         """
-        content, source = read_model(name_or_path)
+        content, source = read_model(name_or_path, budget_us)
         return cls(content, source=source, threads=threads)
 
     def predict(self, iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Prediction:
