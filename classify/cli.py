@@ -64,6 +64,14 @@ def predict(
             show_default=False,
         ),
     ] = None,
+    max_false_alarm: Annotated[
+        float | None,
+        typer.Option(
+            metavar="P",
+            help="Largest share of birds and clutter to be named uav, 0.001 say; sets the threshold on uav.",
+            show_default=False,
+        ),
+    ] = None,
     dwell: DwellS = 0.08,
     carrier_hz: CarrierHz = None,
     prf_hz: PrfHz = None,
@@ -77,7 +85,9 @@ def predict(
     from .inference import Classifier
 
     dwell_s = work.checked_dwell_s(dwell)
-    classifier = Classifier.load(model, budget_us=budget_us)
+    classifier = Classifier.load(model, budget_us=budget_us, max_false_alarm=max_false_alarm)
+    if classifier.operating_point is not None:
+        _complain(work.terms(classifier.operating_point), kind="note")
     said: Counter[str] = Counter()
     unreadable = 0
     for result in work.answers(

@@ -16,6 +16,7 @@ import onnxruntime
 from bladewing.features.inputs import model_inputs
 from bladewing.features.schema import INPUT_SHAPES, schema_hash
 from bladewing.models import DEFAULT_MODEL
+from bladewing.models.operating import OperatingCurve, OperatingPoint
 from bladewing.models.seal import verify
 from numpy.typing import ArrayLike, NDArray
 
@@ -26,6 +27,9 @@ from .ladder import PLACES, by_budget, by_place, measured_fft_us, shipped_accoun
 from .samples import complex_samples, positive
 
 __all__ = ["Classifier", "Envelope", "Prediction", "model_names"]
+
+CURVE_KEY = "operating_curve"
+"""Metadata of the thresholds for every false-alarm rate; models of earlier versions hold none."""
 
 FORMAT = "1"
 """Version of the metadata that this code reads."""
@@ -103,6 +107,9 @@ class Classifier:
         What error messages call it.
     threads
         CPU threads that one call may use.
+    max_false_alarm
+        Largest share of birds and clutter that may be named UAV; sets the threshold on "uav", above or below the
+        model's own.
 
     Attributes
     ----------
@@ -116,11 +123,15 @@ class Classifier:
         Least probability at which each class is named.
     inputs
         Names of the inputs it reads, keys of `bladewing.features.schema.INPUT_SHAPES`.
+    operating_point
+        The threshold that `max_false_alarm` chose and the detection probability that remains, of its calibration
+        records; None without one.
 
     Raises
     ------
     BadInput
-        Not a bladewing model, altered after it was written, or made for other inputs or another version.
+        Not a bladewing model, altered after it was written, or made for other inputs or another version; or its
+        calibration records do not support the false-alarm rate.
     """
 
     classes: tuple[str, str, str] = CLASSES
@@ -128,8 +139,11 @@ class Classifier:
     envelope: Envelope
     accept: tuple[float, float, float]
     inputs: tuple[str, ...]
+    operating_point: OperatingPoint | None
 
-    def __init__(self, onnx_bytes: bytes, *, source: str = "model", threads: int = 1) -> None:
+    def __init__(
+        self, onnx_bytes: bytes, *, source: str = "model", threads: int = 1, max_false_alarm: float | None = None
+    ) -> None:
         if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
             raise BadInput(f"threads is {threads!r}: it must be a whole number of 1 or more")
         try:
@@ -140,6 +154,10 @@ class Classifier:
         self.metadata = MappingProxyType(dict(self._session.get_modelmeta().custom_metadata_map))
         self.envelope, self.accept = _read_metadata(self.metadata, source)
         self.inputs = _read_inputs(self._session, source)
+        self.operating_point = None
+        if max_false_alarm is not None:
+            self.operating_point = _operating_point(self.metadata, max_false_alarm, source)
+            self.accept = (self.operating_point.threshold, *self.accept[1:])
 
     @classmethod
     def load(
@@ -148,6 +166,7 @@ class Classifier:
         threads: int = 1,
         *,
         budget_us: float | None = None,
+        max_false_alarm: float | None = None,
     ) -> "Classifier":
         """Load a shipped model by its name, or any bladewing model by its path.
 
@@ -161,6 +180,8 @@ class Classifier:
         budget_us
             Instead of a name: the most accurate shipped model that takes at most this for a record of 2048 pulses in
             batches of 64 on one thread of this machine [us].
+        max_false_alarm
+            See `Classifier`.
 
         Raises
         ------
@@ -168,7 +189,7 @@ class Classifier:
             There is no such model, or it is not one that can be used (see `Classifier`).
         """
         content, source = read_model(name_or_path, budget_us)
-        return cls(content, source=source, threads=threads)
+        return cls(content, source=source, threads=threads, max_false_alarm=max_false_alarm)
 
     def predict(self, iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Prediction:
         """Tell UAV, bird and clutter apart.
@@ -272,6 +293,16 @@ def _read_metadata(metadata: Mapping[str, str], source: str) -> tuple[Envelope, 
     except (KeyError, TypeError, ValueError) as error:
         raise BadInput(f"{source}: damaged metadata: {error}: train it again") from None
     return envelope, (uav, bird, clutter)
+
+
+def _operating_point(metadata: Mapping[str, str], max_false_alarm: float, source: str) -> OperatingPoint:
+    """The point of the model's curve that keeps to a false-alarm rate."""
+    if CURVE_KEY not in metadata:
+        raise BadInput(f"{source}: holds no operating curve, so no false-alarm rate can be chosen: train it again")
+    try:
+        return OperatingCurve.from_json(metadata[CURVE_KEY]).at(max_false_alarm)
+    except ValueError as error:
+        raise BadInput(f"{source}: {error}") from None
 
 
 def _read_inputs(session: onnxruntime.InferenceSession, source: str) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ from .envelope import Envelope
 from .errors import BadInput
 from .files import write_together
 from .gather import Gathered, gather
+from .inference import CURVE_KEY
 from .labels import CLASSES
 from .ladder import COST_KEY, PULSES, RECORDS
 from .progress import Progress
@@ -162,6 +163,7 @@ def _train_one(
         fit_vector_scaling,
     )
     from bladewing.models.export import TABULAR_TOLERANCE, attach_metadata, check_export
+    from bladewing.models.operating import operating_curve
     from bladewing.models.seal import seal
 
     started = time.perf_counter()
@@ -172,6 +174,7 @@ def _train_one(
     accept = acceptance_thresholds(calibrated, sets.calibrate.labels, settings.precision)
     # A false drone is what users complain of: "uav" must also keep the false-alarm rate, however many UAVs it costs.
     accept[0] = max(accept[0], _alarm_threshold(calibrated, sets.calibrate.labels, settings.false_alarm))
+    curve = operating_curve(calibrated, sets.calibrate.labels)
     onnx_bytes = export(calibration)
     probabilities = calibration.probabilities(scores_of(sets.test))
     difference = check_export(
@@ -199,6 +202,7 @@ def _train_one(
         "envelope": Envelope().to_json(),
         "calibration": json.dumps(account["calibration"]),
         "accept": json.dumps(account["accept"]),
+        CURVE_KEY: curve.to_json(),
         "training": settings.model_dump_json(),
     }
     sealed = seal(attach_metadata(onnx_bytes, metadata))
