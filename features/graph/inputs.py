@@ -8,7 +8,7 @@ from ..axis import pooling
 from ..change import PARTS, _frame_starts, part_length
 from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
 from ..spectrum import LEAST_FLOOR, Spectrum, doppler_spectrum
-from ..vector import _BANDS, SIGNIFICANT_DB, radar_columns
+from ..vector import _BANDS, _SIGNIFICANT, radar_columns
 from .measurements import (
     band_levels_db,
     body_line,
@@ -104,7 +104,7 @@ def _feature_vector(radar: Spectrum, relative_power: Value, axis_db: Value, part
     kept = notch_weights(radar, body)
     over = (relative_power - 1.0).at_least(0.0)
     excess = over * kept
-    energy = excess * (level_db > SIGNIFICANT_DB).to(np.float32)
+    energy = excess * (excess > float(_SIGNIFICANT)).to(np.float32)
     residual_db = 10.0 * log10(((relative_power * kept).sum() / kept.sum().at_least(1.0)).at_least(1e-2))
     width_hz = threshold_width_hz(radar, relative_power, kept)
     low, high, occupancy = energy_band(radar, energy)

@@ -99,10 +99,11 @@ def energy_band(radar: Spectrum, energy: Value) -> tuple[Value, Value, Value]:
 
 def entropy(energy: Value, bins: int) -> Value:
     """As `shape.entropy`."""
-    total = energy.sum()
-    share = ratio(energy, total)
-    bits = -(share * share.at_least(1e-12).apply("Log")).sum() / np.log(bins)
-    return energy.graph.where(total > 0.0, bits, 1.0)
+    share = ratio(energy, energy.max())
+    total = share.sum()
+    safe = energy.graph.where(total > 0.0, total, 1.0)
+    bits = (safe.apply("Log") - (share * share.at_least(1e-12).apply("Log")).sum() / safe) / np.log(bins)
+    return energy.graph.where(total > 0.0, bits.at_least(0.0).at_most(1.0), 1.0)
 
 
 def ripple_db(level_db: Value, kept: Value) -> Value:
@@ -185,8 +186,8 @@ def cepstral_chopping(radar: Spectrum, level_db: Value, kept: Value) -> Chopping
     searched = last + 1 - first
     even = 1 - searched % 2
     rms = heights.slice(first, last + 1).ranked(searched // 2 - even, 1 + even).mean() / 0.8326
-    peak = window.max()
-    top = window.argmax().to(np.float32) + float(first)
+    highest = _evidence(flat, first, last, periods).argmax()
+    peak, top = window.pick(highest), highest.to(np.float32) + float(first)
     least = (chopping.FUNDAMENTAL_SHARE * peak).at_least(chopping.FUNDAMENTAL_STRENGTH * rms)
     best = top
     for divisor in chopping._DIVISORS.ravel():
@@ -202,6 +203,17 @@ def cepstral_chopping(radar: Spectrum, level_db: Value, kept: Value) -> Chopping
         for multiple in chopping._MULTIPLES.ravel()
     )
     return Chopping(rms > 0.0, radar.prf_hz / period, ratio(middle_, rms), ratio((twice + thrice) / 2.0, middle_))
+
+
+def _evidence(peaks: Value, first: int, last: int, periods: int) -> Value:
+    """As `chopping._evidence`."""
+    out = peaks.slice(first, last + 1)
+    stop = min(last, (periods - 2) // 2)
+    if stop >= first:
+        twice = 2 * np.arange(first, stop + 1)
+        again = peaks.take(twice - 1).at_least(peaks.take(twice)).at_least(peaks.take(twice + 1))
+        out = out + (again * chopping.REPEAT_SHARE).pad(0, last - stop)
+    return out * chopping._length_weights(first, last)
 
 
 def _prominence(heights: Value, periods: int) -> Value:

@@ -59,7 +59,7 @@ def dft(packed: Value, length: int, count: int, *, real: bool = False) -> tuple[
 def centred_power(packed: Value, pulses: int, bins: int) -> Value:
     """As `spectrum.centred_power`: from samples (n, 2, pulses) to power (n, bins)."""
     even = bins % 2 == 0
-    re, im = dft((packed * definition._window(pulses, even)).pad(0, bins - pulses), bins, bins)
+    re, im = dft((packed * definition._window(pulses, even)[::2]).pad(0, bins - pulses), bins, bins)
     power = re * re + im * im
     half = (bins + 1) // 2
     return power if even else packed.graph.concat(power.slice(half, bins), power.slice(0, half))
