@@ -41,6 +41,14 @@ PrfHz = Annotated[float | None, typer.Option(metavar="F", help="PRF [Hz], where 
 Variable = Annotated[
     str | None, typer.Option(metavar="NAME", help="Which array of an .npz or .mat file, if it holds several.")
 ]
+ModelName = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME|FILE",
+        help="A shipped model, an .onnx file, or fast, balanced or best.",
+        show_default="spectrum-cnn",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object a line: one a dwell, a closing one a recording.")]
 
 
@@ -54,9 +62,22 @@ def predict(
             show_default=False,
         ),
     ],
-    model: Annotated[
-        str | None,
-        typer.Option(metavar="NAME|FILE", help="A shipped model or an .onnx file.", show_default="spectrum-cnn"),
+    model: ModelName = None,
+    budget_us: Annotated[
+        float | None,
+        typer.Option(
+            metavar="N",
+            help="Instead of a model: the most accurate one within N us a dwell (2048 pulses, in batches).",
+            show_default=False,
+        ),
+    ] = None,
+    max_false_alarm: Annotated[
+        float | None,
+        typer.Option(
+            metavar="P",
+            help="Largest share of birds and clutter to be named uav, 0.001 say; sets the threshold on uav.",
+            show_default=False,
+        ),
     ] = None,
     dwell: DwellS = 0.08,
     carrier_hz: CarrierHz = None,
@@ -71,7 +92,9 @@ def predict(
     from .inference import Classifier
 
     dwell_s = work.checked_dwell_s(dwell)
-    classifier = Classifier.load(model)
+    classifier = Classifier.load(model, budget_us=budget_us, max_false_alarm=max_false_alarm)
+    if classifier.operating_point is not None:
+        _complain(work.terms(classifier.operating_point), kind="note")
     said: Counter[str] = Counter()
     unreadable = 0
     for result in work.answers(
@@ -189,6 +212,21 @@ def dataset(
     from .dataset import run_dataset
 
     run_dataset(out, records=records, seed=seed, config=config, progress=True)
+
+
+@app.command()
+def export(
+    out: Annotated[Path, typer.Argument(metavar="OUT.onnx", help="The graph to write.", show_default=False)],
+    carrier_hz: Annotated[float, typer.Option(metavar="F", help="Carrier [Hz].", show_default=False)],
+    prf_hz: Annotated[float, typer.Option(metavar="F", help="PRF [Hz].", show_default=False)],
+    pulses: Annotated[int, typer.Option(metavar="N", min=1, help="Pulses of a record.", show_default=False)],
+    model: ModelName = None,
+) -> None:
+    """Write one self-contained ONNX graph for a radar: raw IQ in, probabilities and label out, onnxruntime alone."""
+    from .export import export_raw_iq
+
+    worst = export_raw_iq(out, carrier_hz=carrier_hz, prf_hz=prf_hz, pulses=pulses, model=model)
+    print(f"Wrote {out}: iq (batch, {pulses}, 2) to probabilities and label, within {worst:.0e} of predict", flush=True)
 
 
 @app.command()

@@ -4,8 +4,9 @@ import json
 import os
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,9 @@ from .envelope import Envelope
 from .errors import BadInput
 from .files import result_folder, write_together
 from .gather import Gathered, gather, gather_from
+from .inference import CURVE_KEY
 from .labels import CLASSES
+from .ladder import COST_KEY, PULSES, RECORDS
 from .progress import Progress
 from .training_config import TrainingConfig, training_config
 
@@ -90,6 +93,8 @@ def run_training(
         for name in settings.models:
             with bars.phase(f"train {name}", 1) as on_fraction:
                 files[f"{name}.onnx"], models[name] = _train_one(name, settings, sets, on_fraction)
+    for name, cost in costs_ffts(files).items():
+        models[name][COST_KEY] = round(cost, 1)
     account = {
         "format": 1,
         "settings": settings.model_dump(mode="json"),
@@ -105,6 +110,31 @@ def run_training(
     if progress:
         _print_table(account, out)
     return account
+
+
+def costs_ffts(files: Mapping[str, bytes]) -> dict[str, float]:
+    """What a record costs each model from samples to answer, over its bare FFT [1]; one thread, all in turns.
+
+    Parameters
+    ----------
+    files
+        File name, `<name>.onnx`, to the sealed model.
+    """
+    from scipy import fft
+
+    from .inference import Classifier
+    from .report.timing import quote, time_in_turns
+
+    parts = np.random.default_rng(0).standard_normal((RECORDS, 2 * PULSES), np.float32)
+    iq = parts.view(np.complex64)
+    works: dict[str, Callable[[], object]] = {"": lambda: fft.fft(iq)}
+    for file, content in files.items():
+        classifier = Classifier(content, source=file)
+        works[file.removesuffix(".onnx")] = partial(classifier.predict, iq, carrier_hz=10e9, prf_hz=25e3)
+    laps = time_in_turns(works, seconds=2.0, least_rounds=5, most_rounds=100)
+    medians = {name: quote(lap)["median_us"] for name, lap in laps.items()}
+    bare = medians.pop("")
+    return {name: median / bare for name, median in medians.items()}
 
 
 def _gather(settings: TrainingConfig, stored: DataSet | None, bars: Progress) -> Sets:
@@ -137,6 +167,7 @@ def _train_one(
         fit_vector_scaling,
     )
     from bladewing.models.export import TABULAR_TOLERANCE, attach_metadata, check_export
+    from bladewing.models.operating import operating_curve
     from bladewing.models.seal import seal
 
     started = time.perf_counter()
@@ -147,6 +178,7 @@ def _train_one(
     accept = acceptance_thresholds(calibrated, sets.calibrate.labels, settings.precision)
     # A false drone is what users complain of: "uav" must also keep the false-alarm rate, however many UAVs it costs.
     accept[0] = max(accept[0], _alarm_threshold(calibrated, sets.calibrate.labels, settings.false_alarm))
+    curve = operating_curve(calibrated, sets.calibrate.labels)
     onnx_bytes = export(calibration)
     probabilities = calibration.probabilities(scores_of(sets.test))
     difference = check_export(
@@ -174,6 +206,7 @@ def _train_one(
         "envelope": Envelope().to_json(),
         "calibration": json.dumps(account["calibration"]),
         "accept": json.dumps(account["accept"]),
+        CURVE_KEY: curve.to_json(),
         "training": settings.model_dump_json(),
     }
     sealed = seal(attach_metadata(onnx_bytes, metadata))

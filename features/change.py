@@ -94,8 +94,11 @@ def change_db(parts: Parts) -> NDArray[np.float32]:
     """Standard deviation of the level over the parts, on the shared axis [dB], shape (..., axis bins)."""
     count = np.float32(PARTS)
     mean = np.add.reduce(parts.axis_db, axis=-2) / count
-    square = np.add.reduce(parts.axis_db * parts.axis_db, axis=-2) / count
-    return np.sqrt(np.maximum(square - mean * mean, np.float32(0)))
+    away = (
+        parts.axis_db - mean[..., None, :]
+    )  # not the difference of squares: that is mostly rounding where it is small
+    away *= away
+    return np.sqrt(np.add.reduce(away, axis=-2) / count)
 
 
 def centroid_mps(parts: Parts, axis_mps: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -146,6 +146,13 @@ def _surroundings(count: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
     return np.stack([start, stop]), (stop - start).astype(np.float32)
 
 
+def searched_periods(spectrum: Spectrum) -> tuple[int, int]:
+    """First and last period in which a chopping frequency is sought [samples]; nothing is where fewer than 5 remain."""
+    low, high = CHOPPING_RANGE_HZ
+    first = max(2, int(np.ceil(spectrum.prf_hz / high)))
+    return first, int(min(spectrum.prf_hz / low, spectrum.bins / MIN_SPACING_BINS))
+
+
 def cepstral_chopping(spectrum: Spectrum, mask: Mask) -> Chopping:
     """Estimate the chopping frequency (the paper's eq. 25) from the cepstrum.
 
@@ -163,9 +170,7 @@ def cepstral_chopping(spectrum: Spectrum, mask: Mask) -> Chopping:
     """
     heights = cepstrum(spectrum, mask)
     shape = heights.shape[:-1]
-    low, high = CHOPPING_RANGE_HZ
-    first = max(2, int(np.ceil(spectrum.prf_hz / high)))
-    last = int(min(spectrum.prf_hz / low, spectrum.bins / MIN_SPACING_BINS))
+    first, last = searched_periods(spectrum)
     if last - first < 4:
         nothing = np.zeros(shape, np.float32)
         return Chopping(np.full(shape, np.nan, np.float32), nothing, nothing)

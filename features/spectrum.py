@@ -19,6 +19,9 @@ NOISE_BANDWIDTH_BINS = 2.056
 #: Levels are not followed below this [dB re noise floor]: an empty side of the spectrum has no level.
 LOWEST_DB = -20.0
 
+#: Without any noise (a synthetic line) the floor is this share of the record's power, not what rounding leaves.
+LEAST_FLOOR = np.float32(1e-9)
+
 _FLOOR_QUANTILE = 0.25
 _FLOOR_QUANTILE_NORMAL = -0.6744897501960817  # standard normal quantile of 0.25
 _FLOOR_BLOCKS = 64  # a side of the spectrum
@@ -220,8 +223,7 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spec
     scale = unit_scale(samples)
     power = centred_power(scaled(samples, scale))
     floor = noise_floor(power)
-    # Without any noise (a synthetic line) the floor is what arithmetic leaves, not zero: -140 dB under the record.
-    floor = np.maximum(floor, power.mean(axis=-1) * np.float32(1e-14))
+    floor = np.maximum(floor, power.mean(axis=-1) * LEAST_FLOOR)
     safe = np.where(floor > 0, floor, np.float32(1))
     natural = floor / scale[..., 0].astype(np.float64) ** 2
     relative = np.divide(power, safe[..., None], out=power)
