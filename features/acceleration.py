@@ -72,9 +72,7 @@ def body_acceleration(
         snr = heights[best] / noise / pulses
         std[index] = np.sqrt(90 / (snr * float(pulses) ** 5)) * prf_hz**2 * wavelength_m / (2 * np.pi)
         rise = heights[best] / heights[reach]
-        smeared[index] = (
-            abs(at) > max(step, SURE_DEVIATIONS * std[index]) and rise > 10 ** (LEAST_RISE_DB / 10)
-        )
+        smeared[index] = abs(at) > max(step, SURE_DEVIATIONS * std[index]) and rise > 10 ** (LEAST_RISE_DB / 10)
     return value, std, smeared
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .notch import body_line
+from .periodogram import LINE_DB
 from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum
 from .stft import stft
 
@@ -94,6 +95,8 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
         return (*nothing, "no wingbeat: no signal" if scale == 0 else f"no wingbeat: PRF {prf_hz:g} Hz is too low")
     wavelength_m = SPEED_OF_LIGHT_MPS / carrier_hz
     velocity, acceleration, std = _track(iq / scale, carrier_hz, prf_hz)
+    if np.isnan(velocity):
+        return (*nothing, "no wingbeat: no body line")
     body = (velocity, acceleration, std)
     time_s = (np.arange(len(iq)) - (len(iq) - 1) / 2) / prf_hz
     turns = 2 / wavelength_m * (velocity * time_s + acceleration / 2 * time_s**2)
@@ -105,7 +108,13 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     floor = float(np.quantile(mean, 0.2))
     far = speed > WING_MPS
     if far.any() and (mean[far] > 2 * floor).mean() > FAR_SHARE:
-        return (np.nan, np.nan, np.nan, *body, f"no wingbeat: echoes beyond {WING_MPS:g} m/s of the body, a rotor's")
+        return (
+            np.nan,
+            np.nan,
+            np.nan,
+            *body,
+            f"no wingbeat: echoes beyond {WING_MPS:g} m/s of the body, too fast for wings",
+        )
     level = np.log1p(frames.power[:, ~far] / np.float32(floor)).astype(np.float64)
     # bouts and fading are slower than a beat
     span = round(frames.frame_rate_hz / WINGBEAT_RANGE_HZ[0])
@@ -123,10 +132,12 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
         return (np.nan, np.nan, np.nan, *body, "no wingbeat: nothing moves")
     row = correlation / correlation[0]
     low, high = WINGBEAT_RANGE_HZ
-    lag, lag_std, repeat = _repetition(row, frames.frame_rate_hz / high, frames.frame_rate_hz / low)
+    lag, lag_std, repeat = _repetition(row, FRAME_S * frames.frame_rate_hz, frames.frame_rate_hz / low)
     if not repeat >= LEAST_REPEAT:
         return (np.nan, np.nan, repeat, *body, f"no wingbeat: the pattern repeats by {max(repeat, 0):.2f} only")
     rate = frames.frame_rate_hz / lag
+    if rate > high:
+        return (np.nan, np.nan, repeat, *body, f"no wingbeat: the pattern repeats at {rate:.0f} Hz, too fast for wings")
     return (rate, rate * lag_std / lag, repeat, *body, "")
 
 
@@ -135,7 +146,10 @@ def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple
     length = round(BODY_DWELL_S * prf_hz)
     count = len(iq) // length
     spectrum = doppler_spectrum(iq[: count * length].reshape(count, length), carrier_hz=carrier_hz, prf_hz=prf_hz)
-    velocity = body_line(spectrum).velocity_mps.astype(np.float64)
+    body = body_line(spectrum)
+    if np.median(body.level_db) < LINE_DB:
+        return np.nan, np.nan, np.nan
+    velocity = body.velocity_mps.astype(np.float64)
     ambiguous = prf_hz * spectrum.wavelength_m / 2
     velocity = np.unwrap(velocity, period=ambiguous)
     when = ((np.arange(count) + 0.5) * length - (len(iq) - 1) / 2) / prf_hz
