@@ -95,7 +95,7 @@ def test_a_long_recording_of_a_bird_has_a_wingbeat(tmp_path, capsys):
     radar = {"carrier_hz": CARRIER_HZ, "prf_hz": 4e3, "pulses": 10000}
     part = {"name": "bird", "species": "paper_bird", "wing_db": 18.0, "heading_deg": 60.0}
     np.save(tmp_path / "bird.npy", Scene.build({"radar": radar, "bird": [part]}).render(1).iq)
-    given = ["measure", str(tmp_path / "bird.npy"), "--carrier-hz", "9.85e9", "--prf-hz", "4e3"]
+    given = ["measure", str(tmp_path / "bird.npy"), "--carrier-hz", "9.85e9", "--prf-hz", "4e3", "--dwell", "0.5"]
     assert main([*given, "--json"]) == 0
     found = json.loads(capsys.readouterr().out.splitlines()[-1])["recording"]
     assert found["wingbeat_hz"] == pytest.approx(1 / 0.302, abs=0.1)
