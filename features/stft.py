@@ -1,4 +1,4 @@
-"""Joint time-frequency counterparts of the spectrum: STFT, flash period, its band, cadences, cepstrogram, HERM lines."""
+"""Joint time-frequency counterparts of the spectrum: STFT, flashes, band, cadences, cepstrogram, HERM lines."""
 
 from dataclasses import dataclass
 
