@@ -27,7 +27,7 @@ BODY_DWELL_S = 0.1
 WING_MPS, FAR_SHARE = 25.0, 0.1
 
 #: How well the pattern must repeat after a beat, over what it does between beats [1 of the pattern's power].
-LEAST_REPEAT = 0.4
+LEAST_REPEAT = 0.5
 
 #: The earliest repetition with this share of the best is the beat, not a multiple.
 FIRST_SHARE = 0.8
@@ -94,6 +94,9 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     if scale == 0 or round(FRAME_S * prf_hz) < 8:
         return (*nothing, "no wingbeat: no signal" if scale == 0 else f"no wingbeat: PRF {prf_hz:g} Hz is too low")
     wavelength_m = SPEED_OF_LIGHT_MPS / carrier_hz
+    if prf_hz * wavelength_m / 4 < 1.1 * WING_MPS:
+        # a rotor folded into the wings' speeds cannot be told from them
+        return (*nothing, f"no wingbeat: unambiguous only to {prf_hz * wavelength_m / 4:.1f} m/s")
     velocity, acceleration, std = _track(iq / scale, carrier_hz, prf_hz)
     if np.isnan(velocity):
         return (*nothing, "no wingbeat: no body line")

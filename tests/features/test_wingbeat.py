@@ -100,6 +100,7 @@ def test_clutter_noise_and_silence_do_not_beat():
     found = wingbeat(np.stack([*clutter, *white(rng, 3, 10000), np.zeros(10000)]), **LONG)
     assert np.isnan(found.wingbeat_hz).all()
     assert all(found.reason)
+    assert "unambiguous only" in str(wingbeat(white(rng, 4000), carrier_hz=CARRIER_HZ, prf_hz=1.5e3).reason)
     assert "less than" in str(wingbeat(white(rng, 2000), **LONG).reason)
 
 
