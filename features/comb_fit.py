@@ -20,6 +20,9 @@ SMOOTHED_ORDERS = 2
 #: Added to one over the lines' snr: a line that lies half in a band taken out has little left to be fitted by.
 LEAST_RIDGE = 1e-6
 
+#: Added besides where that is not enough.
+NOTCH_RIDGE = 1e-2
+
 #: Well above this snr a line's amplitude is not held back: what that leaves of it would pull at its neighbours.
 CLEAR_SNR = 30.0
 
@@ -124,7 +127,11 @@ def fit_combs(
         without_bands(products, frequency, pulses, data.bands)
         if number == 0:
             snr = np.maximum(share @ (np.abs(seen) ** 2 * pulses / level) - 1, 1e-3)
-        factor = cho_factor(plain + np.diag(1 / (snr * (1 + (snr / CLEAR_SNR) ** 2)) + LEAST_RIDGE))
+        held_back = 1 / (snr * (1 + (snr / CLEAR_SNR) ** 2)) + LEAST_RIDGE
+        try:
+            factor = cho_factor(plain + np.diag(held_back))
+        except np.linalg.LinAlgError:  # what is tabulated of the notch is a little off where nearly all was taken out
+            factor = cho_factor(plain + np.diag(held_back + NOTCH_RIDGE))
         amplitudes = cho_solve(factor, seen)
         left = seen - plain @ amplitudes
         snr = np.maximum(share @ (np.abs(amplitudes + left) ** 2 * pulses / level) - 1, 1e-3)
