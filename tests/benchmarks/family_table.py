@@ -49,7 +49,7 @@ def trained(name: str, settings: TrainingConfig, sets: Sets, test: Gathered) -> 
 def described(probabilities: np.ndarray, answers: np.ndarray, test: Gathered, rows: np.ndarray) -> list[float]:
     """Balanced accuracy, share unknown, share wrongly named, and calibration error of the family.
 
-    The balance is over the three classes; those that the family does not belong to are represented by all their records.
+    The balance is over the three classes; those that the family does not belong to stand with all their records.
     """
     own = np.unique(test.labels[rows])
     recall = []
