@@ -80,6 +80,28 @@ def mixed_model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture(scope="session")
+def tiny_models(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of two models that cost nothing, under a known name and a strange one."""
+    folder = tmp_path_factory.mktemp("models")
+    (folder / "spectrum-cnn.onnx").write_bytes(model_bytes(slope=0.05))
+    (folder / "always-uav.onnx").write_bytes(model_bytes(bias=np.log([0.8, 0.15, 0.05])))
+    return folder
+
+
+@pytest.fixture(scope="session")
+def report_folder(tmp_path_factory: pytest.TempPathFactory, tiny_models: Path) -> Path:
+    """A whole report on few records: report.json and report.html."""
+    from bladewing.classify.report import run
+
+    folder = tmp_path_factory.mktemp("report") / "new"
+    tiny = run.Effort(records=120, reference_records=64, chain_s=1e-3, stft_s=1e-3, least_rounds=2)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run, "QUICK", tiny)
+        run.run_report(folder, models=tiny_models, quick=True, progress=False)
+    return folder
+
+
 @pytest.fixture
 def sigmf_pair(tmp_path: Path) -> Callable[..., Path]:
     """Write a SigMF recording, by default 4000 pulses of noise; keywords change the metadata, None drops a field."""

@@ -19,32 +19,15 @@ from bladewing.classify.report import run, run_report, scores
 from bladewing.classify.report.page import draw_page
 from bladewing.features.schema import INPUT_SHAPES
 
-TINY = run.Effort(records=120, reference_records=64, chain_s=1e-3, stft_s=1e-3, least_rounds=2)
-
 
 @pytest.fixture(scope="module")
-def models(tmp_path_factory: pytest.TempPathFactory, make_model: Callable[..., bytes]) -> Path:
-    folder = tmp_path_factory.mktemp("models")
-    (folder / "spectrum-cnn.onnx").write_bytes(make_model(slope=0.05))
-    (folder / "always-uav.onnx").write_bytes(make_model(bias=np.log([0.8, 0.15, 0.05])))
-    return folder
-
-
-@pytest.fixture(scope="module")
-def out(tmp_path_factory: pytest.TempPathFactory, models: Path) -> Path:
-    folder = tmp_path_factory.mktemp("report") / "new"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run, "QUICK", TINY)
-        run_report(folder, models=models, quick=True, progress=False)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def report(out: Path) -> dict[str, Any]:
+def report(report_folder: Path) -> dict[str, Any]:
     def refuse(name: str) -> None:
         raise AssertionError(f"{name} is not JSON")
 
-    found: dict[str, Any] = json.loads((out / "report.json").read_text(encoding="utf-8"), parse_constant=refuse)
+    found: dict[str, Any] = json.loads(
+        (report_folder / "report.json").read_text(encoding="utf-8"), parse_constant=refuse
+    )
     return found
 
 
@@ -90,7 +73,7 @@ def test_a_model_that_always_says_uav_is_scored_as_such(report: dict[str, Any]) 
     assert found["acceptance"]["coverage"]["value"] == 1.0
 
 
-def test_page_is_drawn_from_the_stored_json_alone_to_the_same_bytes(out: Path) -> None:
+def test_page_is_drawn_from_the_stored_json_alone_to_the_same_bytes(report_folder: Path) -> None:
     redraw = (
         "import json, sys; from bladewing.classify.report.page import draw_page; "
         "sys.stdout.buffer.write(draw_page(json.load(open(sys.argv[1], encoding='utf-8'))).encode())"
@@ -98,9 +81,12 @@ def test_page_is_drawn_from_the_stored_json_alone_to_the_same_bytes(out: Path) -
     for hash_seed in ("1", "2"):
         environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
         drawn = subprocess.run(
-            [sys.executable, "-c", redraw, str(out / "report.json")], env=environment, capture_output=True, check=True
+            [sys.executable, "-c", redraw, str(report_folder / "report.json")],
+            env=environment,
+            capture_output=True,
+            check=True,
         )
-        assert drawn.stdout == (out / "report.html").read_bytes()
+        assert drawn.stdout == (report_folder / "report.html").read_bytes()
 
 
 class Reader(HTMLParser):
@@ -143,8 +129,8 @@ def read(page: str) -> Reader:
     return reader
 
 
-def test_page_is_whole_asks_for_nothing_and_names_its_pictures(out: Path) -> None:
-    page = (out / "report.html").read_text(encoding="utf-8")
+def test_page_is_whole_asks_for_nothing_and_names_its_pictures(report_folder: Path) -> None:
+    page = (report_folder / "report.html").read_text(encoding="utf-8")
     reader = read(page)
     assert all(link.startswith(("#", "data:")) for link in reader.links)
     assert "@import" not in page
@@ -192,12 +178,12 @@ def test_page_of_another_schema_is_refused(report: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("where", ["scores.score", "draw_page", "write_together"])
 def test_interrupted_run_leaves_the_old_files_whole(
-    where: str, out: Path, models: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    where: str, report_folder: Path, tiny_models: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    old = {name: (out / name).read_bytes() for name in ("report.json", "report.html")}
+    old = {name: (report_folder / name).read_bytes() for name in ("report.json", "report.html")}
     for name, content in old.items():
         (tmp_path / name).write_bytes(content)
     monkeypatch.setattr(
@@ -205,7 +191,7 @@ def test_interrupted_run_leaves_the_old_files_whole(
     )
     monkeypatch.setattr(f"bladewing.classify.report.run.{where}", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        run_report(tmp_path, models=models, quick=True, seed=1, progress=False)
+        run_report(tmp_path, models=tiny_models, quick=True, seed=1, progress=False)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == old
 
 
