@@ -209,7 +209,7 @@ def run_tables(out: Path, seed: int = 0) -> dict[str, list[Row]]:
     BadInput
         The folder cannot be written to.
     """
-    tables = {title: [_without_nan(row) for row in rows(seed)] for title, rows in TABLES.items()}
+    tables = make_tables(seed)
     text = json.dumps({"seed": seed, "tables": tables}, indent=2, allow_nan=False) + "\n"
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -217,6 +217,11 @@ def run_tables(out: Path, seed: int = 0) -> dict[str, list[Row]]:
     except OSError as error:
         raise BadInput(f"{out}: cannot be written: {error.strerror or error}: give a folder") from None
     return tables
+
+
+def make_tables(seed: int = 0) -> dict[str, list[Row]]:
+    """Rows of each table; None where nothing was found."""
+    return {title: [_without_nan(row) for row in rows(seed)] for title, rows in TABLES.items()}
 
 
 def _without_nan(row: Row) -> Row:

@@ -1,12 +1,12 @@
 """The settings of a training: one validated table, from defaults, a TOML file and the command line."""
 
-import tomllib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from .errors import BadInput
+from .settings_file import build_settings
 
 #: What `--quick` changes: enough to see every step work, not a model to use.
 QUICK = {"records": 3000, "epochs": 3, "iterations": 20}
@@ -66,31 +66,10 @@ def training_config(
     """
     from bladewing.models import LADDER
 
-    values: dict[str, Any] = dict(QUICK) if quick else {}
-    if file is not None:
-        values |= _read(file)
-    values |= {name: value for name, value in (("records", records), ("seed", seed)) if value is not None}
+    options = {"records": records, "seed": seed}
+    config = build_settings(TrainingConfig, file, start=QUICK if quick else {}, options=options, what="training")
     where = str(file) if file is not None else "training settings"
-    try:
-        config = TrainingConfig(**values)
-    except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"])
-        if first["type"] == "extra_forbidden":
-            known = ", ".join(TrainingConfig.model_fields)
-            raise BadInput(f"{where}: unknown field {field!r}: the fields are {known}") from None
-        rule = first["msg"].removeprefix("Input ")
-        raise BadInput(f"{where}: {field} is {first['input']!r}: it {rule}") from None
     for name in config.models:
         if name not in LADDER:
             raise BadInput(f"{where}: models holds {name!r}: it may hold {', '.join(LADDER)}")
     return config
-
-
-def _read(file: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BadInput(f"{file}: cannot be read: {error.strerror}: give the path of a TOML file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadInput(f"{file}: not TOML: {error}") from None

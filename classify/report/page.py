@@ -13,7 +13,7 @@ from ..errors import BadInput
 from . import draw_cost, draw_examples, draw_scores, summary, words
 from .series import looks
 
-SCHEMA_VERSION = "1"
+SCHEMA_VERSION = "2"
 
 # Marker outlines on a 14 x 14 field, in the order of `svg.MARKERS`.
 _OUTLINES = (

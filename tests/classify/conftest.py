@@ -12,6 +12,20 @@ from bladewing.models.seal import PLACEHOLDER, SEAL_KEY, seal
 
 CARRIER_HZ, PRF_HZ = 10e9, 20e3
 
+#: The least a report can measure.
+TINY_REPORT = """
+records = 120
+reference_records = 64
+chain_s = 1e-3
+stft_s = 1e-3
+least_rounds = 2
+repeats = 2
+front_train = 210
+front_test = 6
+front_epochs = 1
+front_s = 1e-3
+"""
+
 
 def model_bytes(
     *,
@@ -92,13 +106,12 @@ def tiny_models(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def report_folder(tmp_path_factory: pytest.TempPathFactory, tiny_models: Path) -> Path:
     """A whole report on few records: report.json and report.html."""
-    from bladewing.classify.report import run
+    from bladewing.classify.report import run_report
 
     folder = tmp_path_factory.mktemp("report") / "new"
-    tiny = run.Effort(records=120, reference_records=64, chain_s=1e-3, stft_s=1e-3, least_rounds=2)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run, "QUICK", tiny)
-        run.run_report(folder, models=tiny_models, quick=True, progress=False)
+    config = tmp_path_factory.mktemp("settings") / "tiny.toml"
+    config.write_text(TINY_REPORT)
+    run_report(folder, models=tiny_models, quick=True, config=config, progress=False)
     return folder
 
 

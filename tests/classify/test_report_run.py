@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -155,6 +154,7 @@ def test_page_copes_with_one_model_without_answers(report: dict[str, Any]) -> No
         snr_db=np.full(120, np.nan),
         dwell_s=np.full(120, 0.08),
         radar=np.zeros(120, int),
+        beta_rad=np.full(120, np.nan),
     )
     refused = scores.Answers(np.full((120, 3), 1 / 3), np.full(120, scores.UNKNOWN), np.zeros(120, bool))
     lean["scores"] = {name: scores.score(truth, refused)}
