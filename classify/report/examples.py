@@ -19,6 +19,8 @@ from .stft import STFT_BINS, frames, stft
 WINDOW, OVERLAP = 80, 0.9
 # Strong enough to see, weak enough to be honest [dB].
 SNR_SHOWN_DB = (5.0, 20.0)
+# ... and with a line this far over the noise, if any has one [dB].
+CLEAR_DB = 20.0
 # Shown resolution: neighbouring values are pooled by their maximum, so that no line is lost.
 POINTS, ROWS, COLUMNS = 400, 128, 90
 # The velocities shown reach past the fastest line this strong [dB over the noise], and at least so far [m/s].
@@ -40,9 +42,9 @@ def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, 
         One a class present: ``class``, ``kind``, ``snr_db`` (or None), ``dwell_s``, ``spectrum`` (``velocity_mps``,
         ``level_db`` above the noise floor), ``measured`` (``reason`` why there is no comb, else ""; ``body_mps``,
         ``chopping_hz``, ``chopping_mps``, ``orders``, ``band_hz``, ``band_mps`` [slowest, fastest], ``tip_mps``; None
-        where there is no value; ``notches_mps``: pairs) and ``picture`` (``velocity_mps`` [first, last], ``time_s`` [first,
-        last], ``level_db`` rows of whole numbers, one a velocity, above the median
-        over all velocities). Velocities are cut where nothing is left to see.
+        where there is no value; ``notches_mps``: pairs) and ``picture`` (``velocity_mps`` [first, last], ``time_s``
+        [first, last], ``level_db`` rows of whole numbers, one a velocity, above the median over all velocities).
+        Velocities are cut where nothing is left to see.
     """
     radar, shown = records.radar, []
     for name in classes:
@@ -52,7 +54,8 @@ def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, 
         snr_db = np.asarray(records.truth["snr_db"], np.float64)
         low, high = SNR_SHOWN_DB
         fitting = where[(snr_db[where] >= low) & (snr_db[where] <= high)]
-        index = int(fitting[0] if fitting.size else where[0])
+        seen = [row for row in fitting if _spectrum(radar, records.iq[row])[1].max() > CLEAR_DB]
+        index = int([*seen, *fitting, *where][0])
         known = float(snr_db[index]) if np.isfinite(snr_db[index]) else None
         velocity, level = _spectrum(radar, records.iq[index])
         span = _span_mps(radar, velocity, level)

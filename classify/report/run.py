@@ -25,6 +25,7 @@ from ..labels import CLASSES
 from ..progress import Progress
 from ..train import ACCOUNT
 from . import cost, evaluate, scores, stft, storage, trade
+from .card import model_card
 from .examples import OVERLAP, WINDOW, show_examples, show_stfts
 from .front import Given, measure_front
 from .machine import describe_machine
@@ -224,7 +225,7 @@ def run_report(
     config: Path | None = None,
     progress: bool = True,
 ) -> dict[str, Any]:
-    """Measure the models on fresh synthetic records and write ``report.json`` and ``report.html``.
+    """Measure the models on fresh synthetic records and write ``report.json``, ``report.html`` and ``model-card.md``.
 
     The files change together after everything is measured and drawn: interrupted at any moment, the old ones or the
     new ones stand whole, and the next run of the same report goes on where this one stopped.
@@ -274,9 +275,11 @@ def run_report(
         text = _json({"schema_version": SCHEMA_VERSION, "made": made, **body})
         # The page is drawn from the very text that is stored, so that whoever has the file can draw it again.
         report: dict[str, Any] = json.loads(text)
-        write_together(out, {"report.json": text, "report.html": draw_page(report)})
+        write_together(
+            out, {"report.json": text, "report.html": draw_page(report), "model-card.md": model_card(report)}
+        )
         parts.forget()
-    bars.say(f"Wrote {out / 'report.html'} and {out / 'report.json'}")
+    bars.say(f"Wrote {out / 'report.html'}, {out / 'report.json'} and {out / 'model-card.md'}")
     return report
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from .timing import Work, quote, ratio, time_in_turns
 
@@ -120,8 +121,8 @@ def time_law(
     -------
     dict
         ``fft`` and ``stft``, each with ``points`` (``{"pulses", "window", "overlap", "operations", "time_us"}``) and
-        the fit of time = ``ns_each`` * operations ** ``power`` over them, with ``worst_factor``: how far the farthest point
-        lies from the fit.
+        the fit of time = ``call_us`` + ``ns_each`` * operations over them, with ``worst_factor``: how far the farthest
+        point lies from the fit.
     """
     rng = np.random.default_rng(seed)
     works: dict[int, Work] = {}
@@ -158,9 +159,13 @@ def _operations(length: int) -> float:
 
 
 def _fitted(points: list[dict[str, Any]]) -> dict[str, Any]:
-    """Least squares of the logarithms."""
-    operations = np.log([point["operations"] for point in points])
-    times_ns = np.log([1e3 * point["time_us"] for point in points])
-    power, offset = np.polyfit(operations, times_ns, 1)
-    worst = float(np.exp(np.abs(times_ns - offset - power * operations).max()))
-    return {"points": points, "power": float(power), "ns_each": float(np.exp(offset)), "worst_factor": worst}
+    """Least squares of the relative errors, neither term below zero."""
+    operations = np.array([point["operations"] for point in points])
+    times_us = np.array([point["time_us"] for point in points])
+    terms = np.stack([np.ones(len(points)), operations], axis=1) / times_us[:, None]
+    # in the columns' own sizes: one is a million times the other
+    sizes = np.linalg.norm(terms, axis=0)
+    (call_us, each_us), _ = nnls(terms / sizes, np.ones(len(points)))
+    call_us, each_us = float(call_us / sizes[0]), float(each_us / sizes[1])
+    worst = float(np.exp(np.abs(np.log((call_us + each_us * operations) / times_us)).max()))
+    return {"points": points, "call_us": call_us, "ns_each": 1e3 * each_us, "worst_factor": worst}

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -103,6 +104,42 @@ def tiny_models(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def linear_bytes(net: Any) -> bytes:
+    """A model with a network's inputs that takes no time to make: a report only times it."""
+    from onnx import TensorProto, helper, numpy_helper
+
+    signal, evidence = net.input_shapes
+    weights = numpy_helper.from_array(np.eye(4, 3, dtype=np.float32), "weights")
+    nodes = [
+        helper.make_node("Shape", [signal], ["unused"]),
+        helper.make_node("MatMul", [evidence, "weights"], ["scores"]),
+        helper.make_node("Softmax", ["scores"], ["probabilities"], axis=-1),
+    ]
+    inputs = [
+        helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *shape])
+        for name, shape in net.input_shapes.items()
+    ]
+    out = helper.make_tensor_value_info("probabilities", TensorProto.FLOAT, ["batch", 3])
+    graph = helper.make_graph(nodes, "linear", inputs, [out], [weights])
+    made = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
+    content: bytes = made.SerializeToString()
+    return content
+
+
+def few_choices(patch: pytest.MonkeyPatch) -> None:
+    """Let a report compare little: two pictures, three dwells, two numbers of bins; no process of its own."""
+    from bladewing.classify.report import choices, front, pictures
+
+    few = {name: pictures.PICTURES[name] for name in ("spectrum", "stft-80-90")}
+    dwells_s, bins = (0.005, 0.02, 0.08), (64, 1024)
+    for module in (front, choices):
+        patch.setattr(module, "PICTURES", few)
+        patch.setattr(module, "DWELLS_S", dwells_s)
+        patch.setattr(module, "STORED_BINS", bins)
+    patch.setattr(choices, "network_bytes", linear_bytes)
+    patch.setattr(front, "peak_bytes", lambda *_: 1_000_000)
+
+
 @pytest.fixture(scope="session")
 def report_folder(tmp_path_factory: pytest.TempPathFactory, tiny_models: Path) -> Path:
     """A whole report on few records: report.json and report.html."""
@@ -111,7 +148,9 @@ def report_folder(tmp_path_factory: pytest.TempPathFactory, tiny_models: Path) -
     folder = tmp_path_factory.mktemp("report") / "new"
     config = tmp_path_factory.mktemp("settings") / "tiny.toml"
     config.write_text(TINY_REPORT)
-    run_report(folder, models=tiny_models, quick=True, config=config, progress=False)
+    with pytest.MonkeyPatch.context() as patch:
+        few_choices(patch)
+        run_report(folder, models=tiny_models, quick=True, config=config, progress=False)
     return folder
 
 
