@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -71,7 +72,7 @@ def pictures_of(names: Sequence[str]) -> dict[str, Picture]:
         stored_name(bins): Picture(
             f"Doppler spectrum, {bins} bins",
             (2, bins),
-            lambda iq, radar, bins=bins: spectrum_picture(iq, radar, bins=bins),
+            partial(spectrum_picture, bins=bins),
         )
         for bins in STORED_BINS
     }
@@ -148,8 +149,9 @@ def network_for(picture: Picture, *, seed: int) -> Any:
     """An untrained network for a picture: one anatomy for spectra, one for pictures with time in them."""
     from bladewing.models.cnn import ImageNet, SpectrumNet
 
-    flat = len(picture.shape) == 2
-    return (SpectrumNet if flat else ImageNet)(picture.shape, 4, seed=seed)
+    if len(picture.shape) == 2:
+        return SpectrumNet((picture.shape[0], picture.shape[1]), 4, seed=seed)
+    return ImageNet((picture.shape[0], picture.shape[1], picture.shape[2]), 4, seed=seed)
 
 
 def network_bytes(net: Any) -> bytes:

@@ -93,7 +93,7 @@ def _decades(axes: Axes) -> float:
 
 def _label(axes: Axes, x: Sequence[float], y: Sequence[float], texts: Sequence[str]) -> None:
     """Write a letter beside each point, where neither a letter nor a point of the front stands already."""
-    figure = axes.get_figure()
+    figure = axes.get_figure(root=True)
     assert figure is not None
     figure.draw_without_rendering()
     points = [axes.transData.transform(pair) * 72.0 / figure.dpi for pair in zip(x, y, strict=True)]

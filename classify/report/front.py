@@ -142,8 +142,12 @@ def _score(models: Mapping[str, Given], config: ReportConfig, reference: Radar, 
         parts.take(f"front features {FEATURES}", partial(_features, sets, config))
     with phase("Training on every picture", max(1.0, len(missing))) as done:
         for place, name in enumerate(missing):
-            measure = _stored if name in stored else _picture
-            parts.take(f"front picture {name}", partial(measure, name, sets, config, lambda s, p=place: done(p + s)))
+
+            def share(part: float, place: int = place) -> None:
+                done(place + part)
+
+            measure: Callable[..., Any] = _stored if name in stored else _picture
+            parts.take(f"front picture {name}", partial(measure, name, sets, config, share))
 
 
 def _picture(name: str, sets: Mapping[str, Sets], config: ReportConfig, done: OnDone) -> dict[str, Any]:

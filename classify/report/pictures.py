@@ -108,8 +108,7 @@ def _pooled_power(some: NDArray[np.complex64]) -> NDArray[np.float32]:
     count = len(some)
     starts = np.arange(IMAGE_FRAMES) * count // IMAGE_FRAMES
     if count < IMAGE_FRAMES:
-        lines = transformed(some)
-        return (lines.real**2 + lines.imag**2)[starts]
+        return _squares(transformed(some))[starts]
     ends = np.append(starts[1:], count)
     pooled = np.empty((IMAGE_FRAMES, STFT_BINS), np.float32)
     # A few pools at a time: a whole STFT of a short window leaves every cache.
@@ -117,11 +116,16 @@ def _pooled_power(some: NDArray[np.complex64]) -> NDArray[np.float32]:
     for first in range(0, IMAGE_FRAMES, step):
         part = slice(first, first + step)
         begin, end = starts[part][0], ends[part][-1]
-        parts = transformed(some[begin:end]).view(np.float32)
-        np.multiply(parts, parts, out=parts)
-        squares = np.add.reduceat(parts, starts[part] - begin, axis=0)
-        pooled[part] = squares[:, ::2] + squares[:, 1::2]
+        pooled[part] = np.add.reduceat(_squares(transformed(some[begin:end])), starts[part] - begin, axis=0)
     return pooled / (ends - starts)[:, None].astype(np.float32)
+
+
+def _squares(lines: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """Power of each line."""
+    parts = lines.view(np.float32)
+    np.multiply(parts, parts, out=parts)
+    squares: NDArray[np.float32] = parts[..., ::2] + parts[..., 1::2]
+    return squares
 
 
 def radar_numbers(radar: Radar, count: int) -> NDArray[np.float32]:

@@ -93,7 +93,7 @@ def measure(
             )
 
     def transforms() -> dict[str, Any]:
-        effort = {"seed": config.seed, "seconds": config.stft_s, "least_rounds": config.repeats}
+        effort: dict[str, Any] = {"seed": config.seed, "seconds": config.stft_s, "least_rounds": config.repeats}
         with progress.phase("Timing FFT against STFT", 1.0) as done:
             against = stft.time_fft_against_stft(**effort, on_share=lambda share: done(0.8 * share))
             law = stft.time_law(against, **effort, on_share=lambda share: done(0.8 + 0.2 * share))

@@ -141,16 +141,22 @@ def few_choices(patch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="session")
-def report_folder(tmp_path_factory: pytest.TempPathFactory, tiny_models: Path) -> Path:
+def tiny_settings(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A settings file of the least report."""
+    file = tmp_path_factory.mktemp("settings") / "tiny.toml"
+    file.write_text(TINY_REPORT)
+    return file
+
+
+@pytest.fixture(scope="session")
+def report_folder(tmp_path_factory: pytest.TempPathFactory, tiny_models: Path, tiny_settings: Path) -> Path:
     """A whole report on few records: report.json and report.html."""
     from bladewing.classify.report import run_report
 
     folder = tmp_path_factory.mktemp("report") / "new"
-    config = tmp_path_factory.mktemp("settings") / "tiny.toml"
-    config.write_text(TINY_REPORT)
     with pytest.MonkeyPatch.context() as patch:
         few_choices(patch)
-        run_report(folder, models=tiny_models, quick=True, config=config, progress=False)
+        run_report(folder, models=tiny_models, quick=True, config=tiny_settings, progress=False)
     return folder
 
 

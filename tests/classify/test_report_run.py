@@ -33,13 +33,14 @@ def report(report_folder: Path) -> dict[str, Any]:
 def test_report_holds_the_data_of_every_figure(report: dict[str, Any]) -> None:
     assert set(report) == {
         *("schema_version", "made", "machine", "classes", "records", "models", "scores", "reference", "cost"),
-        *("trade", "fft_against_stft", "storage", "examples"),
+        *("trade", "front", "fft_against_stft", "time_law", "storage", "examples", "stft_pictures", "tables"),
+        *("training", "config"),
     }
     assert [model["name"] for model in report["models"]] == ["spectrum-cnn", "always-uav"]
     for found in report["scores"].values():
         assert set(found) == {
             *("refused", "accuracy", "design_effect", "balanced_accuracy", "recall", "confusion", "uav_at_pfa"),
-            *("false_uav", "reliability", "by_snr", "by_dwell", "by_kind", "acceptance"),
+            *("false_uav", "false_per_hour", "reliability", "by_snr", "by_dwell", "by_beta", "by_kind", "acceptance"),
         }
     for part in report["cost"]["batches"]:
         assert {(row["stage"], row["name"]) for row in part["stages"]} == {
@@ -178,21 +179,53 @@ def test_page_of_another_schema_is_refused(report: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("where", ["scores.score", "draw_page", "write_together"])
 def test_interrupted_run_leaves_the_old_files_whole(
-    where: str, report_folder: Path, tiny_models: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    where: str,
+    report_folder: Path,
+    tiny_models: Path,
+    tiny_settings: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    old = {name: (report_folder / name).read_bytes() for name in ("report.json", "report.html")}
+    old = {name: (report_folder / name).read_bytes() for name in ("report.json", "report.html", "model-card.md")}
     for name, content in old.items():
         (tmp_path / name).write_bytes(content)
-    monkeypatch.setattr(
-        run, "QUICK", run.Effort(records=12, reference_records=64, chain_s=1e-3, stft_s=1e-3, least_rounds=1)
-    )
+    body = json.loads(old["report.json"])
+    if where != "scores.score":
+        monkeypatch.setattr(run, "measure", lambda *_, **__: body)
     monkeypatch.setattr(f"bladewing.classify.report.run.{where}", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        run_report(tmp_path, models=tiny_models, quick=True, seed=1, progress=False)
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == old
+        run_report(tmp_path, models=tiny_models, quick=True, seed=1, config=tiny_settings, progress=False)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == old
+
+
+def test_an_interrupted_run_goes_on_where_it_stopped(
+    report: dict[str, Any],
+    tiny_models: Path,
+    tiny_settings: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    def again(*_: object, **__: object) -> None:
+        raise AssertionError("what was measured is measured again")
+
+    call = {"models": tiny_models, "quick": True, "config": tiny_settings, "progress": False}
+    with monkeypatch.context() as patch:
+        patch.setattr("bladewing.classify.report.run.cost.time_chain", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            run_report(tmp_path, **call)
+    monkeypatch.setattr("bladewing.classify.report.run.evaluate.ask", again)
+    # of what comes after, only that it is reached
+    monkeypatch.setattr("bladewing.classify.report.run.cost.time_chain", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        run_report(tmp_path, **call)
+    (kept,) = (tmp_path / "report-parts").glob("*/scores.json")
+    assert json.loads(kept.read_text())["scores"] == report["scores"]
 
 
 def test_no_models_is_one_clear_line(tmp_path: Path) -> None:
@@ -200,7 +233,7 @@ def test_no_models_is_one_clear_line(tmp_path: Path) -> None:
         run_report(tmp_path, models=tmp_path, quick=True, progress=False)
     with pytest.raises(BadInput, match="not a folder"):
         run_report(tmp_path, models=tmp_path / "missing", quick=True, progress=False)
-    with pytest.raises(BadInput, match="seed=-1"):
+    with pytest.raises(BadInput, match="seed is -1"):
         run_report(tmp_path, models=None, quick=True, seed=-1, progress=False)
 
 
