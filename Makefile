@@ -1,6 +1,7 @@
 # make train   install what is missing, train on synthetic records, write models and report to out/
 # make test    install what is missing, lint, check types, run every test
 # make bench   speed and size, as ratios within one run
+# make fuzz    hostile files, faults, broken guards and long runs, by the ten thousand (an hour)
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -9,7 +10,7 @@ OUT    ?= out
 NS     := build/ns
 SOURCES := simulate features models classify tests
 
-.PHONY: train test browser lint bench clean
+.PHONY: train test browser lint bench fuzz clean
 .DELETE_ON_ERROR:
 
 train: $(STAMP)
@@ -35,6 +36,12 @@ lint: $(STAMP)
 
 bench: $(STAMP)
 	$(BIN)/python -m pytest tests/benchmarks -o addopts="--import-mode=importlib" -q
+
+fuzz: $(STAMP)
+	$(BIN)/python -m tests.fuzz.long_run
+	$(BIN)/python -m tests.fuzz.faults
+	$(BIN)/python -m tests.fuzz.mutations
+	$(BIN)/python -m tests.fuzz.predictions
 
 # Made again only when the pins or the project's own description change.
 $(STAMP): pyproject.toml constraints.txt

@@ -1,6 +1,7 @@
 """IQ from .npy, .npz and .mat files. Nothing is ever unpickled."""
 
 import lzma
+import math
 import warnings
 import zipfile
 import zlib
@@ -12,12 +13,33 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
+from .bounds import open_zip, require_size
 from .errors import BadInput
+from .mat_file import require_sound
 
 ARRAY_SUFFIXES = (".npy", ".npz", ".mat")
 
 # What zipfile raises for damaged, encrypted or unknown contents.
 _ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, NotImplementedError, RuntimeError, ValueError)
+
+
+# What numpy raises for a damaged .npy: an old header is Python text, so that the tokeniser's errors come too.
+_NPY_ERRORS = (
+    ValueError,
+    EOFError,
+    MemoryError,
+    OverflowError,
+    TypeError,
+    KeyError,
+    AttributeError,
+    RecursionError,
+    SyntaxError,
+    TokenError,
+)
+
+# Version of the format to what reads its header, and in how many bytes that header's length stands.
+_HEADERS = {(1, 0): (np.lib.format.read_array_header_1_0, 2), (2, 0): (np.lib.format.read_array_header_2_0, 4)}
+_MOST_HEADER_BYTES = 10_000
 
 
 class _PickledError(BadInput):
@@ -53,11 +75,11 @@ def read_array(path: Path, variable: str | None = None) -> NDArray[np.generic]:
     if suffix == ".npy" and variable is not None:
         raise BadInput(f"{path}: variable {variable!r} given, but a .npy file holds one array: leave it out")
     try:
-        if path.stat().st_size == 0:
+        if not require_size(path):
             raise BadInput(f"{path}: the file is empty (0 bytes): copy or record it again")
         if suffix == ".npy":
             with open(path, "rb") as file:
-                return _parse_npy(file, str(path))
+                return _parse_npy(file, str(path), path.stat().st_size)
         arrays = _read_npz(path, variable) if suffix == ".npz" else _read_mat(path, variable)
     except OSError as error:
         if error.errno is None:  # not the system's: the readers' word for a file that ends too early
@@ -66,26 +88,48 @@ def read_array(path: Path, variable: str | None = None) -> NDArray[np.generic]:
     return _choose(arrays, variable, path)
 
 
-def _parse_npy(file: IO[bytes], name: str) -> NDArray[np.generic]:
+def _parse_npy(file: IO[bytes], name: str, size: int) -> NDArray[np.generic]:
     try:
-        return np.lib.format.read_array(file, allow_pickle=False)
-    # numpy reads an old header as Python text, so that a damaged one raises the tokeniser's errors too
-    except (ValueError, EOFError, MemoryError, OverflowError, TypeError, SyntaxError, TokenError) as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about headers of old versions
+            _require_whole(file, size)
+            return np.lib.format.read_array(file, allow_pickle=False)
+    except _NPY_ERRORS as error:
         if "Object arrays" in str(error):
             raise _PickledError(name) from None
         raise BadInput(_damaged(name, error)) from None
+
+
+def _require_whole(file: IO[bytes], size: int) -> None:
+    """Refuse a header that speaks of more than the file holds, before any room is made for it."""
+    version = np.lib.format.read_magic(file)
+    if version not in _HEADERS:
+        raise ValueError(f"version {version} of the format")
+    read_header, width = _HEADERS[version]
+    start, length = file.tell(), int.from_bytes(file.read(width), "little")
+    if length > _MOST_HEADER_BYTES:
+        raise ValueError(f"a header of {length} bytes")
+    file.seek(start)
+    shape, _, dtype = read_header(file)
+    if any(length < 0 for length in shape):
+        raise ValueError(f"shape {shape}")
+    claimed, held = math.prod(shape) * dtype.itemsize, size - file.tell()
+    if claimed > held and not dtype.hasobject:
+        raise ValueError(f"its header speaks of {claimed} bytes, {held} are there")
+    file.seek(0)
 
 
 def _read_npz(path: Path, variable: str | None) -> dict[str, NDArray[np.generic]]:
     arrays: dict[str, NDArray[np.generic]] = {}
     pickled: dict[str, _PickledError] = {}
     try:
-        with zipfile.ZipFile(path) as archive:
-            for member in archive.namelist():
+        with open_zip(path) as archive:
+            for entry in archive.infolist():
+                member = entry.filename
                 name = member.removesuffix(".npy")
-                with archive.open(member) as file:
+                with archive.open(entry) as file:
                     try:
-                        arrays[name] = _parse_npy(file, f"{path}: {member}")
+                        arrays[name] = _parse_npy(file, f"{path}: {member}", entry.file_size)
                     except _PickledError as error:
                         pickled[name] = error
     except BadInput:
@@ -103,6 +147,8 @@ def _read_mat(path: Path, variable: str | None) -> dict[str, NDArray[np.generic]
     import scipy.io
 
     try:
+        if scipy.io.matlab.matfile_version(path)[0] == 1:
+            require_sound(path)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about variables that are of no concern here
             kinds = {name: kind for name, _, kind in scipy.io.whosmat(path, appendmat=False)}

@@ -1,5 +1,6 @@
 """The command line. Exit codes: 0 done, 1 unexpected, 2 bad input, 130 interrupted; errors are one line on stderr."""
 
+import errno
 import json
 import os
 import sys
@@ -23,9 +24,15 @@ app = typer.Typer(
 # The parent of all usage errors has no public name that old and new versions of typer share.
 _UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])
 
-_TRAIN_EXTRA = {"torch", "sklearn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2"}
+_TRAIN_EXTRA = {"torch", "sklearn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2", "mpmath"}
+# A disk that is full, read-only or out of bounds is the user's to mend.
+_DISK_ERRORS = {
+    errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EFBIG, errno.ENOTDIR, errno.EISDIR,
+    errno.EEXIST, errno.ENAMETOOLONG, errno.ENOENT,
+}  # fmt: skip
 _TRACEBACK = "BLADEWING_TRACEBACK"
 
+Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]
 
 # Options that every command over recordings takes.
 DwellS = Annotated[float, typer.Option(metavar="SECONDS", help="Length of a dwell [s].")]
@@ -33,6 +40,14 @@ CarrierHz = Annotated[float | None, typer.Option(metavar="F", help="Carrier [Hz]
 PrfHz = Annotated[float | None, typer.Option(metavar="F", help="PRF [Hz], where the file does not say.")]
 Variable = Annotated[
     str | None, typer.Option(metavar="NAME", help="Which array of an .npz or .mat file, if it holds several.")
+]
+ModelName = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME|FILE",
+        help="A shipped model, an .onnx file, or fast, balanced or best.",
+        show_default="spectrum-cnn",
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object a line: one a dwell, a closing one a recording.")]
 
@@ -47,9 +62,22 @@ def predict(
             show_default=False,
         ),
     ],
-    model: Annotated[
-        str | None,
-        typer.Option(metavar="NAME|FILE", help="A shipped model or an .onnx file.", show_default="spectrum-cnn"),
+    model: ModelName = None,
+    budget_us: Annotated[
+        float | None,
+        typer.Option(
+            metavar="N",
+            help="Instead of a model: the most accurate one within N us a dwell (2048 pulses, in batches).",
+            show_default=False,
+        ),
+    ] = None,
+    max_false_alarm: Annotated[
+        float | None,
+        typer.Option(
+            metavar="P",
+            help="Largest share of birds and clutter to be named uav, 0.001 say; sets the threshold on uav.",
+            show_default=False,
+        ),
     ] = None,
     dwell: DwellS = 0.08,
     carrier_hz: CarrierHz = None,
@@ -64,7 +92,9 @@ def predict(
     from .inference import Classifier
 
     dwell_s = work.checked_dwell_s(dwell)
-    classifier = Classifier.load(model)
+    classifier = Classifier.load(model, budget_us=budget_us, max_false_alarm=max_false_alarm)
+    if classifier.operating_point is not None:
+        _complain(work.terms(classifier.operating_point), kind="note")
     said: Counter[str] = Counter()
     unreadable = 0
     for result in work.answers(
@@ -153,15 +183,50 @@ def train(
     records: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Synthetic records to train on.", show_default=False)
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")
-    ] = None,
+    seed: Seed = None,
     quick: Annotated[bool, typer.Option("--quick", help="Few records and epochs: a try, not a model to use.")] = False,
+    data: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Read the records from what `bladewing dataset` wrote, instead of drawing."),
+    ] = None,
 ) -> None:
     """Train all models on synthetic records and write them as ONNX."""
     from .train import run_training
 
-    run_training(out, records=records, seed=seed, quick=quick, config=config, progress=True)
+    run_training(out, records=records, seed=seed, quick=quick, config=config, data=data, progress=True)
+
+
+@app.command()
+def dataset(
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the data set: new, or to be gone on with.")],
+    records: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Records to train on; the other sets follow from it.")
+    ],
+    seed: Seed = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.toml", help="Settings of a training; the options given here come first."),
+    ] = None,
+) -> None:
+    """Write the records of a training to disk; interrupted, the same command goes on."""
+    from .dataset import run_dataset
+
+    run_dataset(out, records=records, seed=seed, config=config, progress=True)
+
+
+@app.command()
+def export(
+    out: Annotated[Path, typer.Argument(metavar="OUT.onnx", help="The graph to write.", show_default=False)],
+    carrier_hz: Annotated[float, typer.Option(metavar="F", help="Carrier [Hz].", show_default=False)],
+    prf_hz: Annotated[float, typer.Option(metavar="F", help="PRF [Hz].", show_default=False)],
+    pulses: Annotated[int, typer.Option(metavar="N", min=1, help="Pulses of a record.", show_default=False)],
+    model: ModelName = None,
+) -> None:
+    """Write one self-contained ONNX graph for a radar: raw IQ in, probabilities and label out, onnxruntime alone."""
+    from .export import export_raw_iq
+
+    worst = export_raw_iq(out, carrier_hz=carrier_hz, prf_hz=prf_hz, pulses=pulses, model=model)
+    print(f"Wrote {out}: iq (batch, {pulses}, 2) to probabilities and label, within {worst:.0e} of predict", flush=True)
 
 
 @app.command()
@@ -226,12 +291,23 @@ def simulate(
         raise BadInput(error.problems[-1]) from None
     for warning in found.warnings():
         _complain(f"{scene}: {warning}", kind="warning")
-    plan = None if full else found.plan(tolerance_db=tolerance_db)
+    plan = None if full else found.plan(seed, tolerance_db=tolerance_db)
     if explain:
         print(plan.explain() if plan else "full fidelity: nothing is left out", flush=True)
     if out is not None:
         written = write_rendering(out, render(found, seed, plan=plan), found, seed)
         print("\n".join(str(path) for path in written), flush=True)
+
+
+@app.command()
+def stability(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where stability.json, .md and .html go.")] = Path("out"),
+    quick: Annotated[bool, typer.Option("--quick", help="Leave out what takes minutes.")] = False,
+) -> None:
+    """Take every stage to its extremes: errors against a more precise oracle, and the guard that acts there."""
+    from .stability import run_stability
+
+    run_stability(out, quick=quick, progress=True)
 
 
 @app.command()
@@ -277,6 +353,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if error.name not in _TRAIN_EXTRA:
             return _unexpected(error)
         _complain(f"{error.name} is not installed, this command needs it: pip install 'bladewing[train]'")
+        return 2
+    except MemoryError:
+        _complain("more memory is needed than there is: give less at once (a shorter recording, fewer records)")
+        return 2
+    except OSError as error:
+        if error.errno not in _DISK_ERRORS:
+            return _unexpected(error)
+        name = f"{error.filename}: " if error.filename else ""
+        _complain(f"{name}{error.strerror}: make room or give another place; what stood there is unchanged")
         return 2
     except Exception as error:
         return _unexpected(error)

@@ -38,7 +38,7 @@ class Envelope:
     pulses_min: int = 64
     pulses_max: int = 65536
     dwell_min_s: float = 5e-3
-    dwell_max_s: float = 2.0
+    dwell_max_s: float = 5.0
     unambiguous_min_mps: float = 10.0
 
     def to_json(self) -> str:

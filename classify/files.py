@@ -4,8 +4,16 @@ import contextlib
 import json
 import os
 import secrets
-from collections.abc import Mapping
+import stat
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+
+from .errors import BadInput
+
+try:
+    import fcntl
+except ImportError:  # Windows: writers are not kept apart there
+    fcntl = None  # type: ignore[assignment]
 
 
 def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:
@@ -29,21 +37,88 @@ def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:
     target = Path(os.path.realpath(path))
     if target.is_dir():
         raise IsADirectoryError(f"{path} is a directory")
-    data = content.encode() if isinstance(content, str) else content
     beside = target.with_name(f".bladewing-{secrets.token_hex(8)}.tmp")
-    # Not tempfile: its files are private (0600), a result should follow the user's umask.
-    descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     try:
-        with open(descriptor, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
+        _write_new(beside, content)
         os.replace(beside, target)
     except BaseException:
         with contextlib.suppress(OSError):
             beside.unlink()
         raise
     _sync_folder(target.parent)
+
+
+def _write_new(path: Path, content: bytes | str) -> None:
+    """Write a file that is not there yet and bring it to the disk."""
+    # Not tempfile: its files are private (0600), a result should follow the user's umask.
+    with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666), "wb") as file:
+        file.write(content.encode() if isinstance(content, str) else content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+@contextlib.contextmanager
+def only_writer(folder: str | os.PathLike[str], *, wait: bool = True) -> Iterator[None]:
+    """Keep other writers out of a folder; the lock ends with the process, however that ends.
+
+    Parameters
+    ----------
+    folder
+        An existing folder. Within the ``with``, `write_together` and `settle` must not be called for it.
+    wait
+        Whether to wait while another process holds it.
+
+    Raises
+    ------
+    BlockingIOError
+        Another process holds the folder, and `wait` is False.
+    OSError
+        The folder is missing.
+    """
+    if fcntl is None:
+        yield
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError:
+            raise
+        except OSError:  # a file system without locks: writers are not kept apart there
+            pass
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def clear_litter(folder: str | os.PathLike[str], pattern: str = ".bladewing-*.*") -> None:
+    """Remove what killed writers left half written; only while no other process writes there (`only_writer`)."""
+    for path in Path(folder).glob(pattern):
+        if path.suffix in (".tmp", ".new"):
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
+def read_bounded(path: str | os.PathLike[str], most_bytes: int) -> bytes:
+    """Read a regular file of a bounded size; a device or a pipe, which may never end, is refused.
+
+    Raises
+    ------
+    ValueError
+        It is no regular file, or larger.
+    OSError
+        It cannot be read.
+    """
+    found = os.stat(path)
+    if not stat.S_ISREG(found.st_mode):
+        raise ValueError("it is no regular file")
+    if found.st_size > most_bytes:
+        raise ValueError(f"it has {found.st_size} bytes, more than the {most_bytes} that it may have")
+    with open(path, "rb") as file:
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        raise ValueError(f"it has more than the {most_bytes} bytes that it may have")
+    return content
 
 
 def _sync_folder(folder: Path) -> None:
@@ -56,8 +131,33 @@ def _sync_folder(folder: Path) -> None:
             os.close(descriptor)
 
 
+def result_folder(path: str | os.PathLike[str]) -> Path:
+    """Make the folder that results will go to, and see that it can be written to before any work is done.
+
+    Raises
+    ------
+    BadInput
+        It cannot be made, or not be written to.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be made a folder: {error.strerror}: give another place") from None
+    probe = folder / f".bladewing-{secrets.token_hex(8)}.tmp"
+    try:
+        _write_new(probe, b"")
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written to: {error.strerror}: give another place") from None
+    finally:
+        with contextlib.suppress(OSError):
+            probe.unlink()
+    return folder
+
+
 #: Journal of a change of several files that was decided but maybe not finished.
 _JOURNAL = ".bladewing-pending.json"
+_JOURNAL_BYTES = 1 << 20
 
 
 def write_together(folder: str | os.PathLike[str], files: Mapping[str, bytes | str]) -> None:
@@ -79,21 +179,25 @@ def write_together(folder: str | os.PathLike[str], files: Mapping[str, bytes | s
         The folder is not writable, or the disk is full. Nothing is changed then.
     """
     place = Path(folder)
-    settle(place)
-    waiting: dict[str, str] = {}
-    try:
-        for name, content in files.items():
-            if (place / name).is_dir():
-                raise IsADirectoryError(f"{place / name} is a directory")
-            beside = f".bladewing-{secrets.token_hex(8)}.new"
-            waiting[beside] = name
-            write_whole(place / beside, content)
-        write_whole(place / _JOURNAL, json.dumps(waiting))
-    except BaseException:
-        for beside in waiting:
-            (place / beside).unlink(missing_ok=True)
-        raise
-    settle(place)
+    with only_writer(place):
+        _settle(place)
+        clear_litter(place, ".bladewing-*.new")  # of writers that were killed before they decided
+        waiting: dict[str, str] = {}
+        try:
+            for name, content in files.items():
+                if (place / name).is_dir():
+                    raise IsADirectoryError(f"{place / name} is a directory")
+                beside = f".bladewing-{secrets.token_hex(8)}.new"
+                waiting[beside] = name
+                _write_new(place / beside, content)
+            _sync_folder(place)
+            write_whole(place / _JOURNAL, json.dumps(waiting))
+        except BaseException:
+            for name in (_JOURNAL, *waiting):  # the decision first, else half of what it names would be gone
+                with contextlib.suppress(OSError):
+                    (place / name).unlink()
+            raise
+        _settle(place)
 
 
 def settle(folder: str | os.PathLike[str]) -> None:
@@ -104,15 +208,25 @@ def settle(folder: str | os.PathLike[str]) -> None:
     folder
         A folder that `write_together` may have written to.
     """
-    place = Path(folder)
+    if (Path(folder) / _JOURNAL).exists():
+        with only_writer(folder):
+            _settle(Path(folder))
+
+
+def _settle(place: Path) -> None:
     journal = place / _JOURNAL
     try:
-        waiting = json.loads(journal.read_bytes())
+        waiting = json.loads(read_bounded(journal, _JOURNAL_BYTES))
+        renames = [(str(beside), str(name)) for beside, name in waiting.items()]
     except FileNotFoundError:
         return
-    for beside, name in waiting.items():
+    except (ValueError, AttributeError, RecursionError):
+        # written whole by whoever writes it: this one is not ours, and it must not stand in the way for ever
+        journal.unlink()
+        return
+    for beside, name in renames:
         # a name is taken for what it says only within the folder: a journal must not move files elsewhere
-        if Path(beside).name == beside and Path(name).name == name:
+        if Path(beside).match(".bladewing-*.new") and all(Path(one).name == one for one in (beside, name)):
             with contextlib.suppress(FileNotFoundError):
                 os.replace(place / beside, place / name)
     _sync_folder(place)

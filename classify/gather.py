@@ -2,16 +2,17 @@
 
 import os
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context, parent_process
+from typing import TypeVar
 
 import numpy as np
 from bladewing.features import INPUT_SHAPES, model_inputs
 from bladewing.simulate import stream
-from bladewing.simulate.dataset import RADAR_GROUP
+from bladewing.simulate.dataset import RADAR_GROUP, Records
 from numpy.typing import NDArray
 
 #: Records of one task: whole radar groups, so that no record is drawn twice.
@@ -74,10 +75,34 @@ def gather(
     -------
     Gathered
     """
-    workers = workers_at_hand() if workers is None else workers
-    tasks = [(seed, purpose, at, min(TASK_RECORDS, count - at), tuple(names)) for at in range(0, count, TASK_RECORDS)]
+    sources = [
+        partial(stream, seed, purpose, min(TASK_RECORDS, count - at), start=at) for at in range(0, count, TASK_RECORDS)
+    ]
+    return gather_from(sources, names=names, workers=workers, on_records=on_records)
+
+
+def gather_from(
+    sources: Sequence[Callable[[], Iterable[Records]]],
+    *,
+    names: Sequence[str],
+    workers: int | None = None,
+    on_records: Callable[[int], None] | None = None,
+) -> Gathered:
+    """Turn records into model inputs, wherever they come from.
+
+    Parameters
+    ----------
+    sources : sequence of callable
+        Each gives a run of consecutive records when it is called, in any process; at least one.
+    names, workers, on_records
+        As in `gather`.
+
+    Returns
+    -------
+    Gathered
+    """
     parts = []
-    for part in _finished(tasks, workers):
+    for part in in_order(partial(_inputs_of, tuple(names)), sources, workers):
         parts.append(part)
         if on_records:
             on_records(len(part))
@@ -88,21 +113,31 @@ def gather(
     )
 
 
-Task = tuple[int, str, int, int, tuple[str, ...]]
+Task = TypeVar("Task")
+Done = TypeVar("Done")
 
 
-def _finished(tasks: list[Task], workers: int) -> Iterator[Gathered]:
-    """Results in the order of the tasks, with at most a few tasks a worker under way."""
+def in_order(work: Callable[[Task], Done], tasks: Sequence[Task], workers: int | None = None) -> Iterator[Done]:
+    """Do tasks on several processes; give the results in the order of the tasks, a few a worker under way.
+
+    Parameters
+    ----------
+    work, tasks
+        What to do with each; both must travel to another process.
+    workers : int, optional
+        Processes; by default one a processor. 1 works in this process.
+    """
+    workers = workers_at_hand() if workers is None else workers
     if workers < 2 or len(tasks) < 2:
-        yield from map(_gather_task, tasks)
+        yield from map(work, tasks)
         return
     # spawn, not fork: a fork of a process with threads (torch, onnxruntime) may hang
     pool_of = partial(ProcessPoolExecutor, mp_context=get_context("spawn"), initializer=_end_with_parent)
     with pool_of(min(workers, len(tasks))) as pool:
-        waiting: list[Future[Gathered]] = []
+        waiting: list[Future[Done]] = []
         try:
             for task in tasks:
-                waiting.append(pool.submit(_gather_task, task))
+                waiting.append(pool.submit(work, task))
                 if len(waiting) >= 3 * workers:
                     yield waiting.pop(0).result()
             while waiting:
@@ -124,12 +159,11 @@ def _end_with_parent() -> None:
         threading.Thread(target=watch, daemon=True).start()
 
 
-def _gather_task(task: Task) -> Gathered:
+def _inputs_of(names: tuple[str, ...], source: Callable[[], Iterable[Records]]) -> Gathered:
     """Inputs of one run of consecutive records."""
-    seed, purpose, start, count, names = task
     inputs: dict[str, list[NDArray]] = {name: [] for name in names}
     labels, truths = [], []
-    for records in stream(seed, purpose, count, start=start):
+    for records in source():
         radar = records.radar
         computed = model_inputs(records.iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz, names=names)
         for name in names:

@@ -15,16 +15,24 @@ import numpy as np
 import onnxruntime
 from bladewing.features.inputs import model_inputs
 from bladewing.features.schema import INPUT_SHAPES, schema_hash
+from bladewing.features.spectrum import LEAST_PART, largest_part
 from bladewing.models import DEFAULT_MODEL
-from bladewing.models.seal import verify
+from bladewing.models.operating import OperatingCurve, OperatingPoint
+from bladewing.models.seal import read_metadata, verify
 from numpy.typing import ArrayLike, NDArray
 
+from .bounds import MOST_MODEL_BYTES
 from .envelope import Envelope
 from .errors import BadInput
+from .files import read_bounded
 from .labels import CLASSES, UNKNOWN, decide
+from .ladder import PLACES, by_budget, by_place, measured_fft_us, shipped_account
 from .samples import complex_samples, positive
 
 __all__ = ["Classifier", "Envelope", "Prediction", "model_names"]
+
+CURVE_KEY = "operating_curve"
+"""Metadata of the thresholds for every false-alarm rate; models of earlier versions hold none."""
 
 FORMAT = "1"
 """Version of the metadata that this code reads."""
@@ -60,6 +68,35 @@ def model_names() -> tuple[str, ...]:
     return tuple(sorted(names, key=lambda name: (name != DEFAULT_MODEL, name)))
 
 
+def read_model(name_or_path: str | os.PathLike[str] | None = None, budget_us: float | None = None) -> tuple[bytes, str]:
+    """Read a shipped model or a file, as `Classifier.load` takes them: the content, and what messages call it.
+
+    Raises
+    ------
+    BadInput
+        There is no such model, or it cannot be read.
+    """
+    given = DEFAULT_MODEL if name_or_path is None else os.fspath(name_or_path)
+    if budget_us is not None:
+        if name_or_path is not None:
+            raise BadInput(f"model {given!r} and a budget of {budget_us:g} us: give one of them")
+        given = by_budget(positive(budget_us, "budget_us"), shipped_account(), measured_fft_us())
+    elif given in PLACES:
+        given = by_place(given, shipped_account())
+    if given in model_names():
+        return resources.files("bladewing.models.pretrained").joinpath(f"{given}.onnx").read_bytes(), given
+    path = Path(given)
+    if path.is_dir():
+        raise BadInput(f"{given} is a directory: name the .onnx file in it")
+    try:
+        return read_bounded(path, MOST_MODEL_BYTES), given
+    except (FileNotFoundError, NotADirectoryError):
+        shipped = ", ".join(model_names()) or "none"
+        raise BadInput(f"no model {given!r}: give the path of an .onnx file or one of the shipped: {shipped}") from None
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name, no file, too large
+        raise BadInput(f"{given}: the model cannot be read: {getattr(error, 'strerror', None) or error}") from None
+
+
 class Classifier:
     """A model ready to answer. Use `Classifier.load`.
 
@@ -73,6 +110,9 @@ class Classifier:
         What error messages call it.
     threads
         CPU threads that one call may use.
+    max_false_alarm
+        Largest share of birds and clutter that may be named UAV; sets the threshold on "uav", above or below the
+        model's own.
 
     Attributes
     ----------
@@ -86,11 +126,15 @@ class Classifier:
         Least probability at which each class is named.
     inputs
         Names of the inputs it reads, keys of `bladewing.features.schema.INPUT_SHAPES`.
+    operating_point
+        The threshold that `max_false_alarm` chose and the detection probability that remains, of its calibration
+        records; None without one.
 
     Raises
     ------
     BadInput
-        Not a bladewing model, altered after it was written, or made for other inputs or another version.
+        Not a bladewing model, altered after it was written, or made for other inputs or another version; or its
+        calibration records do not support the false-alarm rate.
     """
 
     classes: tuple[str, str, str] = CLASSES
@@ -98,52 +142,59 @@ class Classifier:
     envelope: Envelope
     accept: tuple[float, float, float]
     inputs: tuple[str, ...]
+    operating_point: OperatingPoint | None
 
-    def __init__(self, onnx_bytes: bytes, *, source: str = "model", threads: int = 1) -> None:
+    def __init__(
+        self, onnx_bytes: bytes, *, source: str = "model", threads: int = 1, max_false_alarm: float | None = None
+    ) -> None:
         if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
             raise BadInput(f"threads is {threads!r}: it must be a whole number of 1 or more")
         try:
-            verify(onnx_bytes)  # before anything of the file is run
+            verify(onnx_bytes)  # before anything of the file is opened, and so is what it says of itself
+            self.metadata = MappingProxyType(read_metadata(onnx_bytes))
         except ValueError as error:
             raise BadInput(f"{source}: {error}") from None
-        self._session = _open_session(onnx_bytes, source, threads)
-        self.metadata = MappingProxyType(dict(self._session.get_modelmeta().custom_metadata_map))
         self.envelope, self.accept = _read_metadata(self.metadata, source)
+        self._session = _open_session(onnx_bytes, source, threads)
+        if dict(self._session.get_modelmeta().custom_metadata_map) != dict(self.metadata):
+            raise BadInput(f"{source}: damaged metadata: onnxruntime reads others: train it again")
         self.inputs = _read_inputs(self._session, source)
+        self.operating_point = None
+        if max_false_alarm is not None:
+            self.operating_point = _operating_point(self.metadata, max_false_alarm, source)
+            self.accept = (self.operating_point.threshold, *self.accept[1:])
 
     @classmethod
-    def load(cls, name_or_path: str | os.PathLike[str] | None = None, threads: int = 1) -> "Classifier":
+    def load(
+        cls,
+        name_or_path: str | os.PathLike[str] | None = None,
+        threads: int = 1,
+        *,
+        budget_us: float | None = None,
+        max_false_alarm: float | None = None,
+    ) -> "Classifier":
         """Load a shipped model by its name, or any bladewing model by its path.
 
         Parameters
         ----------
         name_or_path
-            One of `model_names()`, or a file; by default the shipped default model.
+            One of `model_names()`; "fast", "balanced" or "best" (see `ladder`); or a file. By default the shipped
+            default model.
         threads
             CPU threads that one call may use.
+        budget_us
+            Instead of a name: the most accurate shipped model that takes at most this for a record of 2048 pulses in
+            batches of 64 on one thread of this machine [us].
+        max_false_alarm
+            See `Classifier`.
 
         Raises
         ------
         BadInput
             There is no such model, or it is not one that can be used (see `Classifier`).
         """
-        given = DEFAULT_MODEL if name_or_path is None else os.fspath(name_or_path)
-        if given in model_names():
-            content = resources.files("bladewing.models.pretrained").joinpath(f"{given}.onnx").read_bytes()
-            return cls(content, source=given, threads=threads)
-        path = Path(given)
-        if path.is_dir():
-            raise BadInput(f"{given} is a directory: name the .onnx file in it")
-        try:
-            content = path.read_bytes()
-        except (FileNotFoundError, NotADirectoryError):
-            shipped = ", ".join(model_names()) or "none"
-            raise BadInput(
-                f"no model {given!r}: give the path of an .onnx file or one of the shipped: {shipped}"
-            ) from None
-        except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-            raise BadInput(f"{given}: the model cannot be read: {getattr(error, 'strerror', None) or error}") from None
-        return cls(content, source=given, threads=threads)
+        content, source = read_model(name_or_path, budget_us)
+        return cls(content, source=source, threads=threads, max_false_alarm=max_false_alarm)
 
     def predict(self, iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Prediction:
         """Tell UAV, bird and clutter apart.
@@ -189,10 +240,12 @@ class Classifier:
         if outside is not None:
             reasons = np.full(len(records), outside)
         else:
-            live = np.flatnonzero(records.any(axis=-1))
+            largest = largest_part(records)
+            live = np.flatnonzero(largest >= LEAST_PART)
             probabilities[live] = self._probabilities(records, live, carrier_hz, prf_hz)
             labels[live], why = decide(probabilities[live], self.accept)
             texts = np.full(len(records), "no signal: every sample is 0", dtype=object)
+            texts[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
             texts[live] = why
             reasons = texts.astype(np.str_)
         return Prediction(
@@ -218,7 +271,12 @@ def _open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.I
     options.inter_op_num_threads = 1
     options.log_severity_level = 4  # its messages come as exceptions; nothing else may reach the user's terminal
     try:
-        return onnxruntime.InferenceSession(onnx_bytes, options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(
+            onnx_bytes,
+            options,
+            providers=["CPUExecutionProvider"],
+            enable_fallback=0,  # which would print, and try the same again
+        )
     except Exception as error:  # its exceptions share no base class
         raise BadInput(f"{source}: onnxruntime {onnxruntime.__version__} cannot open the model: {error}") from None
 
@@ -244,9 +302,19 @@ def _read_metadata(metadata: Mapping[str, str], source: str) -> tuple[Envelope, 
         uav, bird, clutter = (float(limit) for limit in accept)
         if not all(np.isfinite((uav, bird, clutter))):
             raise ValueError(f"accept is {accept}, it must be three finite numbers")
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise BadInput(f"{source}: damaged metadata: {error}: train it again") from None
     return envelope, (uav, bird, clutter)
+
+
+def _operating_point(metadata: Mapping[str, str], max_false_alarm: float, source: str) -> OperatingPoint:
+    """The point of the model's curve that keeps to a false-alarm rate."""
+    if CURVE_KEY not in metadata:
+        raise BadInput(f"{source}: holds no operating curve, so no false-alarm rate can be chosen: train it again")
+    try:
+        return OperatingCurve.from_json(metadata[CURVE_KEY]).at(max_false_alarm)
+    except ValueError as error:
+        raise BadInput(f"{source}: {error}") from None
 
 
 def _read_inputs(session: onnxruntime.InferenceSession, source: str) -> tuple[str, ...]:

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from bladewing.features.acceleration import body_acceleration, without_acceleration
 from bladewing.features.measure import Measurements, measure
+from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
 from .errors import BadInput, one_line
 from .predict import checked_dwell_s, distinct
@@ -37,7 +39,16 @@ VALUES = (
     "rotation_hz_std",
     "blade_length_m",
     "blade_length_m_std",
+    "main_chopping_hz",
+    "main_chopping_hz_std",
+    "tail_chopping_hz",
+    "tail_chopping_hz_std",
+    "gear_ratio",
+    "gear_ratio_std",
 )
+
+#: What a recording's JSON object holds of the wingbeat.
+WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std")
 
 
 @dataclass(frozen=True)
@@ -88,6 +99,11 @@ class Measured:
         Shape (dwells,): where each dwell begins and ends [s].
     values
         The measurements, shape (dwells,).
+    acceleration_mps2, acceleration_mps2_std
+        Shape (dwells,): acceleration of the body over each dwell, NaN where no line stands out [m/s^2]. Where it smears
+        the lines it is taken out of `iq`.
+    beat
+        Wingbeat and body over the whole recording; None where that is too short.
     """
 
     recording: Recording
@@ -95,6 +111,9 @@ class Measured:
     start_s: np.ndarray
     stop_s: np.ndarray
     values: Measurements
+    acceleration_mps2: np.ndarray
+    acceleration_mps2_std: np.ndarray
+    beat: Wingbeat | None
 
     def json_objects(self) -> Iterator[dict[str, Any]]:
         """One object a dwell and a closing one; what has no value is null."""
@@ -105,20 +124,48 @@ class Measured:
                 "start_s": round(float(self.start_s[n]), 9),
                 "stop_s": round(float(self.stop_s[n]), 9),
                 **{name: _number(getattr(self.values, name)[n]) for name in VALUES},
+                "acceleration_mps2": _number(self.acceleration_mps2[n]),
+                "acceleration_mps2_std": _number(self.acceleration_mps2_std[n]),
                 "rotor_rates_hz": [float(rate) for rate in rates[np.isfinite(rates)]],
                 "rotors_resolved": bool(self.values.rotors_resolved[n]),
                 "length_is_lower_bound": self.values.length_is_lower_bound,
                 "alternatives": self.values.alternatives((n,)),
                 "reason": str(self.values.reason[n]) or None,
+                "gear_reason": str(self.values.gear_reason[n]) or None,
             }
         yield {"file": self.recording.name, "recording": self.together()}
 
     def together(self) -> dict[str, Any]:
-        """Medians over the dwells that hold a comb, and how many those are."""
+        """Medians over the dwells that hold a comb, or both of a helicopter's, and how many those are."""
         held = np.isfinite(self.values.chopping_hz)
         names = ("body_velocity_mps", "chopping_hz", "bandwidth_hz", "tip_speed_mps", "rotation_hz", "blade_length_m")
         medians = {name: _number(np.median(getattr(self.values, name)[held])) if held.any() else None for name in names}
-        return {"dwells": len(self.iq), "with_comb": int(held.sum()), **medians}
+        geared = np.isfinite(self.values.gear_ratio)
+        pair = ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
+        gear = {name: _number(np.median(getattr(self.values, name)[geared])) if geared.any() else None for name in pair}
+        counts = {"dwells": len(self.iq), "with_comb": int(held.sum()), "with_second_comb": int(geared.sum())}
+        return {**counts, **medians, **gear, **self.over_all()}
+
+    def over_all(self) -> dict[str, Any]:
+        """Wingbeat and acceleration over the whole recording; nothing where that is too short."""
+        if self.beat is None:
+            return {}
+        combs = int(np.isfinite(self.values.chopping_hz).sum())
+        # one false comb in a hundred dwells must not hide a bird
+        rotor = combs > 0.1 * len(self.iq)
+        names = ("acceleration_mps2", "acceleration_mps2_std")
+        beat = {name: None if rotor else _number(getattr(self.beat, name)) for name in WINGBEAT}
+        reason = f"no wingbeat: a rotor in {combs} of {len(self.iq)} dwells" if rotor else str(self.beat.reason) or None
+        return beat | {name: _number(getattr(self.beat, name)) for name in names} | {"wingbeat_reason": reason}
+
+    def beat_sentence(self) -> str:
+        """Wingbeat and acceleration in one line; empty where there is no wingbeat."""
+        found = self.over_all()
+        if found.get("wingbeat_hz") is None:
+            return ""
+        beat = with_error(found["wingbeat_hz"], found["wingbeat_hz_std"])
+        pull = with_error(found["acceleration_mps2"], found["acceleration_mps2_std"])
+        return f"wingbeat {beat} Hz; body acceleration {pull} m/s^2"
 
     def print(self, console: "Console") -> None:
         """Write a table, one line a dwell, and the line of the recording."""
@@ -152,6 +199,8 @@ class Measured:
         for reason, dwells in silent.items():
             console.print(Text(f"{dwells} dwells: {reason}"))
         console.print(Text(self.sentence()), soft_wrap=True)
+        if beat := self.beat_sentence():
+            console.print(Text(beat), soft_wrap=True)
 
     def sentence(self) -> str:
         """The recording in one line: the answer an engineer wants."""
@@ -176,7 +225,24 @@ class Measured:
                 for c in v.alternatives((clear,))[:4]
             )
             rotor = "blades x rate: " + " or ".join(options)
-        return f"comb in {all_together['with_comb']} of {all_together['dwells']} dwells; {rotor}; {body}"
+        return f"comb in {all_together['with_comb']} of {all_together['dwells']} dwells; {rotor}; {body}{self.gear()}"
+
+    def gear(self) -> str:
+        """A helicopter's main and tail comb and their ratio in words, of the dwell with the smallest error; or ""."""
+        v = self.values
+        geared = np.isfinite(v.gear_ratio)
+        # a single dwell of many may be chance
+        if geared.sum() <= 0.5 * np.isfinite(v.chopping_hz).sum():
+            return ""
+        n = int(np.nanargmin(v.gear_ratio_std))
+        main, tail, ratio = (
+            with_error(getattr(v, name)[n], getattr(v, f"{name}_std")[n])
+            for name in ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
+        )
+        return (
+            f"; helicopter in {geared.sum()} of {len(geared)} dwells: chopping main {main} Hz, tail {tail} Hz, "
+            f"ratio {ratio} : 1 (the gear's where both have as many blades)"
+        )
 
     def clearest(self) -> int:
         """The dwell whose comb stands highest over the noise; the first one where there is none."""
@@ -244,15 +310,20 @@ def measure_recording(recording: Recording, settings: Settings) -> Measured:
         raise BadInput(f"{recording.name}: 1 pulse: a measurement needs at least 2")
     iq = recording.dwells(settings.dwell_s, least=2)
     count, pulses = iq.shape
+    radar = {"carrier_hz": recording.carrier_hz, "prf_hz": recording.prf_hz}
+    acceleration, acceleration_std, smeared = body_acceleration(iq, **radar)
+    iq = without_acceleration(iq, np.where(smeared, acceleration, 0.0), **radar)
     values = measure(
         iq,
-        carrier_hz=recording.carrier_hz,
-        prf_hz=recording.prf_hz,
+        **radar,
         blades=settings.blades,
         beta_rad=settings.beta_rad,
     )
     start_s = recording.start_s + np.arange(count) * pulses / recording.prf_hz
-    return Measured(recording, iq, start_s, start_s + pulses / recording.prf_hz, values)
+    long = len(recording.iq) >= LEAST_S * recording.prf_hz
+    beat = wingbeat(recording.iq, **radar) if long else None
+    stop_s = start_s + pulses / recording.prf_hz
+    return Measured(recording, iq, start_s, stop_s, values, acceleration, acceleration_std, beat)
 
 
 def measured(

@@ -9,7 +9,7 @@ from .errors import one_line
 from .recording import Recording
 
 #: Colours of what is drawn behind the spectrum.
-_LEGEND = (("#dbe9f6", "band"), ("#f3d9b1", "notch"), ("#c0392b", "comb"))
+_LEGEND = (("#dbe9f6", "band"), ("#f3d9b1", "notch"), ("#c0392b", "comb"), ("#1e8449", "2nd comb"))
 
 _WIDTH, _HEIGHT, _LEFT, _BOTTOM, _TOP = 960, 420, 56, 44, 34
 
@@ -67,15 +67,25 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
         band(body_hz - width_hz / 2, body_hz + width_hz / 2, _LEGEND[0][0], f"band {width_hz:.0f} Hz")
     for centre_hz in {0.0, body_hz} if np.isfinite(body_hz) else {0.0}:
         band(centre_hz - NOTCH_MPS * per_mps, centre_hz + NOTCH_MPS * per_mps, _LEGEND[1][0], "notch")
-    if np.isfinite(chopping_hz):
-        reach = int(values.comb_order[index])
+
+    def comb(spacing_hz: float, half_hz: float, colour: str, length: int) -> None:
+        reach = int(half_hz / spacing_hz + 1e-6)
         for order in range(-reach, reach + 1):
-            hz = body_hz + order * chopping_hz
+            hz = body_hz + order * spacing_hz
             if low <= hz <= high:
                 parts.append(
-                    f'<path d="M{x(hz):.1f} {base:.1f}v6" stroke="#c0392b" stroke-width="1.2"/>'
-                    f'<path d="M{x(hz):.1f} {_TOP}V{base:.1f}" stroke="#c0392b" stroke-width="0.5" opacity="0.35"/>'
+                    f'<path d="M{x(hz):.1f} {base:.1f}v{length}" stroke="{colour}" stroke-width="1.2"/>'
+                    f'<path d="M{x(hz):.1f} {_TOP}V{base:.1f}" stroke="{colour}" stroke-width="0.5" opacity="0.35"/>'
                 )
+
+    # a helicopter's second comb is drawn over the first, as far out
+    both_hz = [float(values.main_chopping_hz[index]), float(values.tail_chopping_hz[index])]
+    if np.isfinite(chopping_hz):
+        half_hz = float(values.comb_order[index]) * chopping_hz
+        comb(chopping_hz, half_hz, _LEGEND[2][0], 6)
+        for other_hz in both_hz:
+            if np.isfinite(other_hz) and abs(other_hz / chopping_hz - 1) > 0.1:
+                comb(other_hz, half_hz, _LEGEND[3][0], 10)
     for db in np.arange(0, top_db + 1, 20):
         parts.append(f'<path d="M{_LEFT} {y(db):.1f}H{_WIDTH - 12}" stroke="#ccc" stroke-width="0.5"/>')
         parts.append(f'<text x="{_LEFT - 6}" y="{y(db) + 4:.1f}" text-anchor="end">{db:.0f}</text>')
@@ -85,11 +95,14 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
     for hz in np.arange(np.ceil(low / step_hz), np.floor(high / step_hz) + 1) * step_hz:
         parts.append(f'<path d="M{x(hz):.1f} {base:.1f}v4" stroke="#222" stroke-width="0.8"/>')
         parts.append(f'<text x="{x(hz):.1f}" y="{base + 20:.1f}" text-anchor="middle">{hz:.0f}</text>')
-    for number, (colour, words) in enumerate(_LEGEND):
-        left = _WIDTH - 12 - 76 * (len(_LEGEND) - number)
+    legend = _LEGEND if np.isfinite(both_hz).all() else _LEGEND[:3]
+    for number, (colour, words) in enumerate(legend):
+        left = _WIDTH - 12 - 76 * (len(legend) - number)
         parts.append(f'<rect x="{left}" y="{_TOP - 24}" width="12" height="12" fill="{colour}" stroke="#888"/>')
         parts.append(f'<text x="{left + 18}" y="{_TOP - 14}">{words}</text>')
     said = str(values.reason[index]) or f"comb every {chopping_hz:.2f} Hz, band {width_hz:.0f} Hz"
+    if np.isfinite(both_hz).all():
+        said += f"; main {both_hz[0]:.2f} Hz, tail {both_hz[1]:.2f} Hz, ratio {values.gear_ratio[index]:.3f}"
     title = escape(one_line(f"{recording.name}: {said}"))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" width="{_WIDTH}" '

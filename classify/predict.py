@@ -15,6 +15,7 @@ from .samples import positive
 from .track import Track, fuse
 
 if TYPE_CHECKING:
+    from bladewing.models.operating import OperatingPoint
     from rich.console import Console
 
     from .inference import Classifier, Prediction
@@ -23,6 +24,14 @@ DWELL_S = 0.08
 """Default length of a dwell [s]."""
 
 _COLOURS = {"uav": "bold red", "bird": "green", "clutter": "cyan", UNKNOWN: "yellow"}
+
+
+def terms(point: "OperatingPoint") -> str:
+    """Say what a chosen false-alarm rate costs."""
+    return (
+        f"uav from {point.threshold:.4f} on: at most {point.false_alarm:.2g} of birds and clutter are named uav, and "
+        f"{point.detection:.3f} of UAVs (synthetic calibration records of the whole envelope)"
+    )
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Settings of a command from defaults, a TOML file and the command line, each error one clear line."""
+"""Settings of a command: read from a TOML file, checked against their table, each error one clear line."""
 
 from __future__ import annotations
 
@@ -9,26 +9,36 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from .bounds import MOST_TEXT_BYTES
 from .errors import BadInput
+from .files import read_bounded
 
 Settings = TypeVar("Settings", bound=BaseModel)
 
 
-def build_settings(
-    table: type[Settings], file: Path | None, *, start: Mapping[str, Any], options: Mapping[str, Any], what: str
-) -> Settings:
-    """Put settings together: the table's defaults, then `start`, then the file, then the options.
+def given_settings(file: Path | None, **options: Any) -> dict[str, Any]:
+    """What a user gave: the fields of a TOML file, if one is named, then the options that are not None.
+
+    Raises
+    ------
+    BadInput
+        If the file cannot be read or is not TOML.
+    """
+    fields = {} if file is None else _read(file)
+    return fields | {name: value for name, value in options.items() if value is not None}
+
+
+def build_settings(table: type[Settings], values: Mapping[str, Any], *, where: str) -> Settings:
+    """Check values against their table.
 
     Parameters
     ----------
     table : type of pydantic model
         The fields, unknown ones forbidden.
-    file : Path or None
-        TOML file with fields of the table at its top level.
-    start, options : mapping
-        Field to value; an option of None was not given.
-    what : str
-        Whose settings they are, for error messages without a file.
+    values : mapping
+        Field to value.
+    where : str
+        Where they come from, for error messages.
 
     Returns
     -------
@@ -37,11 +47,8 @@ def build_settings(
     Raises
     ------
     BadInput
-        If the file cannot be read, is not TOML, or a field is unknown or out of its range.
+        If a field is unknown or out of its range.
     """
-    given = {name: value for name, value in options.items() if value is not None}
-    values = {**start, **(_read(file) if file is not None else {}), **given}
-    where = str(file) if file is not None else f"{what} settings"
     try:
         return table(**values)
     except ValidationError as error:
@@ -56,8 +63,8 @@ def build_settings(
 
 def _read(file: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        return tomllib.loads(read_bounded(file, MOST_TEXT_BYTES).decode())
     except OSError as error:
         raise BadInput(f"{file}: cannot be read: {error.strerror}: give the path of a TOML file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # too large, not UTF-8, not TOML, or nested beyond reason
         raise BadInput(f"{file}: not TOML: {error}") from None

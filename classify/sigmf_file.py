@@ -1,7 +1,9 @@
 """SigMF recordings, read through the `sigmf` library (which checks the SHA-512) with the rules for one range cell."""
 
+import io
 import json
 import re
+import tarfile
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -9,7 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .bounds import MOST_TEXT_BYTES, open_zip, require_size, unpacked
 from .errors import BadInput
+from .files import read_bounded
 from .samples import positive
 
 if TYPE_CHECKING:
@@ -95,11 +99,10 @@ def read_sigmf(path: Path) -> SigmfSamples:
 
 def _read_pair(path: Path) -> SigmfSamples:
     import sigmf
-    from sigmf.error import SigMFError
 
     try:
-        metadata = json.loads(path.read_bytes())
-    except (ValueError, RecursionError) as error:  # not UTF-8, not JSON, or nested beyond reason
+        metadata = json.loads(read_bounded(path, MOST_TEXT_BYTES))
+    except (ValueError, RecursionError) as error:  # too large, not UTF-8, not JSON, or nested beyond reason
         raise BadInput(f"{path}: not JSON: {error}: SigMF metadata are a JSON object") from None
     _check_structure(metadata, path)
     data = path.with_suffix(_DATA)
@@ -110,20 +113,22 @@ def _read_pair(path: Path) -> SigmfSamples:
         )
     if not data.is_file():
         raise BadInput(f"{path}: its samples {data.name} are missing: a SigMF recording is both files")
-    _check_length(metadata, data.stat().st_size, path)
+    _check_length(metadata, require_size(data), path)
     try:
         recording = sigmf.SigMFFile(metadata=metadata, data_file=data)
-    except SigMFError as error:
+    except OSError:
+        raise
+    except Exception as error:  # the library's own errors, and Python's where a field that is not used here is odd
         raise BadInput(_library_message(data, error)) from None
     return _samples(recording, path)
 
 
 def _read_archive(path: Path) -> SigmfSamples:
-    import sigmf
+    from sigmf.archivereader import SigMFArchiveReader
 
     try:
-        recording = sigmf.fromarchive(path)
-    except OSError:
+        recording = SigMFArchiveReader(**_bounded_archive(path)).sigmffile
+    except (BadInput, OSError):
         raise
     except Exception as error:  # tar, zip, xz, JSON and schema each raise their own
         raise BadInput(_library_message(path, error)) from None
@@ -135,6 +140,23 @@ def _read_archive(path: Path) -> SigmfSamples:
     _check_structure(metadata, path)
     _check_length(metadata, recording.data_size_bytes, path)
     return _samples(recording, path)
+
+
+def _bounded_archive(path: Path) -> dict[str, Any]:
+    """What to hand to the library, once it cannot unpack to more than a recording: it reads members whole."""
+    require_size(path)
+    with open(path, "rb") as file:
+        if file.read(2) == b"PK":
+            with open_zip(path):
+                file.seek(0)
+                return {"name": path} if path.name.endswith(".zip") else {"archive_buffer": io.BytesIO(file.read())}
+        content = unpacked(path)
+        file.seek(0)
+        with tarfile.open(fileobj=file if content is None else io.BytesIO(content), mode="r:") as tar:
+            for member in tar.getmembers():
+                if member.isfile() and (member.issparse() or member.size < 0):
+                    raise ValueError(f"{member.name!r} is stored sparse: pack the recording without holes")
+    return {"name": path} if content is None else {"archive_buffer": io.BytesIO(content)}
 
 
 def _library_message(path: Path, error: Exception) -> str:

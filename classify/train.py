@@ -4,8 +4,9 @@ import json
 import os
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,14 @@ from bladewing.features import INPUT_SHAPES, schema_hash
 from bladewing.models import LADDER
 from numpy.typing import NDArray
 
+from .dataset import DataSet, Plan
 from .envelope import Envelope
 from .errors import BadInput
-from .files import write_together
-from .gather import Gathered, gather
+from .files import result_folder, write_together
+from .gather import Gathered, gather, gather_from
+from .inference import CURVE_KEY
 from .labels import CLASSES
+from .ladder import COST_KEY, PULSES, RECORDS
 from .progress import Progress
 from .training_config import TrainingConfig, training_config
 
@@ -46,6 +50,7 @@ def run_training(
     seed: int | None = None,
     quick: bool = False,
     config: Path | None = None,
+    data: Path | None = None,
     progress: bool = True,
 ) -> dict[str, Any]:
     """Train the models of the ladder on synthetic records and write them to a folder.
@@ -56,6 +61,8 @@ def run_training(
         Folder for `<name>.onnx` and `train.json`; made if it is missing. All files change together at the end.
     records, seed, quick, config
         See `training_config`.
+    data : Path, optional
+        A data set (see `dataset`) to read the records from instead of drawing them; the models are the same.
     progress : bool
         Show progress and a table on the terminal.
 
@@ -67,31 +74,31 @@ def run_training(
     Raises
     ------
     BadInput
-        If a setting is wrong or the folder cannot be written.
+        If a setting is wrong, the data set cannot be used, or the folder cannot be written.
     """
-    settings = training_config(config, records=records, seed=seed, quick=quick)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(f"{out}: cannot be made a folder: {error.strerror}: give another --out") from None
+    stored = None if data is None else DataSet(data)
+    held = None if stored is None else {"records": stored.plan.records["train"], "seed": stored.plan.seed}
+    settings = training_config(config, records=records, seed=seed, quick=quick, stored=held)
+    if stored is not None and stored.plan != Plan.of(settings):
+        raise BadInput(f"{data}: holds sets of {stored.plan.records}, a training takes {settings.sets}: write it again")
+    result_folder(out)
     # Threads that spin while they wait make training several times slower beside another busy process.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     started = time.perf_counter()
     with Progress(visible=progress) as bars:
-        sets = _gather(settings, bars)
+        sets = _gather(settings, stored, bars)
         gathered_s = time.perf_counter() - started
         files: dict[str, bytes] = {}
         models: dict[str, dict[str, Any]] = {}
         for name in settings.models:
             with bars.phase(f"train {name}", 1) as on_fraction:
                 files[f"{name}.onnx"], models[name] = _train_one(name, settings, sets, on_fraction)
+    for name, cost in costs_ffts(files).items():
+        models[name][COST_KEY] = round(cost, 1)
     account = {
         "format": 1,
         "settings": settings.model_dump(mode="json"),
-        "records": {
-            "train": settings.records,
-            **dict.fromkeys(("validate", "calibrate", "test"), settings.held_out),
-        },
+        "records": settings.sets,
         "seconds": {"gather": round(gathered_s, 1), "all": round(time.perf_counter() - started, 1)},
         "false_alarm": settings.false_alarm,
         "models": models,
@@ -105,21 +112,48 @@ def run_training(
     return account
 
 
-def _gather(settings: TrainingConfig, bars: Progress) -> Sets:
-    """Draw the four sets, with only the inputs that the chosen models read."""
+def costs_ffts(files: Mapping[str, bytes]) -> dict[str, float]:
+    """What a record costs each model from samples to answer, over its bare FFT [1]; one thread, all in turns.
+
+    Parameters
+    ----------
+    files
+        File name, `<name>.onnx`, to the sealed model.
+    """
+    from scipy import fft
+
+    from .inference import Classifier
+    from .report.timing import quote, time_in_turns
+
+    parts = np.random.default_rng(0).standard_normal((RECORDS, 2 * PULSES), np.float32)
+    iq = parts.view(np.complex64)
+    works: dict[str, Callable[[], object]] = {"": lambda: fft.fft(iq)}
+    for file, content in files.items():
+        classifier = Classifier(content, source=file)
+        works[file.removesuffix(".onnx")] = partial(classifier.predict, iq, carrier_hz=10e9, prf_hz=25e3)
+    laps = time_in_turns(works, seconds=2.0, least_rounds=5, most_rounds=100)
+    medians = {name: quote(lap)["median_us"] for name, lap in laps.items()}
+    bare = medians.pop("")
+    return {name: median / bare for name, median in medians.items()}
+
+
+def _gather(settings: TrainingConfig, stored: DataSet | None, bars: Progress) -> Sets:
+    """Draw or read the four sets, with only the inputs that the chosen models read."""
     names = tuple(name for name in INPUT_SHAPES if any(name in LADDER[model] for model in settings.models))
-    counts = {"train": settings.records, **dict.fromkeys(("validate", "calibrate", "test"), settings.held_out)}
-    total, done = sum(counts.values()), 0
+    total, done = sum(settings.sets.values()), 0
     sets = {}
-    with bars.phase(f"draw {total} records", total) as on_done:
-        for purpose, count in counts.items():
+    with bars.phase(f"{'draw' if stored is None else 'read'} {total} records", total) as on_done:
+        for purpose, count in settings.sets.items():
 
             def on_records(number: int) -> None:
                 nonlocal done
                 done += number
                 on_done(done)
 
-            sets[purpose] = gather(settings.seed, purpose, count, names=names, on_records=on_records)
+            if stored is None:
+                sets[purpose] = gather(settings.seed, purpose, count, names=names, on_records=on_records)
+            else:
+                sets[purpose] = gather_from(stored.sources(purpose), names=names, on_records=on_records)
     return Sets(**sets)
 
 
@@ -133,6 +167,7 @@ def _train_one(
         fit_vector_scaling,
     )
     from bladewing.models.export import TABULAR_TOLERANCE, attach_metadata, check_export
+    from bladewing.models.operating import operating_curve
     from bladewing.models.seal import seal
 
     started = time.perf_counter()
@@ -143,6 +178,7 @@ def _train_one(
     accept = acceptance_thresholds(calibrated, sets.calibrate.labels, settings.precision)
     # A false drone is what users complain of: "uav" must also keep the false-alarm rate, however many UAVs it costs.
     accept[0] = max(accept[0], _alarm_threshold(calibrated, sets.calibrate.labels, settings.false_alarm))
+    curve = operating_curve(calibrated, sets.calibrate.labels)
     onnx_bytes = export(calibration)
     probabilities = calibration.probabilities(scores_of(sets.test))
     difference = check_export(
@@ -170,6 +206,7 @@ def _train_one(
         "envelope": Envelope().to_json(),
         "calibration": json.dumps(account["calibration"]),
         "accept": json.dumps(account["accept"]),
+        CURVE_KEY: curve.to_json(),
         "training": settings.model_dump_json(),
     }
     sealed = seal(attach_metadata(onnx_bytes, metadata))

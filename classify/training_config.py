@@ -1,12 +1,13 @@
 """The settings of a training: one validated table, from defaults, a TOML file and the command line."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from .errors import BadInput
-from .settings_file import build_settings
+from .settings_file import build_settings, given_settings
 
 #: What `--quick` changes: enough to see every step work, not a model to use.
 QUICK = {"records": 3000, "epochs": 3, "iterations": 20}
@@ -40,9 +41,19 @@ class TrainingConfig(BaseModel):
         """Records of each of the three sets that are not trained on: validation, calibration and test."""
         return max(600, min(self.records // 6, 30_000))
 
+    @property
+    def sets(self) -> dict[str, int]:
+        """Records of each set: purpose (see `bladewing.simulate.stream`) to number."""
+        return {"train": self.records, **dict.fromkeys(("validate", "calibrate", "test"), self.held_out)}
+
 
 def training_config(
-    file: Path | None = None, *, records: int | None = None, seed: int | None = None, quick: bool = False
+    file: Path | None = None,
+    *,
+    records: int | None = None,
+    seed: int | None = None,
+    quick: bool = False,
+    stored: Mapping[str, int] | None = None,
 ) -> TrainingConfig:
     """Put the settings together: defaults, then `--quick`, then the file, then the options.
 
@@ -54,6 +65,8 @@ def training_config(
         Override the file.
     quick : bool
         Start from few records and epochs.
+    stored : mapping of str to int, optional
+        Records and seed of the data set that is trained on; the file and the options may only say the same.
 
     Returns
     -------
@@ -66,9 +79,12 @@ def training_config(
     """
     from bladewing.models import LADDER
 
-    options = {"records": records, "seed": seed}
-    config = build_settings(TrainingConfig, file, start=QUICK if quick else {}, options=options, what="training")
+    values = given_settings(file, records=records, seed=seed)
     where = str(file) if file is not None else "training settings"
+    for name, held in (stored or {}).items():
+        if values.setdefault(name, held) != held:
+            raise BadInput(f"{where}: {name} is {values[name]!r}, but the data set has {held}: leave it out")
+    config = build_settings(TrainingConfig, (QUICK if quick else {}) | values, where=where)
     for name in config.models:
         if name not in LADDER:
             raise BadInput(f"{where}: models holds {name!r}: it may hold {', '.join(LADDER)}")

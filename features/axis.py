@@ -64,11 +64,11 @@ class Pooling:
     def peak_db(self, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
         """Largest level of each axis bin over that of noise in as many bins [dB], shape (..., bins)."""
         peak = self._pooled(np.maximum, relative_power)
-        peak /= self._expected_peak
+        peak /= self.expected_peak
         return self._place(to_db(peak))
 
     @cached_property
-    def _expected_peak(self) -> NDArray[np.float32]:
+    def expected_peak(self) -> NDArray[np.float32]:
         """Mean of the largest of so many exponentials."""
         independent = np.maximum(self.counts / np.float32(NOISE_BANDWIDTH_BINS), 1)
         return np.maximum(np.log(independent) + np.euler_gamma, 1).astype(np.float32)

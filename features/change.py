@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axis import pooling
-from .spectrum import Spectrum, centred_power
+from .spectrum import Spectrum, centred_power, scaled
 
 #: Parts of a dwell, half overlapping, each a quarter of it long.
 PARTS = 7
@@ -63,10 +63,10 @@ def _frame_starts(pulses: int, length: int, count: int) -> tuple[NDArray[np.intp
 
 def frame_power(iq: NDArray[np.complex64], spectrum: Spectrum, length: int, count: int) -> NDArray[np.float32]:
     """Power spectra of frames in units of the dwell's noise floor, shape (..., count, bins)."""
-    parts = frames(iq * spectrum.scale, length, count)
+    parts = frames(scaled(iq, spectrum.scale), length, count)
     floor = (spectrum.floor * spectrum.scale[..., 0].astype(np.float64) ** 2).astype(np.float32)
     power = centred_power(parts)
-    return (power / np.where(floor > 0, floor, 1)[..., None, None]).astype(np.float32, copy=False)
+    return np.divide(power, np.where(floor > 0, floor, np.float32(1))[..., None, None], out=power)
 
 
 def parts_of(iq: NDArray[np.complex64], spectrum: Spectrum, axis_bins: int) -> Parts:
@@ -94,8 +94,11 @@ def change_db(parts: Parts) -> NDArray[np.float32]:
     """Standard deviation of the level over the parts, on the shared axis [dB], shape (..., axis bins)."""
     count = np.float32(PARTS)
     mean = np.add.reduce(parts.axis_db, axis=-2) / count
-    square = np.add.reduce(parts.axis_db * parts.axis_db, axis=-2) / count
-    return np.sqrt(np.maximum(square - mean * mean, np.float32(0)))
+    away = (
+        parts.axis_db - mean[..., None, :]
+    )  # not the difference of squares: that is mostly rounding where it is small
+    away *= away
+    return np.sqrt(np.add.reduce(away, axis=-2) / count)
 
 
 def centroid_mps(parts: Parts, axis_mps: NDArray[np.float64]) -> NDArray[np.float32]:

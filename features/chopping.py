@@ -18,7 +18,11 @@ MIN_SPACING_BINS = 3.5
 
 #: A peak at a multiple of the period is passed over for one at the period itself if that has this share of it (unlike
 #: rotor rates blur the high orders, and with them the first peak) and is no accident of noise.
-FUNDAMENTAL_SHARE, FUNDAMENTAL_STRENGTH = 0.35, 3.5
+FUNDAMENTAL_SHARE, FUNDAMENTAL_STRENGTH = 0.4, 3.5
+
+#: A period counts for its own peak, for this share of the one at twice the period (a comb repeats, a ripple of the
+#: band's envelope does not), and the longer the more, by this power: such ripples crowd the short periods.
+REPEAT_SHARE, LENGTH_POWER = 0.5, 0.15
 
 #: Lines stand out of the spectrum by no more than this [dB], so that one strong line does not become the cepstrum.
 CLIP_DB = 30.0
@@ -94,7 +98,11 @@ def cepstrum(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     count = np.maximum(np.add.reduce(kept, axis=-1, keepdims=True), np.float32(1))
     mean = np.add.reduce(level, axis=-1, keepdims=True) / count
     level -= kept * mean
-    magnitude = np.abs(fft.rfft(level, axis=-1))
+    # the root of the squares takes a fraction of the time of `abs`, which guards against an overflow that cannot be
+    parts = fft.rfft(level, axis=-1, overwrite_x=True).view(np.float32)
+    np.multiply(parts, parts, out=parts)
+    magnitude = parts[..., ::2] + parts[..., 1::2]
+    np.sqrt(magnitude, out=magnitude)
     magnitude /= noise_shape(spectrum.pulses, spectrum.bins)
     return magnitude
 
@@ -115,13 +123,13 @@ def prominence(heights: NDArray[np.float32]) -> NDArray[np.float32]:
     """
     count = heights.shape[-1]
     edges, widths = _surroundings(count)
-    total = np.zeros((*heights.shape[:-1], count + 1))
-    np.cumsum(heights, axis=-1, dtype=np.float64, out=total[..., 1:])
-    at = np.take(total, edges, axis=-1)
+    total = np.zeros((*heights.shape[:-1], count + 1), np.float32)
+    np.cumsum(heights, axis=-1, out=total[..., 1:])
+    at = np.take(total, edges, axis=-1, mode="clip")  # all are in range; "clip" alone spares a copy
     means = at[..., 1, :, :] - at[..., 0, :, :]
     means /= widths
     around = np.maximum(means[..., 0, :], means[..., 1, :])
-    out = heights - around.astype(np.float32)
+    out = heights - around
     out += np.add.reduce(heights, axis=-1, keepdims=True) / np.float32(count)
     np.maximum(out, np.float32(0), out=out)
     out[..., :2] = 0
@@ -129,13 +137,20 @@ def prominence(heights: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 @lru_cache(maxsize=64)
-def _surroundings(count: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+def _surroundings(count: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
     """First and last of the periods below and above each, shape (2, 2, count), and how many they are, (2, count)."""
     period = np.arange(count)
     low, high = (np.array(shares)[:, None] for shares in ((0.6, 1.15), (0.85, 1.4)))
     start = np.minimum((low * period).astype(np.intp), count - 1)
     stop = np.minimum(np.maximum((high * period).astype(np.intp), start + 1), count)
-    return np.stack([start, stop]), (stop - start).astype(np.float64)
+    return np.stack([start, stop]), (stop - start).astype(np.float32)
+
+
+def searched_periods(spectrum: Spectrum) -> tuple[int, int]:
+    """First and last period in which a chopping frequency is sought [samples]; nothing is where fewer than 5 remain."""
+    low, high = CHOPPING_RANGE_HZ
+    first = max(2, int(np.ceil(spectrum.prf_hz / high)))
+    return first, int(min(spectrum.prf_hz / low, spectrum.bins / MIN_SPACING_BINS))
 
 
 def cepstral_chopping(spectrum: Spectrum, mask: Mask) -> Chopping:
@@ -155,9 +170,7 @@ def cepstral_chopping(spectrum: Spectrum, mask: Mask) -> Chopping:
     """
     heights = cepstrum(spectrum, mask)
     shape = heights.shape[:-1]
-    low, high = CHOPPING_RANGE_HZ
-    first = max(2, int(np.ceil(spectrum.prf_hz / high)))
-    last = int(min(spectrum.prf_hz / low, spectrum.bins / MIN_SPACING_BINS))
+    first, last = searched_periods(spectrum)
     if last - first < 4:
         nothing = np.zeros(shape, np.float32)
         return Chopping(np.full(shape, np.nan, np.float32), nothing, nothing)
@@ -166,7 +179,7 @@ def cepstral_chopping(spectrum: Spectrum, mask: Mask) -> Chopping:
     window = flat[:, first : last + 1]
     # the median of Rayleigh heights is 0.83 of their rms; a comb's own peaks do not move it
     rms = _median(heights.reshape(flat.shape)[:, first : last + 1]) / np.float32(0.8326)
-    highest = window.argmax(axis=-1)
+    highest = _evidence(flat, first, last).argmax(axis=-1)
     top, peak = first + highest, window[rows, highest]
     least = np.maximum(FUNDAMENTAL_SHARE * peak, FUNDAMENTAL_STRENGTH * rms)
     near = np.rint(top / _DIVISORS).astype(np.intp)
@@ -189,6 +202,26 @@ def cepstral_chopping(spectrum: Spectrum, mask: Mask) -> Chopping:
     return Chopping(
         frequency.reshape(shape), strength.astype(np.float32).reshape(shape), repeats.astype(np.float32).reshape(shape)
     )
+
+
+def _evidence(peaks: NDArray[np.float32], first: int, last: int) -> NDArray[np.float32]:
+    """What speaks for each period from `first` to `last` as that of a comb, shape (records, last - first + 1)."""
+    out = peaks[:, first : last + 1].copy()
+    stop = min(last, (peaks.shape[1] - 2) // 2)
+    if stop >= first:  # twice the period, or a sample beside it: the period is no whole number
+        twice = peaks[:, 2 * first - 1 : 2 * stop + 2]
+        again = np.maximum(twice[:, :-2:2], twice[:, 2::2])
+        np.maximum(again, twice[:, 1:-1:2], out=again)
+        again *= np.float32(REPEAT_SHARE)
+        out[:, : stop - first + 1] += again
+    out *= _length_weights(first, last)
+    return out
+
+
+@lru_cache(maxsize=64)
+def _length_weights(first: int, last: int) -> NDArray[np.float32]:
+    """How much a period counts for its length alone, 1 for the longest."""
+    return ((np.arange(first, last + 1) / last) ** LENGTH_POWER).astype(np.float32)
 
 
 def _median(values: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -8,12 +8,13 @@ from numpy.typing import ArrayLike, NDArray
 from .bandwidth import threshold_band_hz
 from .chopping import Chopping
 from .comb import LEAST_REACH_MPS, Comb, find_comb
+from .helicopter import find_gear
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .periodogram import Periodogram, prepare
 from .rotor_band import fit_edge
-from .rotors import MAX_ROTORS, separate_rotors
+from .rotors import MAX_ROTORS
 from .smearing import smearing_index
-from .spectrum import Spectrum, doppler_spectrum
+from .spectrum import LEAST_PART, Spectrum, doppler_spectrum, largest_part
 
 #: Threshold of the paper's bandwidth rule over the noise [dB]: it took 20 on measured data, 30 on simulated.
 PAPER_THRESHOLD_DB = 20.0
@@ -60,6 +61,12 @@ class Measurements:
         True where beta was not given.
     reason : ndarray of str
         Why there is no comb; empty where there is one.
+    main_chopping_hz, main_chopping_hz_std, tail_chopping_hz, tail_chopping_hz_std : ndarray
+        Of a helicopter: chopping frequency of the main and of the tail rotor [Hz]; NaN where no second comb is seen.
+    gear_ratio, gear_ratio_std : ndarray
+        Tail over main chopping frequency [1]: the gear's ratio where both rotors have as many blades.
+    gear_reason : ndarray of str
+        Why there is no second comb; empty where there is one.
     """
 
     body_velocity_mps: NDArray[np.float64]
@@ -85,6 +92,13 @@ class Measurements:
     blade_length_m_std: NDArray[np.float64]
     length_is_lower_bound: bool
     reason: NDArray[np.str_]
+    main_chopping_hz: NDArray[np.float64]
+    main_chopping_hz_std: NDArray[np.float64]
+    tail_chopping_hz: NDArray[np.float64]
+    tail_chopping_hz_std: NDArray[np.float64]
+    gear_ratio: NDArray[np.float64]
+    gear_ratio_std: NDArray[np.float64]
+    gear_reason: NDArray[np.str_]
 
     def alternatives(self, index: tuple[int, ...] = ()) -> list[dict[str, float]]:
         """The {blades, rpm, blade_length_m} that a record's chopping frequency and band allow.
@@ -178,6 +192,9 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     out: dict = {field.name: np.nan for field in fields(Measurements)}
     out["rotor_rates_hz"] = out["rotor_rates_hz_std"] = np.full(MAX_ROTORS, np.nan)
     out["rotors_resolved"] = False
+    out["gear_reason"] = "no comb"
+    if 0 < largest_part(iq) < LEAST_PART:
+        return out | {"reason": "no digits left in samples this small: raise the gain"}
     data = prepare(iq, carrier_hz=spectrum.carrier_hz, prf_hz=spectrum.prf_hz)
     if data is None:
         return out | {"reason": "no signal"}
@@ -199,12 +216,17 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     out |= _body(data, comb)
     if comb is None:
         return out
-    chopping_hz = comb.chopping * prf_hz
-    out["chopping_hz"], out["chopping_hz_std"] = chopping_hz, comb.chopping_std * prf_hz
+    out["chopping_hz"], out["chopping_hz_std"] = comb.chopping * prf_hz, comb.chopping_std * prf_hz
     out["comb_order"] = float(np.abs(comb.fit.orders).max() // comb.per_turn)
     out["comb_snr_db"] = float(10 * np.log10(max(comb.fit.snr.sum() / data.pulses, 1e-9)))
 
-    rotors = separate_rotors(data, comb, edge)
+    gear, rotors, out["gear_reason"] = find_gear(data, comb, edge)
+    if gear is not None:
+        data, comb = gear.alone, gear.first
+        out["chopping_hz"], out["chopping_hz_std"] = comb.chopping * prf_hz, comb.chopping_std * prf_hz
+        for name, (rate, std) in zip(("main", "tail"), gear.rates, strict=True):
+            out[f"{name}_chopping_hz"], out[f"{name}_chopping_hz_std"] = rate * prf_hz, std * prf_hz
+        out["gear_ratio"], out["gear_ratio_std"] = gear.ratio, gear.ratio_std
     count = len(rotors.rates)
     if count > 1:
         edge, edge_std = _edge(data, comb, rotors.rates, blades or 2)
@@ -221,7 +243,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     tip, tip_std = (value * prf_hz * wavelength_m / 2 / cosine for value in (edge, edge_std))
     out["tip_speed_mps"], out["tip_speed_mps_std"] = tip, tip_std
     if known is not None:
-        rotation = chopping_hz / known
+        rotation = out["chopping_hz"] / known
         out["rotation_hz"], out["rotation_hz_std"] = rotation, out["chopping_hz_std"] / known
         length = tip / (2 * np.pi * rotation)
         out["blade_length_m"] = length
@@ -234,7 +256,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         spectrum,
         energy,
         Body(body.index, np.asarray(centre_mps), body.level_db),
-        Chopping(np.asarray(np.float32(chopping_hz)), np.asarray(nothing), np.asarray(nothing)),
+        Chopping(np.asarray(np.float32(out["chopping_hz"])), np.asarray(nothing), np.asarray(nothing)),
     )
     out["smearing_index"] = float(index)
     return out

@@ -16,6 +16,9 @@ NOTCH_MPS = 3.0
 LOBE_BINS = 5
 
 
+#: Of bins within this share of the strongest the first one counts: rounding must not choose in a flat spectrum.
+EQUAL_SHARE = np.float32(1 - 1e-5)
+
 #: True, or 1, where a spectrum counts.
 Mask = NDArray[np.bool_] | NDArray[np.float32]
 
@@ -54,7 +57,8 @@ def body_line(spectrum: Spectrum) -> Body:
     -------
     Body
     """
-    index = spectrum.relative_power.argmax(axis=-1)
+    power = spectrum.relative_power
+    index = (power >= power.max(axis=-1, keepdims=True) * EQUAL_SHARE).argmax(axis=-1)
     bins = spectrum.bins
     first = np.arange(index.size).reshape(index.shape) * bins  # of each spectrum, one behind the other
     level = spectrum.level_db.reshape(-1)
@@ -84,12 +88,15 @@ def notch_mask(spectrum: Spectrum, body: Body, notch_mps: float = NOTCH_MPS) -> 
     -------
     ndarray of bool, shape (..., bins)
     """
-    bins = spectrum.bins
-    step = spectrum.prf_hz / bins * spectrum.wavelength_m / 2
+    keep, away = _notches(spectrum.bins, half_width_bins(spectrum, notch_mps))
+    return away[spectrum.bins - body.index] & keep
+
+
+def half_width_bins(spectrum: Spectrum, notch_mps: float = NOTCH_MPS) -> int:
+    """Bins to each side of a notch's middle that it takes out."""
+    step = spectrum.prf_hz / spectrum.bins * spectrum.wavelength_m / 2
     # At least the main lobe, at most a third of the span: a slow radar must keep something to look at.
-    half = min(max(LOBE_BINS, int(np.ceil(notch_mps / step))), max(1, bins // 6))
-    keep, away = _notches(bins, half)
-    return away[bins - body.index] & keep
+    return min(max(LOBE_BINS, int(np.ceil(notch_mps / step))), max(1, spectrum.bins // 6))
 
 
 @lru_cache(maxsize=64)
@@ -106,11 +113,12 @@ def weights(mask: Mask) -> NDArray[np.float32]:
     return mask.astype(np.float32, copy=False)
 
 
-def residual(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
-    """Power over the floor outside the notches, in units of the floor, shape (..., bins); 0 inside and below noise."""
+def residual(spectrum: Spectrum, mask: Mask | None = None) -> NDArray[np.float32]:
+    """Power over the floor outside the notches (if any), in units of the floor, shape (..., bins); 0 below noise."""
     excess = spectrum.relative_power - np.float32(1)
     np.maximum(excess, np.float32(0), out=excess)
-    excess *= weights(mask)
+    if mask is not None:
+        excess *= weights(mask)
     return excess
 
 

@@ -212,7 +212,9 @@ def _prepare(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram:
         # what stands at rest may be the background; the body is then the strongest line that moves
         moving = np.abs(spectrum.frequency_hz) * pulses / spectrum.prf_hz > rest_half + 2 * NOISE_BANDWIDTH_BINS
         line = body_line(replace(spectrum, relative_power=np.where(moving, spectrum.relative_power, np.float32(0))))
-        centres.append((0.0 if abs(turns(body)) * pulses > rest_half else turns(body), rest_db))
+        # the strongest line of all, if it is as slow as that, has its own level
+        slow = abs(turns(body)) * pulses <= rest_half
+        centres.append((turns(body), float(body.level_db)) if slow else (0.0, rest_db))
         if line.level_db > LINE_DB:
             centres.append((turns(line), float(line.level_db)))
     else:

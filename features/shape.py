@@ -39,10 +39,15 @@ def band_levels_db(
 
 def entropy(energy: NDArray[np.float32]) -> NDArray[np.float32]:
     """Entropy of the energy's distribution over the bins, 0 (one bin) to 1 (even), shape (...); 1 without energy."""
-    total = energy.sum(axis=-1, keepdims=True)
-    share = energy / np.where(total > 0, total, 1)
-    bits = -(share * np.log(np.maximum(share, np.float32(1e-12)))).sum(axis=-1) / np.log(energy.shape[-1])
-    return np.where(total[..., 0] > 0, bits, np.float32(1)).astype(np.float32)
+    peak = energy.max(axis=-1, keepdims=True)
+    share = energy / np.where(peak > 0, peak, np.float32(1))
+    logs = np.maximum(share, np.float32(1e-12))
+    np.log(logs, out=logs)
+    total = np.add.reduce(share, axis=-1)
+    safe = np.where(total > 0, total, np.float32(1))
+    # the mean of -log(share / total)
+    bits = (np.log(safe) - np.vecdot(share, logs) / safe) / np.float32(np.log(energy.shape[-1]))
+    return np.where(total > 0, np.minimum(np.maximum(bits, 0), 1), np.float32(1)).astype(np.float32)
 
 
 def ripple_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:

@@ -53,10 +53,10 @@ def smearing_index(
     weight *= x > 0
     total = np.add.reduce(weight, axis=-1)
     safe = np.where(total > 0, total, 1)
-    mean_x, mean_y = np.vecdot(weight, x) / safe, np.vecdot(weight, y) / safe
+    # Centred first: where few orders hold energy the differences of mean squares are rounding alone.
+    x -= (np.vecdot(weight, x) / safe)[..., None]
     weight *= x
-    mean_xx, mean_xy = np.vecdot(weight, x) / safe, np.vecdot(weight, y) / safe
-    variance = mean_xx - mean_x**2
-    slope = (mean_xy - mean_x * mean_y) / np.where(variance > 1e-3, variance, np.inf)
+    variance, covariance = np.vecdot(weight, x) / safe, np.vecdot(weight, y) / safe
+    slope = covariance / np.where(variance > 1e-3, variance, np.inf)
     index = np.sqrt(np.clip(slope, 0, FULLY_SMEARED**2))
     return np.where((total > 0) & usable[..., 0], index, np.float32(np.nan)).astype(np.float32)

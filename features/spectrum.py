@@ -19,6 +19,9 @@ NOISE_BANDWIDTH_BINS = 2.056
 #: Levels are not followed below this [dB re noise floor]: an empty side of the spectrum has no level.
 LOWEST_DB = -20.0
 
+#: Without any noise (a synthetic line) the floor is this share of the record's power, not what rounding leaves.
+LEAST_FLOOR = np.float32(1e-9)
+
 _FLOOR_QUANTILE = 0.25
 _FLOOR_QUANTILE_NORMAL = -0.6744897501960817  # standard normal quantile of 0.25
 _FLOOR_BLOCKS = 64  # a side of the spectrum
@@ -66,7 +69,7 @@ class Spectrum:
         """Doppler frequency of each bin [Hz], rising, shape (bins,), not to be written to."""
         return _frequencies_hz(self.bins, self.prf_hz)
 
-    @property
+    @cached_property
     def velocity_mps(self) -> NDArray[np.float64]:
         """Radial velocity of each bin [m/s], falling: Doppler = -2 v / wavelength, shape (bins,)."""
         return -self.frequency_hz * self.wavelength_m / 2
@@ -92,12 +95,20 @@ def _frequencies_hz(bins: int, prf_hz: float) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=64)
 def _window(pulses: int, centred_by_sign: bool) -> NDArray[np.float32]:
-    """Kaiser window of unit noise gain; with alternating signs it also centres the spectrum, which saves the shift."""
+    """Kaiser window of unit noise gain, each value twice, for a sample's two parts, shape (2 pulses,).
+
+    With alternating signs it also centres the spectrum, which saves the shift.
+    """
     window = np.kaiser(pulses, KAISER_BETA)
     window /= np.sqrt(np.sum(window**2))
     if centred_by_sign:
         window[1::2] *= -1
-    return window.astype(np.float32)
+    return np.repeat(window.astype(np.float32), 2)
+
+
+def scaled(iq: NDArray[np.complex64], scale: NDArray[np.float32]) -> NDArray[np.complex64]:
+    """Samples times a real factor a record: part by part, for half the price of a complex product."""
+    return (np.ascontiguousarray(iq).view(np.float32) * scale).view(np.complex64)
 
 
 def centred_power(iq: NDArray[np.complex64], bins: int | None = None) -> NDArray[np.float32]:
@@ -117,9 +128,22 @@ def centred_power(iq: NDArray[np.complex64], bins: int | None = None) -> NDArray
     pulses = iq.shape[-1]
     bins = fft.next_fast_len(pulses) if bins is None else bins
     even = bins % 2 == 0
-    lines = fft.fft(iq * _window(pulses, even), n=bins, axis=-1)
-    power = lines.real**2 + lines.imag**2
+    parts = iq.astype(np.complex64, copy=False).view(np.float32)
+    tapered = (parts * _window(pulses, even)).view(np.complex64)
+    squares = fft.fft(tapered, n=bins, axis=-1, overwrite_x=True).view(np.float32)
+    np.multiply(squares, squares, out=squares)
+    power = squares[..., ::2] + squares[..., 1::2]
     return power if even else fft.fftshift(power, axes=-1)
+
+
+#: A record whose largest part is below this has lost its digits among float32's denormal numbers: 9 bits are left here.
+LEAST_PART = 2.0**-140
+
+
+def largest_part(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """Largest real or imaginary part of each record, by magnitude, shape (...)."""
+    parts = np.ascontiguousarray(iq).view(np.float32)
+    return np.maximum(parts.max(axis=-1), -parts.min(axis=-1))
 
 
 def unit_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
@@ -128,9 +152,7 @@ def unit_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
     A power of two changes no digit, so results do not depend on the gain; the square of the scaled samples can neither
     overflow nor vanish.
     """
-    parts = np.ascontiguousarray(iq).view(np.float32)
-    largest = np.maximum(parts.max(axis=-1), -parts.min(axis=-1))
-    _, exponent = np.frexp(largest)
+    _, exponent = np.frexp(largest_part(iq))
     return np.ldexp(np.float32(1), -np.clip(exponent, -126, 126))[..., None].astype(np.float32)
 
 
@@ -199,11 +221,10 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spec
         if not (np.isfinite(value) and value > 0):
             raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
     scale = unit_scale(samples)
-    power = centred_power(samples * scale)
+    power = centred_power(scaled(samples, scale))
     floor = noise_floor(power)
-    # Without any noise (a synthetic line) the floor is what arithmetic leaves, not zero: -140 dB under the record.
-    floor = np.maximum(floor, power.mean(axis=-1) * np.float32(1e-14))
+    floor = np.maximum(floor, power.mean(axis=-1) * LEAST_FLOOR)
     safe = np.where(floor > 0, floor, np.float32(1))
     natural = floor / scale[..., 0].astype(np.float64) ** 2
-    relative = (power / safe[..., None]).astype(np.float32, copy=False)
+    relative = np.divide(power, safe[..., None], out=power)
     return Spectrum(relative, natural, float(carrier_hz), float(prf_hz), samples.shape[-1], scale)

@@ -20,6 +20,8 @@ from .spectrum import Spectrum
 #: Energy counts where the level is this far over the floor [dB]: noise passes it in 2 % of the bins.
 SIGNIFICANT_DB = 6.0
 
+_SIGNIFICANT = np.float32(10 ** (SIGNIFICANT_DB / 10) - 1)
+
 
 #: Names of the bands' levels on the stronger and on the weaker side.
 _BANDS = tuple([f.name for f in FEATURES if f.name.startswith(stem)] for stem in ("strong_", "weak_"))
@@ -98,8 +100,9 @@ def feature_vector(
     body = body_line(spectrum)
     mask = notch_mask(spectrum, body)
     kept = weights(mask)
-    excess = residual(spectrum, kept)
-    energy = excess * (spectrum.level_db > SIGNIFICANT_DB)  # a choice bin by bin would cost ten times as much
+    above = residual(spectrum)
+    excess = above * kept
+    energy = excess * (excess > _SIGNIFICANT)  # a choice bin by bin would cost ten times as much
     chopping = cepstral_chopping(spectrum, kept)
     residual_db = notch_residual_db(spectrum, kept)
 
@@ -120,7 +123,7 @@ def feature_vector(
     half = spectrum.bins // 2
     power = spectrum.relative_power
     side = np.add.reduce(power[..., :half], axis=-1) / half, np.add.reduce(power[..., -half:], axis=-1) / half
-    total = np.add.reduce(np.maximum(power - np.float32(1), np.float32(0)), axis=-1)
+    total = np.add.reduce(above, axis=-1)
     peak = excess.max(axis=-1)
 
     columns: dict[str, NDArray | float] = {
@@ -129,7 +132,7 @@ def feature_vector(
         "body_speed_mps": np.abs(body.velocity_mps),
         "rest_level_db": spectrum.level_db[..., half - 1 : half + 2].max(axis=-1),
         "notch_residual_db": residual_db,
-        "notch_residual_share": excess.sum(axis=-1) / np.where(total > 0, total, 1),
+        "notch_residual_share": np.add.reduce(excess, axis=-1) / np.where(total > 0, total, 1),
         "bandwidth_log": np.log10(np.maximum(width_hz, 1)),
         "bandwidth_speed_mps": width_hz * (spectrum.wavelength_m / 2),
         "span_share": width_hz / spectrum.prf_hz,
@@ -139,7 +142,7 @@ def feature_vector(
         "occupancy": occupancy,
         "entropy": entropy(energy),
         "ripple_db": ripple_db(spectrum, kept),
-        "peak_over_mean_db": 10 * np.log10(np.maximum(peak + 1, 1)) - residual_db,
+        "peak_over_mean_db": 10 * np.log10(peak + 1) - residual_db,
         "symmetry": symmetry(spectrum, energy, body),
         "chopping_log": np.log10(np.maximum(chopping.frequency_hz, 1)),
         "chopping_step_mps": chopping.frequency_hz * np.float32(spectrum.wavelength_m / 2),

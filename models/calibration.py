@@ -35,7 +35,8 @@ def softmax(scores: ArrayLike) -> NDArray[np.float64]:
         Shape (..., K), each vector sums to 1.
     """
     scores = np.asarray(scores, dtype=np.float64)
-    powers = np.exp(scores - scores.max(axis=-1, keepdims=True))
+    with np.errstate(over="ignore", under="ignore"):  # what lies beyond float64 below the largest has no share
+        powers = np.exp(scores - scores.max(axis=-1, keepdims=True))
     return powers / powers.sum(axis=-1, keepdims=True)
 
 

@@ -7,6 +7,7 @@ written, not who wrote it.
 
 import hashlib
 import re
+from collections.abc import Iterator
 
 SEAL_KEY = "bladewing_sha256"
 PLACEHOLDER = "0" * 64
@@ -84,3 +85,70 @@ def verify(onnx_bytes: bytes) -> str:
             f" {found[:12]}...; fetch or train it again"
         )
     return found
+
+
+def read_metadata(onnx_bytes: bytes) -> dict[str, str]:
+    """Read what a model says of itself from its bytes alone, before any runtime opens it.
+
+    Parameters
+    ----------
+    onnx_bytes
+        The content of a model file.
+
+    Returns
+    -------
+    dict of str to str
+        Its metadata.
+
+    Raises
+    ------
+    ValueError
+        Where it is no ONNX model, says one thing twice, or refers to data outside the file.
+    """
+    if b"location" in onnx_bytes:  # the one key by which a tensor can name another file
+        raise ValueError("the model refers to data outside its file; use a file that `bladewing train` wrote")
+    metadata: dict[str, str] = {}
+    for number, content in _fields(onnx_bytes):
+        if number == _METADATA_FIELD:
+            entry = dict(_fields(content))
+            key, value = (entry.get(part, b"").decode() for part in (1, 2))
+            if key in metadata:
+                raise ValueError(f"damaged metadata: {key!r} stands there twice")
+            metadata[key] = value
+    return metadata
+
+
+_METADATA_FIELD = 14  # of the message ModelProto
+
+
+def _fields(message: bytes) -> Iterator[tuple[int, bytes]]:
+    """Numbers and contents of a protocol buffer's fields; of numbers (not lengths) the content is empty."""
+    at = 0
+
+    def varint() -> int:
+        nonlocal at
+        value = 0
+        for shift in range(0, 70, 7):
+            if at >= len(message):
+                raise ValueError("not an ONNX model: it ends within a number")
+            byte = message[at]
+            at += 1
+            value |= (byte & 127) << shift
+            if byte < 128:
+                return value
+        raise ValueError("not an ONNX model: a number of too many bytes")
+
+    while at < len(message):
+        tag = varint()
+        number, kind = tag >> 3, tag & 7
+        if kind == 0:
+            varint()
+            size = 0
+        elif kind in (1, 2, 5):
+            size = varint() if kind == 2 else 8 if kind == 1 else 4
+        else:
+            raise ValueError(f"not an ONNX model: a field of kind {kind}")
+        if size > len(message) - at:
+            raise ValueError("not an ONNX model: cut short")
+        yield number, message[at : at + size] if kind == 2 else b""
+        at += size

@@ -1,7 +1,7 @@
 """Whole aircraft at the speed of their noise: rotors, body and path, tile by tile in float32."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,11 +44,15 @@ def rotors_echo(
     *,
     velocity_mps: ArrayLike = 0.0,
     acceleration_mps2: ArrayLike = 0.0,
+    vibration_rad: ArrayLike = 0.0,
+    vibration_hz: ArrayLike = 0.0,
+    vibration_phase_rad: ArrayLike = 0.0,
     out: NDArray[np.complex64] | None = None,
 ) -> NDArray[np.complex64]:
-    """Echo of all rotors of each aircraft, carried along by its body.
+    """Echo of all rotors of each aircraft, carried along and shaken by its body.
 
     The sum over the rotors of hub x `rotor_echo`, times the phasor of the path, to float32; much cheaper than these.
+    The airframe is rigid, so its vibration moves every hub as it moves the body.
 
     Parameters
     ----------
@@ -60,6 +64,8 @@ def rotors_echo(
         Aircraft in the batch.
     velocity_mps, acceleration_mps2 : array_like, shape (records,)
         Radial velocity [m/s] at the first pulse and acceleration [m/s^2], positive when the range grows.
+    vibration_rad, vibration_hz, vibration_phase_rad : array_like, shape (records,)
+        As in `body_echo`.
     out : ndarray of complex64, shape (records, pulses), optional
         What the echo is added to, such as the noise: saves passing over the records once more.
 
@@ -67,7 +73,8 @@ def rotors_echo(
     -------
     ndarray of complex64, shape (records, pulses)
     """
-    grid, path = PulseGrid(radar), _path(radar, velocity_mps, acceleration_mps2, records)
+    shake = (vibration_rad, vibration_hz, vibration_phase_rad)
+    grid, path = PulseGrid(radar), _path(radar, velocity_mps, acceleration_mps2, records, shake)
     turning = _turning([rotor.motion for rotor in rotors], records)
     blades = [_blades(rotor, radar, records) for rotor in rotors]
     parts = 1 if all(b.real for b in blades) else 2
@@ -136,9 +143,8 @@ def body_echo(
     -------
     ndarray of complex64, shape (records, pulses)
     """
-    grid, path = PulseGrid(radar), _path(radar, velocity_mps, acceleration_mps2, records, phase_rad)
-    if np.any(vibration_rad):
-        path = replace(path, sine=Sine(*(_row(x, records) for x in (vibration_rad, vibration_hz, vibration_phase_rad))))
+    shake = (vibration_rad, vibration_hz, vibration_phase_rad)
+    grid, path = PulseGrid(radar), _path(radar, velocity_mps, acceleration_mps2, records, shake, phase_rad)
     gain = np.broadcast_to(np.asarray(amplitude, np.float32), records)[:, None]
     sums = np.empty((records, radar.pulses), np.complex64) if out is None else out
     room = Room(4 * TILE_SAMPLES)
@@ -159,12 +165,20 @@ def _row(value: ArrayLike, records: int) -> NDArray[np.float64]:
 
 
 def _path(
-    radar: Radar, velocity_mps: ArrayLike, acceleration_mps2: ArrayLike, records: int, phase_rad: ArrayLike = 0.0
+    radar: Radar,
+    velocity_mps: ArrayLike,
+    acceleration_mps2: ArrayLike,
+    records: int,
+    shake: tuple[ArrayLike, ArrayLike, ArrayLike],
+    phase_rad: ArrayLike = 0.0,
 ) -> PhaseLaw:
-    """Two-way phase of straight paths: Doppler = -2 v / wavelength."""
+    """Two-way phase of straight paths, Doppler = -2 v / wavelength, shaken by a sine of amplitude, rate and phase."""
     velocity, acceleration = _row(velocity_mps, records), _row(acceleration_mps2, records)
     return PhaseLaw(
-        _row(phase_rad, records), velocity * (-2 / radar.wavelength_m), acceleration * (-2 / radar.wavelength_m)
+        _row(phase_rad, records),
+        velocity * (-2 / radar.wavelength_m),
+        acceleration * (-2 / radar.wavelength_m),
+        Sine(*(_row(x, records) for x in shake)) if np.any(shake[0]) else None,
     )
 
 

@@ -61,13 +61,13 @@ class Blades:
         tip, root, asymmetry = row(blade_length_m), row(root_m), row(edge_asymmetry)
         amplitudes = np.asarray(blade_amplitudes, np.float64)
         blades = amplitudes.shape[-1]
-        amplitudes = np.broadcast_to(amplitudes, (*lead, blades)).reshape(-1, blades)
+        amplitudes = np.broadcast_to(amplitudes, (*lead, blades)).reshape(math.prod(lead), blades)
         if blades % 2:
             even = odd = amplitudes
         else:
             here, there = amplitudes[:, : blades // 2], amplitudes[:, blades // 2 :]
             even, odd = here + there, here - there
-        turn = TWO_PI / blades * np.arange(even.shape[1])
+        turn = TWO_PI / max(blades, 1) * np.arange(even.shape[1])
         cosine, sine = np.cos(turn), np.sin(turn)
         half, middle = np.maximum((tip - root) * k_cos_beta, _LEAST_HALF), (tip + root) * k_cos_beta
         maps = np.zeros((len(half), len(turn), 4, 3), np.float32)

@@ -4,7 +4,7 @@ A blade is a mean over its radius, so all rests on moments of a phasor: |integra
 most 1 / (n + 1), and by parts at most (1 + n M(n-1)) / |z|. Errors of blades and rotors are added as amplitudes.
 """
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import comb
 
 import numpy as np
@@ -19,7 +19,6 @@ from .render_bird import bird_echo, bird_parts_echo, heave_range_m, members
 from .render_uav import (
     UAV_EFFECTS,
     Fidelity,
-    body_echo,
     centre_range_m,
     rotor_angle_rad,
     rotor_beta_rad,
@@ -69,10 +68,13 @@ class UavBounds:
         The UAV.
     radar : Radar
         The radar that looks.
+    times_s : ndarray of float64, shape (pulses,), optional
+        Instants of the pulses [s] if they are not the radar's even ones.
     """
 
-    def __init__(self, part: UavPart, radar: Radar) -> None:
-        self.part, self.radar, self.times_s = part, radar, radar.times_s
+    def __init__(self, part: UavPart, radar: Radar, times_s: NDArray[np.float64] | None = None) -> None:
+        self.part, self.radar = part, radar
+        self.times_s = radar.times_s if times_s is None else times_s
         self.wavenumber = 2 * TWO_PI / radar.wavelength_m
         self.centre_m = centre_range_m(part, self.times_s, True)
 
@@ -87,9 +89,9 @@ class UavBounds:
         }
         return bounds[effect]()
 
-    def _blades(self, rotor: RotorPart, wanders: bool = True) -> list[tuple[float, Amplitude]]:
+    def _blades(self, rotor: RotorPart) -> list[tuple[float, Amplitude]]:
         """Amplitude and angle of each blade."""
-        angle = rotor_angle_rad(rotor, self.times_s, wanders)
+        angle = rotor_angle_rad(rotor, self.times_s, True)
         level = 10 ** (rotor.flash_db / 20)
         return [(level * a, angle + TWO_PI * n / rotor.blades) for n, a in enumerate(rotor.amplitudes)]
 
@@ -135,44 +137,63 @@ class UavBounds:
         )
         return chord(self.wavenumber * (near - far))
 
+    @cached_property
+    def level(self) -> Amplitude:
+        """Most that the whole echo's amplitude can be, with every effect."""
+        straight = Fidelity(frozenset(UAV_EFFECTS) - {"blade_curvature"}, None)
+        return np.abs(uav_echo(self.part, self.radar, self.times_s, straight)) + self.blade_curvature()
+
+    def _apart(self, path_rad: Amplitude) -> Amplitude:
+        """What scatterers off the line of sight add to a turn of the whole echo: they move a little less than it."""
+        total = sum(10 ** (r.flash_db / 20) * 2 * sum(r.amplitudes) for r in self.part.rotors)
+        total += sum(10 ** (b.level_db / 20) for b in self.part.body)
+        return total * np.minimum(2, np.abs(path_rad)) * (self.part.reach_m / self.centre_m.min()) ** 2
+
     def acceleration(self) -> Amplitude:
         """A constant velocity in place of an accelerated one: the whole echo turns by the path's own error."""
         path = self.wavenumber * np.abs(self.part.acceleration_mps2) * self.times_s**2 / 2
-        if not path.any():
-            return path
-        straight = Fidelity(frozenset(UAV_EFFECTS) - {"blade_curvature"}, None)
-        echo = np.abs(uav_echo(self.part, self.radar, self.times_s, straight)) + self.blade_curvature()
-        # hubs off the line of sight move a little less than the centre does
-        total = sum(10 ** (r.flash_db / 20) * 2 * sum(r.amplitudes) for r in self.part.rotors)
-        total += sum(10 ** (b.level_db / 20) for b in self.part.body)
-        return echo * chord(path) + total * np.minimum(2, path) * (self.part.reach_m / self.centre_m.min()) ** 2
+        return self.level * chord(path) + self._apart(path) if path.any() else path
 
     def vibration(self) -> Amplitude:
-        """A body at rest in place of a shaken one."""
-        still = Fidelity(frozenset({"hub_curvature"}), None)
-        body = np.abs(body_echo(self.part, self.radar.wavelength_m, self.centre_m, self.times_s, still, True))
-        return body * chord(vibration_rad(self.part, self.times_s))
+        """A still airframe in place of a shaken one: the whole echo turns by the vibration's phase."""
+        phase = vibration_rad(self.part, self.times_s)
+        return self.level * chord(phase) if phase.any() else phase
 
     def wander(self) -> Amplitude:
         """A constant rotation rate in place of one that drifts and wanders."""
+        return sum(
+            (
+                self._turned(rotor, self.times_s, wanders=False)
+                for rotor in self.part.rotors
+                if rotor.drift_hz_per_s or rotor.wander_hz
+            ),
+            np.zeros(len(self.times_s)),
+        )
+
+    def jitter(self, times_s: NDArray[np.float64]) -> Amplitude:
+        """Even instants in place of `times_s`: blades turn, and the whole echo follows path and vibration."""
+        moved = centre_range_m(self.part, times_s, True) - self.centre_m
+        phase = self.wavenumber * moved
+        shaken = vibration_rad(self.part, times_s) - vibration_rad(self.part, self.times_s)
+        turned = sum((self._turned(rotor, times_s) for rotor in self.part.rotors), np.zeros(len(times_s)))
+        return turned + self.level * chord(np.abs(phase) + np.abs(shaken)) + self._apart(phase)
+
+    def _turned(self, rotor: RotorPart, times_s: NDArray[np.float64], *, wanders: bool = True) -> Amplitude:
+        """Blades at the angles of other instants, or of a steady rate, in place of the true ones."""
         out = np.zeros(len(self.times_s))
-        for rotor in self.part.rotors:
-            if not (rotor.drift_hz_per_s or rotor.wander_hz):
-                continue
-            share, phase = rotor.root_m / rotor.blade_length_m, self._phase(rotor)
-            for (amplitude, true), (_, steady) in zip(
-                self._blades(rotor), self._blades(rotor, wanders=False), strict=True
-            ):
-                away = np.abs(true - steady)
-                here, there = np.cos(true), np.cos(steady)
-                # the flash is where the cosine is smallest: at an end of the arc between both, or within it
-                least = np.where((here * there <= 0) | (away > 1), 0.0, np.minimum(np.abs(here), np.abs(there)))
-                z = phase * (1 - share)
-                slope = phase * np.sqrt(1 - least**2) * moment_envelope(1, z * least, share)
-                edges = 1 + np.abs(rotor.edge_asymmetry)
-                error = away * (edges * slope + np.abs(rotor.edge_asymmetry) * moment_envelope(0, z * least, share))
-                apart = edges * (moment_envelope(0, z * here, share) + moment_envelope(0, z * there, share))
-                out += amplitude * np.minimum(error, apart)
+        share, phase = rotor.root_m / rotor.blade_length_m, self._phase(rotor)
+        others = rotor_angle_rad(rotor, times_s, wanders) - rotor_angle_rad(rotor, self.times_s, True)
+        away = np.abs(others)
+        for amplitude, true in self._blades(rotor):
+            here, there = np.cos(true), np.cos(true + others)
+            # the flash is where the cosine is smallest: at an end of the arc between both, or within it
+            least = np.where((here * there <= 0) | (away > 1), 0.0, np.minimum(np.abs(here), np.abs(there)))
+            z = phase * (1 - share)
+            slope = phase * np.sqrt(1 - least**2) * moment_envelope(1, z * least, share)
+            edges = 1 + np.abs(rotor.edge_asymmetry)
+            error = away * (edges * slope + np.abs(rotor.edge_asymmetry) * moment_envelope(0, z * least, share))
+            apart = edges * (moment_envelope(0, z * here, share) + moment_envelope(0, z * there, share))
+            out += amplitude * np.minimum(error, apart)
         return out
 
     def spacing(self, points: int) -> float:
@@ -224,9 +245,9 @@ def gauss_error(points: int, half_phase_rad: Amplitude) -> Amplitude:
     return np.maximum.accumulate(error)
 
 
-def bird_bound(part: BirdPart, radar: Radar, effect: str) -> Amplitude:
-    """Bound of leaving out one of `render_bird.BIRD_EFFECTS`, shape (pulses,)."""
-    times = radar.times_s
+def bird_bound(part: BirdPart, radar: Radar, effect: str, times_s: Amplitude | None = None) -> Amplitude:
+    """Bound of leaving out one of `render_bird.BIRD_EFFECTS`, shape (pulses,), at even instants or at these."""
+    times = radar.times_s if times_s is None else times_s
     wavenumber = 2 * TWO_PI / radar.wavelength_m
     if effect == "acceleration":
         echo = bird_echo(part, radar, times, Fidelity(frozenset({"heave"}), None))

@@ -53,8 +53,9 @@ def shaped_noise(
         Source of standard normal numbers, one row a record.
     radar : Radar
         The radar that looks; speeds beyond its unambiguous one alias, as they do in the field.
-    velocity_psd : ndarray, shape (records, lines)
-        Power at each velocity, any scale; the lines are those of `process_velocities`.
+    velocity_psd : ndarray, shape (records, lines) or (1, lines)
+        Power at each velocity, any scale; the lines are those of `process_velocities`, or as many of them at both ends
+        of their order (the slow ones) as `velocities_mps` has: nothing is beyond.
     velocities_mps : ndarray, shape (lines,)
         Those velocities, FFT order.
 
@@ -62,17 +63,53 @@ def shaped_noise(
     -------
     ndarray of complex64, shape (records, pulses)
     """
-    lines = len(velocities_mps)
-    total = velocity_psd.sum(axis=-1, keepdims=True)
-    amplitude = np.sqrt(velocity_psd / np.where(total > 0, total, 1) / 2).astype(np.float32)
+    lines, whole = len(velocities_mps), fft.next_fast_len(2 * radar.pulses)
+    amplitude = _amplitude(velocity_psd)
     white = normals(2 * lines)
-    spectrum = np.empty((len(white), lines), np.complex64)
-    spectrum.real = white[:, :lines] * amplitude
-    spectrum.imag = white[:, lines:] * amplitude
     out = np.empty((len(white), radar.pulses), np.complex64)
+    spectrum, positive = np.zeros(whole, np.complex64), (lines + 1) // 2
+    ends = ((spectrum[:positive], slice(0, positive)), (spectrum[whole - lines + positive :], slice(positive, lines)))
     for row in range(len(white)):  # row by row: the bits of a record must not depend on its batch
-        out[row] = fft.ifft(spectrum[row], norm="forward")[: radar.pulses]
+        weight = amplitude[row if len(amplitude) > 1 else 0]
+        for end, some in ends:
+            np.multiply(white[row, :lines][some], weight[some], out=end.real)
+            np.multiply(white[row, lines:][some], weight[some], out=end.imag)
+        out[row] = fft.ifft(spectrum, norm="forward")[: radar.pulses]
     return out
+
+
+def real_noise(normals: Normals, radar: Radar, psd: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Real Gaussian process of unit power whose spectrum is the same for all records.
+
+    Parameters
+    ----------
+    normals : callable
+        Source of standard normal numbers, one row a record.
+    radar : Radar
+        The radar that looks.
+    psd : ndarray, shape (lines,)
+        Power at each line of `process_velocities` from rest to the fastest positive one: one side of the spectrum.
+
+    Returns
+    -------
+    ndarray of float32, shape (records, pulses)
+    """
+    whole, lines = fft.next_fast_len(2 * radar.pulses), len(psd)
+    amplitude = _amplitude(psd[None, :])[0] / np.float32(np.sqrt(2))
+    white = normals(2 * lines)
+    out = np.empty((len(white), radar.pulses), np.float32)
+    spectrum = np.empty(lines, np.complex64)
+    for row in range(len(white)):
+        np.multiply(white[row, :lines], amplitude, out=spectrum.real)
+        np.multiply(white[row, lines:], amplitude, out=spectrum.imag)
+        out[row] = fft.irfft(spectrum, n=whole, norm="forward")[: radar.pulses]
+    return out
+
+
+def _amplitude(psd: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Amplitude of the real and of the imaginary part of each line, for unit power in all, shape of `psd`."""
+    total = psd.sum(axis=-1, keepdims=True)
+    return np.sqrt(psd / np.where(total > 0, total, 1) / 2).astype(np.float32)
 
 
 def process_velocities(radar: Radar) -> NDArray[np.float64]:
@@ -81,10 +118,27 @@ def process_velocities(radar: Radar) -> NDArray[np.float64]:
     return -fft.fftfreq(lines, 1 / radar.prf_hz) * radar.wavelength_m / 2
 
 
-def ground_psd(radar: Radar, wind_mph: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+#: Share of the moving ground's power that may be missing beyond its fastest line: far under any receiver's noise.
+_BEYOND = 1e-12
+
+
+def slow_velocities(radar: Radar, wind_mph: float) -> NDArray[np.float64]:
+    """Those of `process_velocities` at which ground moves up to that wind, FFT order."""
+    v = process_velocities(radar)
+    step = np.abs(v[1]) if len(v) > 1 else 1.0
+    fastest = -np.log(_BEYOND) / billingsley(wind_mph, radar.carrier_hz)[1] / step
+    if 2 * fastest + 3 > len(v):
+        return v
+    each = math.ceil(fastest)
+    return np.concatenate([v[: each + 1], v[-each:]])
+
+
+def ground_psd(
+    radar: Radar, wind_mph: NDArray[np.float64], velocities_mps: NDArray[np.float64]
+) -> tuple[NDArray, NDArray]:
     """Moving part of wind-blown ground, shape (records, lines), and the share of power at rest, shape (records,)."""
     a, b = billingsley(wind_mph, radar.carrier_hz)
-    v = process_velocities(radar)
+    v = velocities_mps
     b = np.asarray(b)[:, None]
     # Integral of exp(-b|v|) over each line's width: right also where the width of a line exceeds 1/b.
     width = np.abs(v[1]) if len(v) > 1 else 1.0
@@ -99,8 +153,10 @@ def draw_ground(
     normals: Normals, radar: Radar, wind_mph: NDArray[np.float64], phase_rad: NDArray
 ) -> NDArray[np.complex64]:
     """Wind-blown ground of unit mean power, shape (records, pulses)."""
-    psd, rest = ground_psd(radar, wind_mph)
-    moving = shaped_noise(normals, radar, psd, process_velocities(radar))
+    # as many lines as the strongest wind of the law needs: how many numbers a record takes is the same in any batch
+    v = slow_velocities(radar, max(LAWS["wind_mph"].high, float(np.max(wind_mph, initial=0.0))))
+    psd, rest = ground_psd(radar, wind_mph, v)
+    moving = shaped_noise(normals, radar, psd, v)
     still = (np.sqrt(rest) * np.exp(1j * phase_rad)).astype(np.complex64)
     return still[:, None] + np.sqrt(1 - rest).astype(np.float32)[:, None] * moving
 

@@ -74,7 +74,9 @@ RADAR_GROUP = 24
 
 _RADAR_STREAM = 1 << 40  # beyond any record's index
 _CHUNK_SAMPLES = 1 << 19  # samples rendered at a time: memory stays flat whatever the count
-_MAX_PULSES = 8192  # longest training record; beyond it a record only gains resolution
+_MAX_PULSES = 8192  # longest training record of most radars; beyond it a record only gains resolution
+_LONG_CHANCE = 0.03  # of a radar whose dwell is `long_dwell_s`: more would be most of the cost of all records
+_MAX_LONG_PULSES = 65536  # longest record of those
 
 
 @dataclass(frozen=True)
@@ -170,12 +172,13 @@ def draw_radar(seed: int, purpose: str, group: int) -> Radar:
     Radar
     """
     sequence = SeedSequence(seed, spawn_key=(PURPOSES[purpose], _RADAR_STREAM + group))
-    u = Generator(Philox(sequence)).random(3)
+    u = Generator(Philox(sequence)).random(4)
     carrier = float(LAWS["carrier_hz"](u[0]))
     prf = 4 * float(LAWS["unambiguous_mps"](u[1])) * carrier / SPEED_OF_LIGHT_MPS
     prf = min(max(prf, 1e3), 1e5)
-    pulses = round(prf * float(LAWS["dwell_s"](u[2])))
-    return Radar(carrier, prf, min(max(pulses, 64), _MAX_PULSES))
+    law, most = ("long_dwell_s", _MAX_LONG_PULSES) if u[3] < _LONG_CHANCE else ("dwell_s", _MAX_PULSES)
+    pulses = round(prf * float(LAWS[law](u[2])))
+    return Radar(carrier, prf, min(max(pulses, 64), most))
 
 
 def stream(seed: int, purpose: str, count: int, *, start: int = 0) -> Iterator[Records]:
@@ -243,7 +246,7 @@ def _render(
             columns["snr_db"] = snr_db
         for name, values in columns.items():
             truth[name][part.start + rows] = values
-    iq[:] = receiver.receive(signal, noise, radar, normals_of)
+    iq[:] = receiver.receive(signal, noise, radar, lambda _: normals_of)
 
 
 def _kind_of(index: int, u: float, only: str | None) -> str:

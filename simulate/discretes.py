@@ -57,7 +57,7 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
     """Draw a road vehicle: several body scatterers of slightly unlike radial speed, and wheels from 0 to 2 v."""
     speed = draws.value("vehicle_mps") * draws.sign()
     # half of them drive steadily
-    acceleration = draws.value("vehicle_acceleration_mps2") * np.where(draws.chance(0.5), 0.05, 1.0)
+    acceleration = draws.change("vehicle_acceleration_mps2", radar.dwell_s) * np.where(draws.chance(0.5), 0.05, 1.0)
     spread = draws.value("aspect_spread")  # close to the road each part has its own aspect
     body = np.zeros((len(draws), radar.pulses), np.complex64)
     for _ in range(BODY_POINTS):

@@ -167,3 +167,25 @@ class PulseGrid:
         np.matmul(of_block, of_pulse, out=exact.reshape(*lead, len(middle), BLOCK_PULSES))
         out[...] = exact
         return out
+
+    def sines(self, sine: Sine) -> NDArray[np.float32]:
+        """Sum of a few sines a record, at the cost of a product of small matrices.
+
+        Parameters
+        ----------
+        sine : Sine
+            Amplitude in any unit; here each field is of shape (records, sines).
+
+        Returns
+        -------
+        ndarray of float32, shape (records, pulses)
+        """
+        records = len(sine.rate_hz)
+        block = reduce_phase(TWO_PI * sine.rate_hz[:, None, :] * self._middles_s[:, None] + sine.phase_rad[:, None, :])
+        pulse = (TWO_PI / self.radar.prf_hz * sine.rate_hz[:, :, None] * _NUMBER).astype(np.float32)
+        level = sine.amplitude_rad[:, None, :].astype(np.float32)
+        of_block = np.concatenate([level * np.sin(block), level * np.cos(block)], axis=2)
+        of_pulse = np.concatenate([np.cos(pulse), np.sin(pulse)], axis=1)
+        return np.matmul(of_block, of_pulse).reshape(records, len(self._middles_s) * BLOCK_PULSES)[
+            :, : self.radar.pulses
+        ]

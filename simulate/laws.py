@@ -46,6 +46,7 @@ LAWS: dict[str, Law] = {
     # radars
     "carrier_hz": Law("log", 2e9, 100e9, "Hz", "envelope"),
     "dwell_s": Law("log", 5e-3, 1.0, "s", "envelope; dwells of 2.7-89 ms in Gong 2022"),
+    "long_dwell_s": Law("log", 1.0, 5.0, "s", "staring radars; the paper's bird: 2.5 s"),
     "unambiguous_mps": Law("log", 10.0, 260.0, "m/s", "from slow-body radars to tips of 200 m/s and a margin"),
     # every scene
     # rising: a model that is shown many UAVs in which nothing can be seen learns to call an empty cell a UAV
@@ -156,6 +157,11 @@ class Draws:
     def value(self, law: str, columns: int | None = None) -> NDArray[np.float64]:
         """Draw by the law of that name: shape (records,), or (records, columns)."""
         return LAWS[law](self.uniform(columns))
+
+    def change(self, law: str, dwell_s: float) -> NDArray[np.float64]:
+        """Draw a rate of change that adds up to no more over a dwell above 1 s than the law's end does in 1 s."""
+        most = max(abs(LAWS[law].low), abs(LAWS[law].high)) / max(1.0, dwell_s)
+        return np.clip(self.value(law), -most, most)
 
     def chance(self, probability: float) -> NDArray[np.bool_]:
         """Draw True with that probability: shape (records,)."""

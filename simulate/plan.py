@@ -3,24 +3,26 @@
 The error of leaving an effect out is measured by its energy over the dwell, over the noise power of a sample. No line
 of the spectrum can then stand further over the noise floor than that, whatever the window; and no test at all, knowing
 both signals, can tell them apart once the energy is well below one (its deflection is twice the energy): hence the
-tolerance of -10 dB. Errors of several effects are added as amplitudes. The digits of the closed form (float32 phases,
-1e-7 of a blade's amplitude a radian) are not counted: they show at tolerances far below that.
+tolerance of -10 dB. Errors of several effects are added as amplitudes.
+
+Two things are not counted. A converter that is kept rounds a changed record anew: rounding is done to the record, and
+nothing that is done to it makes two signals easier to tell apart. And the digits of the closed form (float32 phases,
+1e-7 of a blade's amplitude a radian) show at tolerances far below that.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .bounds import UavBounds, bird_bound
+from .bounds_receiver import ReceiverBounds
 from .motion import TWO_PI
 from .parts import UavPart
 from .radar import Radar
+from .reception import pulse_times_s
 from .render_bird import BIRD_EFFECTS
 from .render_uav import UAV_EFFECTS, Fidelity, full_fidelity, rotor_beta_rad
-
-if TYPE_CHECKING:
-    from .scene import Scene
+from .setting import Setting
 
 #: Without receiver noise, what is compared with: the digits of complex64, this far under the strongest target.
 DIGITS_DB = -140.0
@@ -30,9 +32,22 @@ WORDS = {
     "blade_curvature": ("range curvature along the blades", "far field, eq. 4: blades in closed form"),
     "hub_curvature": ("range curvature over the airframe", "far field, eq. 2: every part's path is the centre's"),
     "acceleration": ("acceleration over the dwell", "constant radial velocity"),
-    "vibration": ("vibration of the body", "a rigid body"),
+    "vibration": ("vibration of the airframe, body and hubs", "an airframe at rest on its path"),
     "wander": ("drift and wander of the rotor rates", "constant rates"),
     "heave": ("heave of the body against the wings", "a steady body"),
+    "jitter": ("jitter of the pulses' instants", "an even PRF"),
+    "dc": ("offset at velocity zero", "none"),
+    "fading": ("slow rise and fall of all echoes", "constant levels"),
+    "phase_noise": ("phase noise", "a clean oscillator"),
+    "impulses": ("spoilt pulses", "none"),
+    "flicker": ("1/f noise", "white noise alone"),
+    "mains": ("mains lines", "none"),
+    "colour": ("a band that is not flat", "a flat band"),
+    "high_pass": ("a stop band about velocity zero", "none"),
+    "image": ("I/Q imbalance", "balanced channels"),
+    "real_only": ("a real receiver", "both channels"),
+    "analytic": ("a one-sided record made of a real one", "both sides"),
+    "converter": ("quantisation and clipping", "numbers as they are"),
 }
 
 
@@ -78,6 +93,8 @@ class Plan:
         One an effect and part.
     fidelity : dict of str to Fidelity
         The renderer of each UAV and bird.
+    receiver : frozenset of str
+        Effects of the receiver that are kept.
     notes : tuple of str
         Renderers and their costs in words.
     """
@@ -86,6 +103,7 @@ class Plan:
     error_db: float
     decisions: tuple[Decision, ...]
     fidelity: dict[str, Fidelity]
+    receiver: frozenset[str]
     notes: tuple[str, ...]
 
     def explain(self) -> str:
@@ -95,13 +113,15 @@ class Plan:
         return "\n".join([head, *(decision.line() for decision in self.decisions), *self.notes])
 
 
-def make_plan(scene: "Scene", *, tolerance_db: float = -10.0) -> Plan:
+def make_plan(scene: Setting, seed: int = 0, *, tolerance_db: float = -10.0) -> Plan:
     """Decide for each effect whether the scene needs it.
 
     Parameters
     ----------
-    scene : Scene
+    scene : Setting
         The scene.
+    seed : int
+        Root of the rendering's randomness: what the receiver does is judged as it will be drawn.
     tolerance_db : float
         Most error energy over the dwell, over the noise power of a sample [dB]. At -10 dB no receiver can tell.
 
@@ -112,25 +132,37 @@ def make_plan(scene: "Scene", *, tolerance_db: float = -10.0) -> Plan:
     Raises
     ------
     ValueError
-        If the tolerance is NaN.
+        If the tolerance is NaN, or the seed negative.
     """
+    if seed < 0:
+        raise ValueError(f"seed is {seed}: it must not be negative")
     if np.isnan(tolerance_db):
         raise ValueError(f"tolerance_db is {tolerance_db}: it must be a number [dB]")
     radar = scene.sight
     noise = 1.0 if scene.noise else 10 ** (DIGITS_DB / 10) * _strongest(scene)
-    bounds = {uav.name: UavBounds(uav, radar) for uav in scene.uavs}
-    energies: dict[tuple[str, str], float] = {}
+    times = pulse_times_s(scene, seed)
+    bounds = {uav.name: UavBounds(uav, radar, times) for uav in scene.uavs}
+    receiver = ReceiverBounds(scene, seed, bounds)
+    # norms, over that of the noise of one sample; the receiver may make a target's error larger
+    errors: dict[tuple[str, str], float] = {}
     for uav in scene.uavs:
         for effect in UAV_EFFECTS:
-            energies[uav.name, effect] = float(np.sum(bounds[uav.name].of(effect) ** 2)) / noise
+            errors[uav.name, effect] = receiver.total_gain * float(np.linalg.norm(bounds[uav.name].of(effect)))
     for bird in scene.birds:
         for effect in BIRD_EFFECTS:
-            energies[bird.name, effect] = float(np.sum(bird_bound(bird, radar, effect) ** 2)) / noise
+            bound = bird_bound(bird, radar, effect, times)
+            errors[bird.name, effect] = receiver.total_gain * float(np.linalg.norm(bound))
+    if scene.receiver.jitter_s:
+        errors["receiver", "jitter"] = receiver.jitter()
+    for effect in receiver.effects:
+        errors["receiver", effect] = receiver.own(effect)
+    scale = 1 / np.sqrt(noise)
+    errors = {key: scale * error for key, error in errors.items()}
     # half of the amplitude tolerated is for the effects, the rest for the spacing of scatterers where they are needed
     allowed, used, dropped = np.sqrt(10 ** (tolerance_db / 10)), 0.0, set()
-    for key, energy in sorted(energies.items(), key=lambda item: item[1]):
-        if energy == 0 or used + np.sqrt(energy) <= allowed / 2:
-            used += np.sqrt(energy)
+    for key, error in sorted(errors.items(), key=lambda item: item[1]):
+        if error == 0 or used + error <= allowed / 2:
+            used += error
             dropped.add(key)
     fidelity: dict[str, Fidelity] = {}
     notes: list[str] = []
@@ -139,18 +171,19 @@ def make_plan(scene: "Scene", *, tolerance_db: float = -10.0) -> Plan:
         kept = frozenset(effect for effect in UAV_EFFECTS if (uav.name, effect) not in dropped)
         points = None
         if "blade_curvature" in kept:
-            points, missed = _points(bounds[uav.name], uav, radar, rest**2 * noise)
-            used += np.sqrt(missed / noise)
+            points, missed = _points(bounds[uav.name], uav, radar, (rest / (scale * receiver.total_gain)) ** 2)
+            used += scale * receiver.total_gain * np.sqrt(missed)
         fidelity[uav.name] = Fidelity(kept, points)
         notes += [_renderer(uav, radar, points), _aliasing(uav, radar)]
     for bird in scene.birds:
         kept = frozenset(effect for effect in BIRD_EFFECTS if (bird.name, effect) not in dropped)
         fidelity[bird.name] = Fidelity(kept, None)
-    decisions = tuple(Decision(*key, _db(energy), key not in dropped) for key, energy in energies.items())
-    return Plan(tolerance_db, _db(used**2), decisions, fidelity, tuple(notes))
+    decisions = tuple(Decision(*key, _db(error**2), key not in dropped) for key, error in errors.items())
+    kept_by_receiver = frozenset(effect for part, effect in errors.keys() - dropped if part == "receiver")
+    return Plan(tolerance_db, _db(used**2), decisions, fidelity, kept_by_receiver, tuple(notes))
 
 
-def _strongest(scene: "Scene") -> float:
+def _strongest(scene: Setting) -> float:
     """Power of the strongest part of the scene."""
     levels = [point.level_db for uav in scene.uavs for point in uav.body]
     levels += [rotor.flash_db for uav in scene.uavs for rotor in uav.rotors]

@@ -3,11 +3,14 @@
 Faults fall on every class alike, so that none of them gives a label away.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .clutter import process_velocities, shaped_noise
+from .clutter import process_velocities, real_noise, shaped_noise
+from .grid import PulseGrid, Sine
 from .laws import Draws
 from .motion import TWO_PI
 from .radar import Radar
@@ -71,7 +74,11 @@ class Receiver:
         self.gain_db = draws.value("gain_db")
 
     def receive(
-        self, signal: NDArray[np.complex64], noise: NDArray[np.complex64], radar: Radar, normals_of: "NormalsOf"
+        self,
+        signal: NDArray[np.complex64],
+        noise: NDArray[np.complex64],
+        radar: Radar,
+        normals_of: "Callable[[str], NormalsOf]",
     ) -> NDArray[np.complex64]:
         """Pass the signals through their receivers.
 
@@ -84,7 +91,7 @@ class Receiver:
         radar : Radar
             The radar that looks.
         normals_of : callable
-            Gives the source of normal numbers of the rows asked for.
+            Gives the source of normal numbers of the effect of that name.
 
         Returns
         -------
@@ -98,24 +105,28 @@ class Receiver:
         rows = np.flatnonzero(self.on["phase_noise"])
         if len(rows):
             # an oscillator's close-in noise falls as 1/f^2; small angles, so a real process of that spectrum will do
-            psd = np.broadcast_to(colour**2 * (v != 0), (len(rows), len(v)))
-            wander = shaped_noise(normals_of(rows), radar, psd, v).real * np.float32(np.sqrt(2))
-            angle = self.phase_noise_rad[rows].astype(np.float32)[:, None] * wander
-            iq[rows] *= np.cos(angle) + 1j * np.sin(angle)
+            side = colour[: len(v) // 2 + 1] ** 2
+            side[0] = 0
+            angle = real_noise(normals_of("phase_noise")(rows), radar, side)
+            angle *= self.phase_noise_rad[rows].astype(np.float32)[:, None]
+            turn = np.empty(angle.shape, np.complex64)
+            np.cos(angle, out=turn.real)
+            np.sin(angle, out=turn.imag)
+            iq[rows] *= turn
         iq = iq + noise
         self._strike(iq, np.flatnonzero(self.on["impulses"]))
         rows = np.flatnonzero(self.on["flicker"])
         if len(rows):
-            psd = np.broadcast_to(colour, (len(rows), len(v)))
             # the law sets the density at 1 % of the PRF; the process has unit power, so scale by the sum of the lines
             corner = 0.02 * radar.unambiguous_mps
             power = 10 ** (self.flicker_db[rows] / 10) * corner * colour.sum() / len(v)
-            iq[rows] += np.sqrt(power).astype(np.float32)[:, None] * shaped_noise(normals_of(rows), radar, psd, v)
+            iq[rows] += np.sqrt(power).astype(np.float32)[:, None] * shaped_noise(
+                normals_of("flicker")(rows), radar, colour[None], v
+            )
         rows = np.flatnonzero(self.on["mains"])
         if len(rows):
             iq[rows] += self._mains(radar, rows)
-        self._colour(iq, np.flatnonzero(self.on["colour"]))
-        self._block_rest(iq, np.flatnonzero(self.on["high_pass"]), radar)
+        self._filter(iq, radar)
         rows = np.flatnonzero(self.on["image"])
         iq[rows] += (10 ** (self.image_db[rows] / 20)).astype(np.float32)[:, None] * iq[rows].conj()
         rows = np.flatnonzero(self.on["real_only"])
@@ -126,10 +137,9 @@ class Receiver:
 
     def _fading(self, radar: Radar, rows: NDArray[np.intp]) -> NDArray[np.float32]:
         """Slow rise and fall of everything the antenna sees: glint, multipath, a beam that moves on."""
-        log_gain = np.zeros((len(rows), radar.pulses))
-        for rate_hz, phase in zip(self.fading_hz[rows].T, self.fading_phase[rows].T, strict=True):
-            log_gain += np.sin(TWO_PI * rate_hz[:, None] * radar.times_s + phase[:, None])
-        return (10 ** (self.fading_db[rows, None] / 40 * log_gain)).astype(np.float32)
+        swing = np.broadcast_to(np.log(10) * self.fading_db[rows, None] / 40, (len(rows), self.fading_hz.shape[1]))
+        gain = PulseGrid(radar).sines(Sine(swing, self.fading_hz[rows], self.fading_phase[rows]))
+        return np.exp(gain, out=gain)
 
     def _strike(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:
         """Single pulses spoilt by another emitter: broadband like a flash, but not periodic."""
@@ -138,36 +148,36 @@ class Receiver:
                 amplitude = 10 ** (self.impulse_db[row, n] / 20) * np.exp(1j * self.impulse_phase[row, n])
                 iq[row, int(self.impulse_at[row, n] * iq.shape[-1])] += np.complex64(amplitude)
 
-    def _block_rest(self, iq: NDArray[np.complex64], rows: NDArray[np.intp], radar: Radar) -> None:
-        """A receiver coupled by capacitors, or a clutter canceller: nothing near velocity zero comes through."""
-        square = fft.fftfreq(iq.shape[-1], 1 / radar.prf_hz) ** 2
-        for row in rows:
-            response = square / (square + self.high_pass_hz[row] ** 2)
-            iq[row] = fft.ifft(fft.fft(iq[row]) * response.astype(np.float32))
-
     def _mains(self, radar: Radar, rows: NDArray[np.intp]) -> NDArray[np.float32]:
         """Harmonics of the mains, real and so on both sides of the spectrum alike."""
         order = np.arange(1, self.mains_phase.shape[1] + 1)
         amplitude = order ** -self.mains_slope[rows, None]
         amplitude *= np.sqrt(2 * 10 ** (self.mains_db[rows, None] / 10) / (amplitude**2).sum(axis=1, keepdims=True))
-        out = np.zeros((len(rows), radar.pulses), np.float32)
-        for n in order:
-            turns = n * self.mains_hz[rows, None] * radar.times_s + self.mains_phase[rows, n - 1, None] / TWO_PI
-            tone = np.cos((TWO_PI * (turns - np.rint(turns))).astype(np.float32))
-            out += amplitude[:, n - 1, None].astype(np.float32) * tone
-        return out
+        cosine = self.mains_phase[rows] + TWO_PI / 4
+        return PulseGrid(radar).sines(Sine(amplitude, order * self.mains_hz[rows, None], cosine))
 
-    def _colour(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:
-        """A band that is not flat: it falls towards its edges, and smooth humps lie anywhere in it.
+    def _filter(self, iq: NDArray[np.complex64], radar: Radar) -> None:
+        """The band's shape: not flat, falling towards its edges with smooth humps anywhere, and blind at rest.
 
-        A hump of noise must not pass for a rotor's band.
+        A hump of noise must not pass for a rotor's band. A receiver coupled by capacitors, or a clutter canceller, lets
+        nothing near velocity zero through.
         """
-        share = fft.fftfreq(iq.shape[-1]) * 2
-        for row in rows:
-            turns = TWO_PI * self.hump_turns[row][:, None] * share + self.hump_phase[row][:, None]
-            level_db = self.tilt_db[row] * share**2 + self.hump_db[row] @ np.cos(turns)
-            response = 10 ** (level_db / 20)
-            iq[row] = fft.ifft(fft.fft(iq[row]) * response.astype(np.float32))
+        share = (fft.fftfreq(iq.shape[-1]) * 2).astype(np.float32)
+        tilt, square = share**2, fft.fftfreq(iq.shape[-1], 1 / radar.prf_hz).astype(np.float32) ** 2
+        neper = np.float32(np.log(10) / 20)
+        for row in np.flatnonzero(self.on["colour"] | self.on["high_pass"]):
+            spectrum = fft.fft(iq[row])
+            if self.on["colour"][row]:
+                turns = np.float32(TWO_PI) * self.hump_turns[row].astype(np.float32)[:, None] * share
+                level = np.cos(turns + self.hump_phase[row].astype(np.float32)[:, None])
+                level *= self.hump_db[row].astype(np.float32)[:, None]
+                total = level.sum(axis=0)
+                total += np.float32(self.tilt_db[row]) * tilt
+                total *= neper
+                spectrum *= np.exp(total, out=total)
+            if self.on["high_pass"][row]:
+                spectrum *= square / (square + np.float32(self.high_pass_hz[row] ** 2))
+            iq[row] = fft.ifft(spectrum, overwrite_x=True)
 
     def _one_sided(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:
         """A real recording made analytic afterwards: both sides fold onto one, the other is empty."""
@@ -178,7 +188,10 @@ class Receiver:
         if pulses % 2 == 0:
             keep[pulses // 2] = 1
         for row in rows:
-            folded = fft.ifft(fft.fft(iq[row].real.astype(np.complex64)) * keep)
+            spectrum = np.zeros(pulses, np.complex64)
+            side = fft.rfft(iq[row].real)
+            spectrum[: len(side)] = side
+            folded = fft.ifft(spectrum * keep, overwrite_x=True)
             iq[row] = folded.conj() if self.conjugate[row] else folded
 
     def _convert(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:

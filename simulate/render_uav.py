@@ -114,30 +114,17 @@ def uav_echo(part: UavPart, radar: Radar, times_s: NDArray[np.float64], how: Fid
                 edge_asymmetry=rotor.edge_asymmetry,
                 far_field=straight_blades,
             )
-    return out + body_echo(part, wavelength, centre, times_s, how, near_hubs)
-
-
-def body_echo(
-    part: UavPart,
-    wavelength_m: float,
-    centre_m: NDArray[np.float64],
-    times_s: NDArray[np.float64],
-    how: Fidelity,
-    near: bool,
-) -> NDArray[np.complex128]:
-    """Echo of a UAV's body scatterers, shaken if it vibrates."""
-    body = np.zeros(len(times_s), np.complex128)
     for point in part.body:
-        place = hub_range_m(centre_m, point.offset_m, np.deg2rad(point.bearing_deg), far_field=not near)
+        place = hub_range_m(centre, point.offset_m, np.deg2rad(point.bearing_deg), far_field=not near_hubs)
         amplitude = 10 ** (point.level_db / 20) * np.exp(1j * np.deg2rad(point.phase_deg))
-        body += amplitude * range_echo(place, wavelength_m)
+        out += amplitude * range_echo(place, wavelength)
     if "vibration" in how.effects and part.vibration_rad:
-        body *= np.exp(1j * vibration_rad(part, times_s))
-    return body
+        out *= np.exp(1j * vibration_rad(part, times_s))
+    return out
 
 
 def vibration_rad(part: UavPart, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Phase by which the body's vibration moves its echo [rad], shape (pulses,)."""
+    """Phase by which the vibration of the rigid airframe moves its echo, body and hubs alike [rad], shape (pulses,)."""
     return part.vibration_rad * np.sin(TWO_PI * part.vibration_hz * times_s)
 
 

@@ -69,6 +69,10 @@ class RotorMotion:
         return angle
 
 
+#: Largest 4 pi L cos(beta) / wavelength for float32: beyond it the rounding of an angle shows in the flash.
+LARGEST_GAMMA = 3e4
+
+
 def rotor_echo(
     angle_rad: NDArray[np.float64],
     *,
@@ -113,6 +117,11 @@ def rotor_echo(
     )
     blades = Blades.of(lead, wavelength_m, blade_length_m, beta_rad, root_m, blade_amplitudes, edge_asymmetry)
     pulses = angle.shape[-1]
+    reach_m = np.max(np.asarray(blade_length_m) * np.abs(np.cos(beta_rad)), initial=0)
+    if 2 * TWO_PI / wavelength_m * reach_m > LARGEST_GAMMA:
+        shapes = np.atleast_1d(blade_length_m), np.atleast_1d(beta_rad), np.atleast_1d(root_m)
+        echo = _double_echo(angle, wavelength_m, *shapes, blade_amplitudes, edge_asymmetry)
+        return echo.reshape(*lead, pulses)
     angle = np.broadcast_to(angle, (*lead, pulses)).reshape(-1, pulses)
     out = np.empty(angle.shape, np.complex64)
     wide = max(1, min(pulses, TILE_SAMPLES))
@@ -125,3 +134,27 @@ def rotor_echo(
         blades.sum(rows, reduced, room, real, imag)
         part.real, part.imag = real, imag
     return out.reshape(*lead, pulses)
+
+
+def _double_echo(
+    angle: NDArray[np.float64],
+    wavelength_m: float,
+    tip_m: NDArray[np.float64],
+    beta_rad: NDArray[np.float64],
+    root_m: NDArray[np.float64],
+    blade_amplitudes: ArrayLike,
+    edge_asymmetry: ArrayLike,
+) -> NDArray[np.complex64]:
+    """The closed form blade by blade in float64, for blades of so many wavelengths that float32 has no digits left."""
+    amplitudes = np.asarray(blade_amplitudes, np.float64)
+    blades = amplitudes.shape[-1]
+    asymmetry = np.asarray(edge_asymmetry, np.float64)[..., None]
+    k = TWO_PI / wavelength_m * np.cos(beta_rad)
+    out: NDArray = np.zeros(1, np.complex128)
+    for number in range(blades):
+        theta = angle + TWO_PI * number / blades
+        along = k[..., None] * np.cos(theta)
+        share = np.sinc((tip_m - root_m)[..., None] * along / np.pi)
+        weight = amplitudes[..., number, None] * (1 + asymmetry * np.sin(theta))
+        out = out + weight * share * np.exp(1j * (tip_m + root_m)[..., None] * along)
+    return out.astype(np.complex64)

@@ -54,7 +54,7 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
     level = np.exp(0.4 * draws.normal(rotors))
     lifting = []
     for r in range(rotors):
-        motion = _motion(draws, rates[:, r])
+        motion = _motion(draws, rates[:, r], radar)
         hub = level[:, r] * np.exp(1j * draws.value("phase_rad"))
         lifting.append(Rotor(motion, length, beta, root, amplitudes, asymmetry, hub))
     truth = {
@@ -72,34 +72,32 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
     }
     tail = []
     if kind == "helicopter":
-        rotor, truth["tail_rotation_hz"] = _tail_rotor(draws, length, rotation)
+        rotor, truth["tail_rotation_hz"] = _tail_rotor(draws, length, rotation, radar)
         tail.append(rotor)
     vibration, phase, rest = (draws.value(law) for law in ("vibration_rad", "phase_rad", "phase_rad"))
-    path = {"velocity_mps": velocity, "acceleration_mps2": acceleration}
+    path = {
+        "velocity_mps": velocity,
+        "acceleration_mps2": acceleration,
+        "vibration_rad": vibration,
+        "vibration_hz": rates[:, 0],
+        "vibration_phase_rad": phase,
+    }
     micro = np.empty((len(draws), radar.pulses), np.complex64)
     for count in BLADES:
         rows = np.flatnonzero(blades == count)
         if len(rows):
             some = [_of(rotor, rows, count) for rotor in lifting] + [_of(rotor, rows) for rotor in tail]
             micro[rows] = rotors_echo(radar, some, len(rows), **{name: value[rows] for name, value in path.items()})
-    body = body_echo(
-        radar,
-        len(draws),
-        **path,
-        phase_rad=rest,
-        vibration_rad=vibration,
-        vibration_hz=rates[:, 0],
-        vibration_phase_rad=phase,
-    )
+    body = body_echo(radar, len(draws), **path, phase_rad=rest)
     return Target(micro, body, draws.value("uav_body_db"), truth=truth)
 
 
-def _motion(draws: Draws, rate_hz: NDArray[np.float64]) -> RotorMotion:
+def _motion(draws: Draws, rate_hz: NDArray[np.float64], radar: Radar) -> RotorMotion:
     """One rotor's sense, phase, drift and wander."""
     return RotorMotion(
         rotation_hz=rate_hz * draws.sign(),
         phase_rad=draws.value("phase_rad"),
-        drift_hz_per_s=rate_hz * draws.value("drift_per_s") * draws.sign(),
+        drift_hz_per_s=rate_hz * draws.change("drift_per_s", radar.dwell_s) * draws.sign(),
         wander_hz=rate_hz * draws.value("wander"),
         wander_rate_hz=draws.value("wander_rate_hz"),
         wander_phase_rad=draws.value("phase_rad"),
@@ -115,7 +113,7 @@ def _blade_amplitudes(draws: Draws) -> NDArray[np.float64]:
 
 
 def _tail_rotor(
-    draws: Draws, main_length_m: NDArray[np.float64], main_rotation_hz: NDArray[np.float64]
+    draws: Draws, main_length_m: NDArray[np.float64], main_rotation_hz: NDArray[np.float64], radar: Radar
 ) -> tuple[Rotor, NDArray[np.float64]]:
     """A two-blade tail rotor, geared to the main one, in an upright plane: its aspect is another angle.
 
@@ -123,7 +121,7 @@ def _tail_rotor(
     """
     length = main_length_m * draws.value("tail_ratio")
     rate = np.minimum(main_rotation_hz * draws.value("gear_ratio"), 200.0 / (TWO_PI * length))
-    motion = _motion(draws, rate)
+    motion = _motion(draws, rate, radar)
     beta = LAWS["uav_beta_rad"](draws.uniform())
     hub = 0.4 * np.exp(0.5 * draws.normal() + 1j * draws.value("phase_rad"))
     amplitudes = np.ones((len(draws), 2))

@@ -13,6 +13,7 @@ from functools import lru_cache, partial
 
 import numpy as np
 from bladewing.features import doppler_spectrum
+from bladewing.features import stft as joint
 from bladewing.features.axis import pooling
 from bladewing.features.vector import radar_columns
 from bladewing.simulate import Radar
@@ -26,6 +27,9 @@ IMAGE_BINS, IMAGE_FRAMES = 64, 32
 
 #: The four STFTs of the paper that are pictured and weighed: window [samples], overlap.
 STFT_SETTINGS = ((80, 0.9), (200, 0.9), (20, 0.9), (80, 0.5))
+
+#: Window of the cadence-velocity diagram [s], the paper's middle one.
+CADENCE_WINDOW_S = 4e-3
 
 #: Samples worked on at a time: a short window's STFT is hundreds of times larger than the record.
 _BLOCK_SAMPLES = 1 << 16
@@ -120,8 +124,50 @@ def _pooled_power(some: NDArray[np.complex64]) -> NDArray[np.float32]:
     return pooled / (ends - starts)[:, None].astype(np.float32)
 
 
+def cadence_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
+    """Cadence-velocity diagram: how fast each velocity's level swings, (n, 1, velocity bins, cadences) [dB]."""
+    swings, _ = joint.cadence_velocity(_frames_of(iq, radar, CADENCE_WINDOW_S))
+    few = _grouped(swings**2, IMAGE_FRAMES)
+    level = np.median(few, axis=(1, 2), keepdims=True)
+    pool = pooling(few.shape[-1], radar.carrier_hz, radar.prf_hz, IMAGE_BINS)
+    return np.swapaxes(pool.mean_db(few / np.where(level > 0, level, np.float32(1))), -1, -2)[:, None]
+
+
+def cepstral_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
+    """Cepstrogram: periods of the comb, evenly spaced in their logarithm, (n, 1, periods, frames) [dB]."""
+    heights, _ = joint.cepstrogram(_frames_of(iq, radar, joint.HERM_WINDOW_S))
+    few = _grouped(heights, IMAGE_FRAMES)
+    edges = np.geomspace(1, few.shape[-1], IMAGE_BINS + 1)[:-1].astype(int)
+    # a comb's peak is narrow: the highest of a group of periods speaks for it
+    return np.swapaxes(np.maximum.reduceat(few, edges, axis=-1), -1, -2)[:, None]
+
+
+def herm_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
+    """HERM lines: what stays in each velocity bin from long frame to long frame, (n, 1, velocity bins) [dB]."""
+    lines = 10 ** (joint.herm_lines_db(_frames_of(iq, radar, joint.HERM_WINDOW_S)) / 10)
+    pool = pooling(lines.shape[-1], radar.carrier_hz, radar.prf_hz, SPECTRUM_BINS)
+    return pool.mean_db(lines.astype(np.float32, copy=False))[:, None]
+
+
+def _frames_of(iq: NDArray[np.complex64], radar: Radar, window_s: float) -> joint.Stft:
+    """Short-time spectra; a dwell shorter than the window is one frame."""
+    window_s = min(window_s, radar.dwell_s)
+    return joint.stft(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz, window_s=window_s, overlap=0.9)
+
+
+def _grouped(rows: NDArray[np.float32], groups: int) -> NDArray[np.float32]:
+    """Mean of neighbouring rows (axis 1), so many in all; too few rows are shown several times."""
+    count = rows.shape[1]
+    starts = np.arange(groups) * count // groups
+    if count < groups:
+        return rows[:, starts]
+    sizes = np.diff(starts, append=count).astype(np.float32)
+    means: NDArray[np.float32] = np.add.reduceat(rows, starts, axis=1) / sizes[:, None]
+    return means
+
+
 def _squares(lines: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """Power of each line."""
+    """Power of each line; the lines are written over."""
     parts = lines.view(np.float32)
     np.multiply(parts, parts, out=parts)
     squares: NDArray[np.float32] = parts[..., ::2] + parts[..., 1::2]
@@ -178,5 +224,8 @@ def _stft_line(window: int, overlap: float) -> tuple[str, Picture]:
 #: Name to picture, the cheapest transform first.
 PICTURES: dict[str, Picture] = {
     "spectrum": Picture("Doppler spectrum", (2, SPECTRUM_BINS), spectrum_picture),
+    "herm": Picture("HERM lines", (1, SPECTRUM_BINS), herm_picture),
     **dict(_stft_line(*setting) for setting in STFT_SETTINGS),
+    "cadence": Picture("cadence-velocity diagram", (1, IMAGE_BINS, IMAGE_FRAMES), cadence_picture),
+    "cepstrogram": Picture("cepstrogram", (1, IMAGE_BINS, IMAGE_FRAMES), cepstral_picture),
 }

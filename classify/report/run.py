@@ -18,11 +18,13 @@ from bladewing.features.schema import INPUT_SHAPES, schema_hash
 from bladewing.simulate import Radar, Records, draw_records
 from numpy.typing import NDArray
 
+from ..bounds import MOST_MODEL_BYTES
 from ..errors import BadInput
-from ..files import settle, write_together
+from ..files import read_bounded, result_folder, settle, write_together
 from ..inference import Classifier
 from ..labels import CLASSES
 from ..progress import Progress
+from ..stability.run import worst_of_each
 from ..train import ACCOUNT
 from . import cost, evaluate, scores, stft, storage, trade
 from .card import model_card
@@ -195,7 +197,7 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
         raise BadInput(f"{folder}: not a folder: give the one that `bladewing train --out` wrote")
     else:
         settle(folder)
-        found = {path.stem: path.read_bytes() for path in folder.glob("*.onnx")}
+        found = {path.stem: _content(path) for path in folder.glob("*.onnx")}
     if not found:
         where = folder if folder is not None else "the installed package"
         raise BadInput(f"{where}: holds no .onnx file: run `bladewing train --out {folder or 'DIR'}` first")
@@ -211,9 +213,16 @@ def training_account(folder: Path | None) -> dict[str, Any] | None:
         found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise BadInput(f"{file}: not JSON: {error}: remove it or train again") from None
     return found
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return read_bounded(path, MOST_MODEL_BYTES)
+    except (OSError, ValueError) as error:
+        raise BadInput(f"{path}: the model cannot be read: {getattr(error, 'strerror', None) or error}") from None
 
 
 def run_report(
@@ -256,11 +265,11 @@ def run_report(
         If there are no models, one of them cannot be used, or a setting is wrong.
     """
     settings = report_config(config, seed=seed, quick=quick)
-    out = Path(out)
     found, account = load_models(models), training_account(models)
     for name, content in found.items():
         Classifier(content, source=name)  # what cannot be used is told before anything is measured
-    out.mkdir(parents=True, exist_ok=True)
+    out = result_folder(out)
+    stability = worst_of_each(out)
     parts = Parts(out, _of(settings, found))
     started, clock = datetime.now(UTC), time.perf_counter()
     with Progress(visible=progress) as bars:
@@ -272,7 +281,8 @@ def run_report(
             "seed": settings.seed,
             "seconds": round(time.perf_counter() - clock, 1),
         }
-        text = _json({"schema_version": SCHEMA_VERSION, "made": made, **body})
+        extremes = {} if stability is None else {"stability": stability}
+        text = _json({"schema_version": SCHEMA_VERSION, "made": made, **body, **extremes})
         # The page is drawn from the very text that is stored, so that whoever has the file can draw it again.
         report: dict[str, Any] = json.loads(text)
         write_together(

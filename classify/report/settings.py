@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ..settings_file import build_settings
+from ..settings_file import build_settings, given_settings
 
 #: What `--quick` changes: enough to see every figure, with wide intervals.
 QUICK: dict[str, Any] = {
@@ -76,4 +76,5 @@ def report_config(file: Path | None = None, *, seed: int | None = None, quick: b
     BadInput
         If the file cannot be read, is not TOML, or a field is unknown or out of its range.
     """
-    return build_settings(ReportConfig, file, start=QUICK if quick else {}, options={"seed": seed}, what="report")
+    where = str(file) if file is not None else "report settings"
+    return build_settings(ReportConfig, (QUICK if quick else {}) | given_settings(file, seed=seed), where=where)

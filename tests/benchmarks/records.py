@@ -2,6 +2,7 @@
 
 import numpy as np
 from bladewing.simulate import RotorMotion, rotor_echo
+from numpy.typing import ArrayLike
 
 CARRIER_HZ, PRF_HZ, PULSES = 9.85e9, 35e3, 3000
 RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
@@ -14,12 +15,14 @@ def white(rng: np.random.Generator, *shape: int) -> np.ndarray:
     return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) * np.sqrt(0.5)
 
 
-def rotors(rng: np.random.Generator, rates_hz: np.ndarray, *, length_m: float = 0.15, blades: int = 2) -> np.ndarray:
+def rotors(
+    rng: np.random.Generator, rates_hz: np.ndarray, *, length_m: float = 0.15, amplitudes: ArrayLike = (1.0, 1.0)
+) -> np.ndarray:
     """Blades of equal rotors of random phases, unit power a sample together."""
     echo = np.zeros(PULSES, complex)
     for rate_hz in rates_hz:
         angle = RotorMotion(rate_hz, rng.uniform(0, 2 * np.pi)).angle_rad(TIMES_S)
-        one = rotor_echo(angle, wavelength_m=WAVELENGTH_M, blade_length_m=length_m, blade_amplitudes=np.ones(blades))
+        one = rotor_echo(angle, wavelength_m=WAVELENGTH_M, blade_length_m=length_m, blade_amplitudes=amplitudes)
         echo += one * np.exp(2j * np.pi * rng.uniform())
     return echo / np.sqrt(np.mean(np.abs(echo) ** 2))
 
@@ -39,11 +42,16 @@ def record(
     body_db: float,
     velocity_mps: float,
     ground_db: float | None = None,
-    **rotor: float,
+    tail: np.ndarray | None = None,
+    **rotor: ArrayLike,
 ) -> np.ndarray:
-    """One record: blades at `snr_db` over the noise, body and ground so many dB over the blades."""
+    """One record: blades at `snr_db` over the noise, body and ground so many dB over the blades; or a tail rotor."""
     amplitude = 10 ** (snr_db / 20)
-    target = rotors(rng, rates_hz, **rotor) + 10 ** (body_db / 20) * np.exp(2j * np.pi * rng.uniform())
+    blades = rotors(rng, rates_hz, **rotor)
+    if tail is not None:
+        blades += tail
+        blades /= np.sqrt(np.mean(np.abs(blades) ** 2))
+    target = blades + 10 ** (body_db / 20) * np.exp(2j * np.pi * rng.uniform())
     iq = amplitude * target * np.exp(-4j * np.pi * velocity_mps * TIMES_S / WAVELENGTH_M)
     if ground_db is not None:
         iq = iq + amplitude * 10 ** (ground_db / 20) * ground(rng)

@@ -21,10 +21,23 @@ def calls(monkeypatch):
 
 def test_train_hands_its_options_on(calls):
     assert main(["train"]) == 0
-    assert main(["train", "--out", "m", "--config", "c.toml", "--records", "50", "--seed", "7", "--quick"]) == 0
+    assert (
+        main(["train", "--out", "m", "--config", "c.toml", "--records", "50", "--seed", "7", "--quick", "--data", "d"])
+        == 0
+    )
     assert calls == [
-        (Path("out"), {"records": None, "seed": None, "quick": False, "config": None, "progress": True}),
-        (Path("m"), {"records": 50, "seed": 7, "quick": True, "config": Path("c.toml"), "progress": True}),
+        (Path("out"), {"records": None, "seed": None, "quick": False, "config": None, "data": None, "progress": True}),
+        (
+            Path("m"),
+            {
+                "records": 50,
+                "seed": 7,
+                "quick": True,
+                "config": Path("c.toml"),
+                "data": Path("d"),
+                "progress": True,
+            },
+        ),
     ]
 
 

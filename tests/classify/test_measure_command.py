@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from bladewing.classify.cli import main
 from bladewing.classify.measure import with_error
-from bladewing.simulate import RotorMotion, rotor_echo
+from bladewing.simulate import RotorMotion, Scene, rotor_echo
 
 CARRIER_HZ, PRF_HZ, PULSES = 9.85e9, 35e3, 3000
 RADAR = ["--carrier-hz", "9.85e9", "--prf-hz", "35e3"]
@@ -48,6 +48,8 @@ def test_noise_has_nulls_and_a_reason(folder, capsys):
     dwell, *_, closing = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert dwell["chopping_hz"] is None
     assert dwell["rotor_rates_hz"] == dwell["alternatives"] == []
+    assert dwell["gear_ratio"] is None
+    assert dwell["gear_reason"] == "no comb"
     assert dwell["reason"].startswith("no comb")
     assert closing["recording"]["with_comb"] == 0
 
@@ -69,6 +71,49 @@ def test_the_plot_is_svg_with_the_comb_on_it(folder, tmp_path, capsys):
     assert "notch" in titles
     assert any(t.startswith("band ") for t in titles)
     assert sum(e.get("stroke") == "#c0392b" for e in root.iter()) > 20
+
+
+def test_a_helicopter_shows_both_combs_in_words_json_and_plot(tmp_path, capsys):
+    assert main(["simulate", "helicopter", "--out", str(tmp_path / "heli"), "--seed", "1"]) == 0
+    recording, plot = str(tmp_path / "heli.sigmf-meta"), tmp_path / "heli.svg"
+    capsys.readouterr()
+    assert main(["measure", recording, "--plot", str(plot)]) == 0
+    assert "helicopter in 1 of 1 dwells: chopping main 82.000" in capsys.readouterr().out
+    assert main(["measure", recording, "--json"]) == 0
+    dwell, closing = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert dwell["gear_ratio"] == pytest.approx(4.73, abs=6 * dwell["gear_ratio_std"])
+    assert dwell["tail_chopping_hz"] == pytest.approx(4.73 * 82, abs=6 * dwell["tail_chopping_hz_std"])
+    assert dwell["gear_reason"] is None
+    assert closing["recording"]["with_second_comb"] == 1
+    assert closing["recording"]["gear_ratio"] == dwell["gear_ratio"]
+    words = [e.text for e in ET.fromstring(plot.read_text()).iter() if e.tag.endswith("text")]
+    assert "2nd comb" in words
+    assert any("ratio 4.730" in word for word in words)
+
+
+def test_a_long_recording_of_a_bird_has_a_wingbeat(tmp_path, capsys):
+    radar = {"carrier_hz": CARRIER_HZ, "prf_hz": 4e3, "pulses": 10000}
+    part = {"name": "bird", "species": "paper_bird", "wing_db": 18.0, "heading_deg": 60.0}
+    np.save(tmp_path / "bird.npy", Scene.build({"radar": radar, "bird": [part]}).render(1).iq)
+    given = ["measure", str(tmp_path / "bird.npy"), "--carrier-hz", "9.85e9", "--prf-hz", "4e3", "--dwell", "0.5"]
+    assert main([*given, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out.splitlines()[-1])["recording"]
+    assert found["wingbeat_hz"] == pytest.approx(1 / 0.302, abs=0.1)
+    assert found["acceleration_mps2"] == pytest.approx(-(340 + 316) * 0.0304357825 / 2 / 2.5, abs=0.2)
+    assert found["wingbeat_reason"] is None
+    assert main(given) == 0
+    assert "wingbeat 3.3" in capsys.readouterr().out
+
+
+def test_a_dwell_smeared_by_acceleration_is_measured(folder, tmp_path, capsys):
+    iq = np.load(folder / "drone.npy")[:PULSES]
+    times_s = (np.arange(PULSES) - (PULSES - 1) / 2) / PRF_HZ
+    np.save(tmp_path / "pull.npy", iq * np.exp(-2j * np.pi * 30 * times_s**2 * CARRIER_HZ / 299_792_458.0))
+    assert main(["measure", str(tmp_path / "pull.npy"), *RADAR, "--dwell", "0.0857", "--json"]) == 0
+    dwell, closing = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert dwell["chopping_hz"] == pytest.approx(2 * RATE_HZ, abs=0.1)
+    assert dwell["acceleration_mps2"] == pytest.approx(30, abs=0.2)
+    assert "wingbeat_hz" not in closing["recording"]
 
 
 @pytest.mark.parametrize(

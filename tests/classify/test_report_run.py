@@ -16,6 +16,7 @@ import pytest
 from bladewing.classify import BadInput
 from bladewing.classify.report import run, run_report, scores
 from bladewing.classify.report.page import draw_page
+from bladewing.classify.stability.cell import Cell
 from bladewing.features.schema import INPUT_SHAPES
 
 
@@ -241,3 +242,12 @@ def test_a_foreign_model_is_refused_before_anything_is_measured(tmp_path: Path) 
     (tmp_path / "foreign.onnx").write_bytes(b"not a model")
     with pytest.raises(BadInput, match="foreign"):
         run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
+
+
+def test_page_shows_a_stability_table_that_lies_beside_it(report: dict[str, Any]) -> None:
+    cell = Cell("comb", "SNR", "200 dB", 0.05, "error [Hz]", 0.1, "the <guard>")
+    row = {**cell.as_dict(), "shown": "0.05", "cells": 3, "held": 3}
+    page = draw_page({**report, "stability": [row]})
+    assert "the &lt;guard&gt;" in page
+    assert "3 of 3 cells hold" in page
+    assert "At the extremes" not in draw_page(report)

@@ -35,6 +35,10 @@ def test_trained_models_answer_through_the_classifier(trained, name):
     clf = Classifier.load(out / f"{name}.onnx")
     assert json.loads(clf.metadata["training"])["records"] == 2400
     assert list(clf.accept) == account["models"][name]["accept"]
+    assert account["models"][name]["cost_ffts"] > 1
+    chosen = Classifier.load(out / f"{name}.onnx", max_false_alarm=0.1)  # 600 calibration records hold 400 others
+    assert chosen.operating_point.false_alarm == 0.1
+    assert chosen.accept[1:] == clf.accept[1:]
     radar = Radar(9.85e9, 25e3, 2000)
     loud = draw_records(radar, 90, 0, purpose="test", kind="quadcopter")
     answer = clf.predict(loud.iq[loud.truth["snr_db"] > 5], carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)

@@ -7,7 +7,7 @@ import time
 
 import pytest
 from bladewing.classify import files
-from bladewing.classify.files import settle, write_together
+from bladewing.classify.files import only_writer, settle, write_together
 
 OLD, NEW = {"a": b"old a", "b": b"old b"}, {"a": b"new a", "b": b"new b", "c": b"new c"}
 
@@ -51,10 +51,37 @@ def test_a_fault_at_any_rename_leaves_all_old_or_all_new(tmp_path, monkeypatch, 
 def test_a_journal_moves_nothing_out_of_its_folder(tmp_path):
     folder = tmp_path / "models"
     folder.mkdir()
-    (folder / "x").write_bytes(b"x")
-    (folder / ".bladewing-pending.json").write_text(json.dumps({"x": "../escaped"}))
+    (folder / ".bladewing-0.new").write_bytes(b"x")
+    (folder / ".bladewing-pending.json").write_text(json.dumps({".bladewing-0.new": "../escaped"}))
     settle(folder)
     assert not (tmp_path / "escaped").exists()
+
+
+@pytest.mark.parametrize("journal", ['{"mine": "yours"}', "[1]", "[" * 100_000, "\xff", " " * (1 << 21)])
+def test_a_foreign_journal_changes_nothing_and_does_not_stay(tmp_path, journal):
+    (tmp_path / "mine").write_bytes(b"mine")
+    (tmp_path / ".bladewing-pending.json").write_text(journal, encoding="latin-1")
+    settle(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+
+
+def test_two_writers_never_mix_their_files(tmp_path):
+    writers = [subprocess.Popen([sys.executable, "-c", KILL, str(tmp_path)]) for _ in range(2)]
+    try:
+        deadline = time.monotonic() + 20
+        while not (tmp_path / "f").exists() and time.monotonic() < deadline:
+            time.sleep(0.01)
+        for _ in range(20):
+            time.sleep(0.01)
+            with only_writer(tmp_path):
+                assert not (tmp_path / ".bladewing-pending.json").exists()
+                assert len({(tmp_path / name).read_bytes() for name in "abcdef"}) == 1
+    finally:
+        for writer in writers:
+            writer.kill()
+            writer.wait()
+    write_together(tmp_path, {"a": "last"})
+    assert sorted(path.name for path in tmp_path.iterdir() if path.suffix == ".new") == []
 
 
 KILL = """

@@ -16,7 +16,9 @@ def white(rng: np.random.Generator, *shape: int) -> np.ndarray:
     return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) * np.sqrt(0.5)
 
 
-def rotors(rates_hz, *, length_m: float = 0.15, blades: int = 2, velocity_mps: float = 0.0, body: float = 3.0):
+def rotors(
+    rates_hz, *, length_m: float = 0.15, amplitudes=(1.0, 1.0), velocity_mps: float = 0.0, body: float = 3.0
+) -> np.ndarray:
     """Body line and rotors of unit blade power as the paper's radar sees them."""
     times_s = np.arange(PULSES) / PRF_HZ
     iq = np.zeros(PULSES, complex)
@@ -25,7 +27,7 @@ def rotors(rates_hz, *, length_m: float = 0.15, blades: int = 2, velocity_mps: f
             RotorMotion(rate_hz, 0.3 + 1.7 * number).angle_rad(times_s),
             wavelength_m=WAVELENGTH_M,
             blade_length_m=length_m,
-            blade_amplitudes=np.ones(blades),
+            blade_amplitudes=amplitudes,
         )
     iq /= np.sqrt(np.mean(abs(iq) ** 2))
     return (iq + body) * np.exp(-4j * np.pi * velocity_mps * times_s / WAVELENGTH_M)

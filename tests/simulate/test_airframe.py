@@ -127,6 +127,22 @@ def test_a_body_follows_its_path_and_shakes(velocity_mps, acceleration_mps2, pha
     np.testing.assert_allclose(echo[0], expected, atol=1.5e-5)
 
 
+@given(vibration_rad=st.floats(0, 3), vibration_hz=st.floats(1, 400), seed=st.integers(0, 9))
+@settings(max_examples=15, deadline=None)
+def test_hubs_shake_with_the_airframe(vibration_rad, vibration_hz, seed):
+    rotors, velocity, acceleration = drawn(2, seed), np.array([3.0, -8.0]), np.array([0.0, 2.0])
+    shake = {"vibration_rad": vibration_rad, "vibration_hz": vibration_hz, "vibration_phase_rad": 0.7}
+    path = {"velocity_mps": velocity, "acceleration_mps2": acceleration}
+    fast = rotors_echo(RADAR, rotors, 2, **path, **shake)
+    phase = vibration_rad * np.sin(2 * np.pi * vibration_hz * RADAR.times_s + 0.7)
+    np.testing.assert_allclose(fast, slowly(RADAR, rotors, velocity, acceleration) * np.exp(1j * phase), atol=5e-3)
+
+
+def test_a_still_airframe_has_the_bits_of_one_without_vibration():
+    still = {"vibration_rad": 0.0, "vibration_hz": 90.0, "vibration_phase_rad": 1.0}
+    np.testing.assert_array_equal(rotors_echo(RADAR, drawn(2, 1), 2, **still), rotors_echo(RADAR, drawn(2, 1), 2))
+
+
 def test_no_blade_gives_no_echo():
     rotor = Rotor(RotorMotion(80.0), blade_length_m=0.2, blade_amplitudes=(0.0, 0.0))
     assert not rotors_echo(RADAR, [rotor], 2).any()

@@ -115,12 +115,30 @@ def test_a_stream_is_its_groups():
 
 
 def test_radars_stay_inside_the_envelope():
-    radars = [draw_radar(0, "train", g) for g in range(400)]
+    radars = [draw_radar(0, "train", g) for g in range(1200)]
     assert all(2e9 <= r.carrier_hz <= 100e9 for r in radars)
     assert all(1e3 <= r.prf_hz <= 1e5 for r in radars)
-    assert all(64 <= r.pulses <= 8192 for r in radars)
+    assert all(64 <= r.pulses <= (8192 if r.dwell_s <= 1.001 else 65536) or r.pulses == 65536 for r in radars)
     assert all(r.unambiguous_mps > 9.99 for r in radars)
-    assert all(r.dwell_s > 0.00499 for r in radars)
+    assert all(0.00499 < r.dwell_s < 5.001 for r in radars)
+    # one radar in 33 dwells for 1 to 5 s, as long as 65 536 pulses last
+    long = sum(r.dwell_s > 1.001 or r.pulses > 8192 for r in radars)
+    assert abs(long - 36) < 4.5 * 6
+    assert max(r.dwell_s for r in radars) > 3
+    # the mean cost of a record stays near that of the short dwells
+    assert np.mean([r.pulses for r in radars]) < 1.6 * np.mean([min(r.pulses, 8192) for r in radars])
+
+
+@pytest.mark.parametrize(("prf_hz", "dwell_s"), [(2e3, 0.005), (1e3, 5.0), (13e3, 5.0), (1e5, 0.6)])
+def test_any_dwell_from_5_ms_to_5_s_is_drawn_and_stays_physical(prf_hz, dwell_s):
+    radar = Radar(9.85e9, prf_hz, round(prf_hz * dwell_s))
+    records = draw_records(radar, 9, seed=2)
+    assert np.isfinite(records.iq).all()
+    assert (np.mean(abs(records.iq) ** 2, axis=1) > 0).all()
+    draws = Draws(np.random.default_rng(0).random((4000, 2)))
+    # over the dwell a rotor's rate changes by 30 % at most, and a vehicle's speed by 10 m/s
+    for law, most in (("drift_per_s", 0.3), ("vehicle_acceleration_mps2", 10.0)):
+        assert abs(draws.change(law, radar.dwell_s)).max() * radar.dwell_s <= most * 1.0001
 
 
 @pytest.mark.parametrize("call", [{"purpose": "holiday"}, {"kind": "ufo"}, {"start": -1}, {"seed": -2}])

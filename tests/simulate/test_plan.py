@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from bladewing.simulate.bounds import UavBounds, bird_bound, gauss_error, moment_envelope
+from bladewing.simulate.bounds_receiver import CHAIN
 from bladewing.simulate.exact import blade_points
 from bladewing.simulate.parts import BirdPart, UavPart
 from bladewing.simulate.radar import Radar
@@ -155,6 +156,7 @@ def test_what_a_plan_leaves_out_stays_below_its_own_bound_and_the_tolerance(tole
     left_out = 0
     for seed in range(12):
         part, radar = random_uav(np.random.default_rng(seed))
+        part = part.model_copy(update={"vibration_rad": part.vibration_rad * (seed % 2)})
         radar_part = {"carrier_hz": radar.carrier_hz, "prf_hz": radar.prf_hz, "pulses": radar.pulses}
         scene = Scene.build({"radar": radar_part, "uav": [part]})
         plan = scene.plan(tolerance_db=tolerance_db)
@@ -210,3 +212,92 @@ def test_a_plan_says_whether_the_samples_fold():
 def test_a_tolerance_that_is_no_number_is_refused():
     with pytest.raises(ValueError, match="tolerance_db is nan"):
         Scene.load("type1").plan(tolerance_db=float("nan"))
+
+
+def random_reception(rng: np.random.Generator, effects: list[str], **more) -> Scene:
+    """A scene with a receiver: a UAV afar or near, a bird, ground, and effects of random strength."""
+    part, radar = random_uav(rng)
+    part = part.model_copy(update={"range_m": log_uniform(rng, 30, 1e6), "rotors": part.rotors[:1]})
+    values = {
+        "phase_noise_rad": log_uniform(rng, 1e-4, 0.1),
+        "adc_bits": float(rng.integers(6, 17)),
+        "full_scale_db": float(rng.uniform(-3, 20)),
+    }
+    return Scene.build(
+        {
+            "radar": {"carrier_hz": min(radar.carrier_hz, 12e9), "prf_hz": radar.prf_hz, "pulses": 200},
+            "uav": [part],
+            "bird": [{"name": "b", "species": "starling", "members": 2}],
+            "clutter": [{"name": "g", "kind": "ground", "level_db": float(rng.uniform(0, 40))}],
+            "receiver": {"effects": effects, "values": values, **more},
+        }
+    )
+
+
+def changed_by(scene: Scene, seed: int, effect: str) -> float:
+    """Energy of what leaving an effect of the receiver out changes, all else at full fidelity."""
+    receiver = {**dict(scene.receiver)}
+    if effect == "jitter":
+        receiver["jitter_s"] = 0.0
+    elif effect == "dc":
+        receiver["dc_db"] = None
+    else:
+        receiver["effects"] = tuple(name for name in scene.receiver.effects if name != effect)
+    less = Scene.build({**dict(scene), "receiver": receiver})
+    return energy(render(scene, seed).iq.astype(complex) - render(less, seed).iq)
+
+
+@pytest.mark.parametrize("effect", ["jitter", *CHAIN])
+@pytest.mark.parametrize("others", [[], ["fading", "colour", "image"]], ids=["alone", "among others"])
+def test_every_bound_of_a_receiver_holds_and_is_not_idle(effect, others):
+    ratios = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        more = {
+            "jitter": {"jitter_s": log_uniform(rng, 1e-9, 1e-6)},
+            "dc": {"dc_db": float(rng.uniform(-20, 20))},
+        }.get(effect, {})
+        named = sorted({*others, effect} - {"jitter", "dc"})
+        scene = random_reception(rng, named, **more)
+        found = {d.effect: d.bound_db for d in scene.plan(seed).decisions if d.part == "receiver"}
+        true, bound = changed_by(scene, seed, effect), 10 ** (found[effect] / 10)
+        whole = energy(render(scene, seed).iq)
+        assert true <= bound * (1 + 1e-4) + 1e-12 * whole, (seed, true, bound)
+        if true > 1e-10 * whole:
+            ratios.append(bound / true)
+    assert len(ratios) >= 5
+    assert np.median(ratios) <= 10
+
+
+@pytest.mark.parametrize("tolerance_db", [-10.0, 20.0])
+def test_receivers_effects_that_a_plan_leaves_out_stay_below_its_bound(tolerance_db):
+    left_out = set()
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        scene = random_reception(rng, ["phase_noise", "mains", "converter"], jitter_s=1e-10)
+        plan = scene.plan(seed, tolerance_db=tolerance_db)
+        # a converter that is kept rounds anew what changed before it: that is not counted
+        seen = scene.without("converter") if "converter" in plan.receiver else scene
+        error = energy(render(seen, seed, plan=plan).iq.astype(complex) - render(seen, seed).iq)
+        digits = energy(render(scene, seed).iq) * 1e-9  # complex64, and float32 phases of long blades
+        assert error <= 10 ** (plan.error_db / 10) + digits, seed
+        assert plan.error_db <= tolerance_db + 1e-9
+        left_out |= {d.effect for d in plan.decisions if d.part == "receiver" and not d.kept}
+    assert "jitter" in left_out
+
+
+def test_a_plan_says_in_words_and_numbers_what_a_receiver_needs():
+    def said(bits: float, phase_rad: float) -> str:
+        receiver = {
+            "effects": ["phase_noise", "converter"],
+            "values": {"adc_bits": bits, "full_scale_db": 0.0, "phase_noise_rad": phase_rad},
+        }
+        radar = {"carrier_hz": 9.85e9, "prf_hz": 20e3, "pulses": 500}
+        uav = [{"name": "x", "body": [{"level_db": 10.0}]}]
+        return Scene.build({"radar": radar, "uav": uav, "receiver": receiver}).plan().explain()
+
+    coarse, fine = said(6.0, 0.1), said(16.0, 1e-4)
+    assert "receiver: quantisation and clipping: kept; leaving it out changes at most +" in coarse
+    assert "receiver: phase noise: kept; leaving it out changes at most +" in coarse
+    assert "receiver: quantisation and clipping: left out (numbers as they are); leaving it out changes" in fine
+    assert "receiver: phase noise: left out (a clean oscillator); leaving it out changes at most -" in fine

@@ -1,0 +1,160 @@
+"""The work behind `bladewing export`: one ONNX graph from raw IQ to probabilities, for one radar and one dwell.
+
+It holds what `Classifier.predict` does of a record inside the envelope: the inputs (`bladewing.features.graph`), the
+model with its calibration, and the answer. Only operators of the ONNX standard, so any runtime can serve it.
+"""
+
+import hashlib
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+from bladewing.features.graph.inputs import IQ, input_graph
+from bladewing.features.graph.operators import Graph, Value
+from bladewing.models.export import attach_metadata
+from bladewing.models.seal import SEAL_KEY, seal
+from onnx import TensorProto, helper
+
+from .errors import BadInput
+from .files import write_whole
+from .inference import Classifier, read_model
+from .labels import CLASSES, UNKNOWN
+from .samples import positive
+
+PRODUCT = "bladewing raw-IQ graph"
+"""What the metadata of an exported graph call it."""
+
+TOLERANCE = 1e-3
+"""Largest difference of a probability from `Classifier.predict` that an exported graph may show."""
+
+_CHECKED = 16
+
+
+def export_raw_iq(
+    out: str | os.PathLike[str],
+    *,
+    carrier_hz: float,
+    prf_hz: float,
+    pulses: int,
+    model: str | os.PathLike[str] | None = None,
+) -> float:
+    """Write a model as a graph that reads raw IQ.
+
+    Parameters
+    ----------
+    out
+        The file to write. Its graph reads "iq", float32 of shape (batch, pulses, 2), I and Q at any gain, and gives
+        "probabilities", float32 (batch, 3) in the order uav, bird, clutter, and "label", int64 (batch,): the place in
+        (uav, bird, clutter, unknown). A record without signal, or with a sample that is not finite, is unknown with
+        probabilities of 1/3.
+    carrier_hz, prf_hz
+        Carrier and pulse repetition frequency [Hz] that it is made for.
+    pulses
+        Pulses of a record.
+    model
+        As for `Classifier.load`; one that reads "spectrum" and "features" only.
+
+    Returns
+    -------
+    float
+        Largest difference of a probability from `Classifier.predict` over a few records, at most `TOLERANCE`.
+
+    Raises
+    ------
+    BadInput
+        The radar or the dwell lies outside the model's envelope, the model reads an image, or the file cannot be
+        written.
+    """
+    content, source = read_model(model)
+    classifier = Classifier(content, source=source)
+    carrier_hz, prf_hz = positive(carrier_hz, "carrier_hz"), positive(prf_hz, "prf_hz")
+    outside = classifier.envelope.reason(carrier_hz, prf_hz, pulses)
+    if outside is not None:
+        raise BadInput(f"cannot be exported: {outside}")
+    beyond = set(classifier.inputs) - {"spectrum", "features"}
+    if beyond:
+        raise BadInput(
+            f"{source} reads {sorted(beyond)[0]!r}, of an STFT: only models of 'spectrum' and 'features' can be "
+            "exported: give one of these as --model"
+        )
+    whole = _whole_graph(content, classifier, carrier_hz, prf_hz, pulses)
+    written = _sealed(whole, content, classifier, carrier_hz, prf_hz, pulses)
+    worst = _difference(written, classifier, carrier_hz, prf_hz, pulses)
+    if not worst <= TOLERANCE:
+        raise RuntimeError(f"the exported graph differs by {worst:.2g} in probability; allowed {TOLERANCE:.2g}")
+    try:
+        write_whole(Path(out), written)
+    except OSError as error:
+        raise BadInput(f"{os.fspath(out)}: cannot be written: {error.strerror or error}: give another file") from None
+    return worst
+
+
+def _whole_graph(
+    content: bytes, classifier: Classifier, carrier_hz: float, prf_hz: float, pulses: int
+) -> onnx.ModelProto:
+    """Inputs before the model, the answer behind it."""
+    model = onnx.load_model_from_string(content)
+    before = Graph()
+    inputs, live = input_graph(before, carrier_hz=carrier_hz, prf_hz=prf_hz, pulses=pulses, names=classifier.inputs)
+    for name, value in inputs.items():
+        before.name(value, name)
+    for node in model.graph.node:  # the names of the answer are free for what follows
+        for names in (node.input, node.output):
+            names[:] = [f"{IQ}_model_{name}" if name in ("probabilities", "label") else name for name in names]
+
+    after = Graph(prefix=f"{IQ}_answer")
+    judged = after.where(live.on(after), Value(after, f"{IQ}_model_probabilities", np.float32), 1 / len(CLASSES))
+    after.name(judged, "probabilities")
+    best = judged.argmax()
+    needed = after.constant(classifier.accept, np.float64).take_rows(best)
+    accepted = (judged.max().to(np.float64) >= needed) & live.on(after)
+    label = after.where(accepted, best, np.array(len(CLASSES)))
+    after.name(label.squeeze(), "label")
+
+    graph = helper.make_graph(
+        [*before.nodes, *model.graph.node, *after.nodes],
+        "bladewing",
+        [helper.make_tensor_value_info(IQ, TensorProto.FLOAT, ["batch", pulses, 2])],
+        [
+            helper.make_tensor_value_info("probabilities", TensorProto.FLOAT, ["batch", len(CLASSES)]),
+            helper.make_tensor_value_info("label", TensorProto.INT64, ["batch"]),
+        ],
+        [*before.initializers, *model.graph.initializer, *after.initializers],
+    )
+    whole = helper.make_model(
+        graph, opset_imports=model.opset_import, ir_version=model.ir_version, producer_name="bladewing"
+    )
+    onnx.checker.check_model(whole, full_check=True)
+    return whole
+
+
+def _sealed(
+    whole: onnx.ModelProto, content: bytes, classifier: Classifier, carrier_hz: float, prf_hz: float, pulses: int
+) -> bytes:
+    """The graph with what the model says of itself, what it was made for and where it came from."""
+    metadata = {key: value for key, value in classifier.metadata.items() if key not in (SEAL_KEY, "inputs")}
+    metadata |= {
+        "product": PRODUCT,
+        "labels": json.dumps([*CLASSES, UNKNOWN]),
+        "carrier_hz": repr(carrier_hz),
+        "prf_hz": repr(prf_hz),
+        "pulses": str(pulses),
+        "model_sha256": hashlib.sha256(content).hexdigest(),
+    }
+    return seal(attach_metadata(whole.SerializeToString(deterministic=True), metadata))
+
+
+def _difference(written: bytes, classifier: Classifier, carrier_hz: float, prf_hz: float, pulses: int) -> float:
+    """Largest difference of a probability from the classifier's, over noise with lines of every strength."""
+    rng = np.random.default_rng(0)
+    noise = rng.normal(size=(_CHECKED, pulses, 2)).astype(np.float32)
+    strength = np.geomspace(1e-2, 1e2, _CHECKED, dtype=np.float32)[:, None]
+    lines = np.exp(2j * np.pi * rng.uniform(-0.5, 0.5, (_CHECKED, 1)) * np.arange(pulses)).astype(np.complex64)
+    iq = (noise.view(np.complex64)[..., 0] + strength * lines).astype(np.complex64)
+    session = onnxruntime.InferenceSession(written, providers=["CPUExecutionProvider"])
+    (found,) = session.run(["probabilities"], {IQ: iq.view(np.float32).reshape(*iq.shape, 2)})
+    expected = classifier.predict(iq, carrier_hz=carrier_hz, prf_hz=prf_hz).probabilities
+    return float(np.abs(found - expected).max())

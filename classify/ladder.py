@@ -1,0 +1,104 @@
+"""The shipped models on one front of accuracy against cost, and the choice of one by name or by a budget of time.
+
+The figures come from `train.json` beside the models: balanced accuracy on the test records, and what a record costs as
+a multiple of its bare FFT, both measured by the run that made the models. A ratio within one run means the same on
+another machine; only the FFT is timed here.
+"""
+
+import json
+import time
+from collections.abc import Mapping
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from scipy import fft
+
+from .errors import BadInput
+
+#: Names for places on the front: the cheapest, the cheapest that gains at least half of the accuracy between the ends,
+#: the most accurate.
+PLACES = ("fast", "balanced", "best")
+
+#: What the costs are measured on: so many records at a time, each of so many pulses.
+RECORDS, PULSES = 64, 2048
+
+#: Key of a model's account in train.json: time of a record from samples to answer over that of its bare FFT [1].
+COST_KEY = "cost_ffts"
+
+_ROUNDS = 40
+
+
+def shipped_account() -> dict[str, Any]:
+    """The models of the shipped `train.json`, name to account."""
+    text = resources.files("bladewing.models.pretrained").joinpath("train.json").read_text(encoding="utf-8")
+    return json.loads(text)["models"]
+
+
+def front(account: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, float]]:
+    """Names and costs of the models that none is both cheaper and more accurate than, cheapest first.
+
+    Raises
+    ------
+    BadInput
+        The account holds no costs.
+    """
+    if not account or any(COST_KEY not in model for model in account.values()):
+        raise BadInput(f"the shipped train.json holds no {COST_KEY!r}: name a model, or train the models again")
+    kept: list[tuple[str, float]] = []
+    most = -1.0
+    for name, model in sorted(account.items(), key=lambda item: item[1][COST_KEY]):
+        accuracy = model["test"]["balanced_accuracy"]
+        if accuracy > most:
+            kept.append((name, float(model[COST_KEY])))
+            most = accuracy
+    return kept
+
+
+def by_place(place: str, account: Mapping[str, Mapping[str, Any]]) -> str:
+    """Name of the model at one of `PLACES`."""
+    models = front(account)
+    names = [name for name, _ in models]
+    accuracy = [float(account[name]["test"]["balanced_accuracy"]) for name in names]
+    halfway = next(name for name, value in zip(names, accuracy, strict=True) if 2 * value >= accuracy[0] + accuracy[-1])
+    return {"fast": names[0], "balanced": halfway, "best": names[-1]}[place]
+
+
+def by_budget(budget_us: float, account: Mapping[str, Mapping[str, Any]], fft_us: float) -> str:
+    """Name of the most accurate model that keeps to a budget.
+
+    Parameters
+    ----------
+    budget_us
+        Time for a record [us], above 0.
+    account
+        Name to account, as in train.json.
+    fft_us
+        Time of the bare FFT of a record on this machine [us].
+
+    Raises
+    ------
+    BadInput
+        No model is that cheap; says what the cheapest one takes.
+    """
+    models = front(account)
+    affordable = [name for name, cost in models if cost * fft_us <= budget_us]
+    if not affordable:
+        name, cost = models[0]
+        raise BadInput(
+            f"budget {budget_us:g} us: the cheapest model, {name}, takes {cost * fft_us:.0f} us here for a record of "
+            f"{PULSES} pulses in batches of {RECORDS}: allow that much"
+        )
+    return affordable[-1]
+
+
+def measured_fft_us() -> float:
+    """Time of a record's bare FFT in a batch on this machine [us]: the shortest of some rounds."""
+    parts = np.random.default_rng(0).standard_normal((RECORDS, 2 * PULSES), np.float32)
+    iq = parts.view(np.complex64)
+    taken = []
+    for _ in range(_ROUNDS):
+        start = time.perf_counter()
+        fft.fft(iq)
+        taken.append(time.perf_counter() - start)
+    return min(taken) / RECORDS * 1e6

@@ -1,0 +1,95 @@
+"""One cell of the stability table: a stage, a parameter at a value, the error there, and the guard that acts."""
+
+import math
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+#: What a measurement gives: the error, or NaN with the reason why there is no number.
+Outcome = float | tuple[float, str]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell.
+
+    Parameters
+    ----------
+    stage, parameter, value : str
+        What was computed, what was moved, and where to (with its unit).
+    error : float or None
+        The error there; None where the stage says that there is no number.
+    measure : str
+        What the error is of, and its unit.
+    limit : float
+        What the error must not exceed.
+    guard : str
+        What acts at this extreme.
+    said : str
+        The stage's reason where there is no number.
+    warned : str
+        A warning from inside a library; there must be none.
+    """
+
+    stage: str
+    parameter: str
+    value: str
+    error: float | None
+    measure: str
+    limit: float
+    guard: str
+    said: str = ""
+    warned: str = ""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the error is within its limit, or there is a reason instead of a number; and nothing warned."""
+        answered = bool(self.said) if self.error is None else self.error <= self.limit
+        return answered and not self.warned
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, ready for JSON."""
+        return {**self.__dict__, "holds": self.holds}
+
+
+def sweep(
+    stage: str,
+    parameter: str,
+    values: Iterable[Any],
+    measure: str,
+    limit: float,
+    guard: str,
+    error_at: Callable[[Any], Outcome],
+    show: Callable[[Any], str] = "{:g}".format,
+) -> Iterator[Cell]:
+    """Measure one stage along one parameter; whatever a stage does wrong becomes a cell that does not hold.
+
+    Parameters
+    ----------
+    stage, parameter, measure, limit, guard
+        As in `Cell`.
+    values : iterable
+        Where the parameter goes.
+    error_at : callable
+        The error at a value; a ValueError of one line is the stage's own word that it refuses.
+    show : callable
+        The value as text, with its unit.
+    """
+    for value in values:
+        error: float | None = None
+        said = warned = ""
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                outcome = error_at(value)
+                error, said = outcome if isinstance(outcome, tuple) else (outcome, "")
+            except ValueError as refusal:
+                said = f"refused: {str(refusal).splitlines()[0]}"
+        if caught:
+            warned = f"{caught[0].category.__name__}: {caught[0].message}"
+        if error is not None and not math.isfinite(error):
+            error = None if math.isnan(error) else 1e300  # an infinity is no answer
+        yield Cell(
+            stage, parameter, show(value), None if error is None else float(error), measure, limit, guard, said, warned
+        )

@@ -1,0 +1,147 @@
+"""Stages of the models: network in float32, int8 and ONNX against float64, softmax against mpmath."""
+
+import copy
+import logging
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import onnxruntime
+import torch
+from bladewing.features import INPUT_SHAPES, model_inputs
+from bladewing.models.calibration import Calibration, softmax
+from bladewing.models.cnn import EvidenceNet, ImageNet, SpectrumNet
+from bladewing.models.export import export_network
+from bladewing.models.training import network_scores
+from bladewing.simulate import Radar, draw_records
+from numpy.typing import NDArray
+
+from .cell import Cell, sweep
+
+Inputs = dict[str, NDArray[np.float32]]
+
+_CLIP_GUARD = "standardised inputs are clipped at eight deviations"
+_NETS = {"spectrum": SpectrumNet, "image": ImageNet}
+
+
+def cells(quick: bool) -> Iterator[Cell]:
+    """Every cell of these stages; `quick` leaves out the second network."""
+    yield from _softmax()
+    for signal, evidence in (("spectrum", "features"), ("image", "joint_features"))[: 1 if quick else 2]:
+        yield from _network(signal, evidence)
+
+
+def _softmax_error(scores: tuple[float, ...], calibration: Calibration | None = None) -> float:
+    found = softmax(np.array(scores)) if calibration is None else calibration.probabilities(np.array(scores))
+    scale, bias = (1.0, (0.0,) * 3) if calibration is None else (calibration.scale, calibration.bias)
+    with mpmath.workdps(50):
+        lifted = [mpmath.mpf(scale) * mpmath.mpf(s) + mpmath.mpf(b) for s, b in zip(scores, bias, strict=True)]
+        powers = [mpmath.exp(s - max(lifted)) for s in lifted]
+        total = mpmath.fsum(powers)
+        return max(float(abs(p / total - mpmath.mpf(float(q)))) for p, q in zip(powers, found, strict=True))
+
+
+def _softmax() -> Iterator[Cell]:
+    measured, guard = "largest error of a probability [1]", "the largest score is taken off first"
+    sizes = [0.0, 1e-300, 1.0, 700.0, 1e4, 1e38, 1e300, 1.7e308]
+    yield from sweep(
+        "softmax", "score", sizes, measured, 1e-12, guard, lambda size: _softmax_error((size, -size, size / 3))
+    )
+    yield from sweep(
+        "calibration",
+        "scale",
+        [1e-300, 1e-6, 1.0, 1e6, 1e300],
+        measured,
+        1e-12,
+        guard + "; scale and bias must be finite",
+        lambda scale: _softmax_error((3.0, -1.0, 2.5), Calibration(scale, (0.3, -0.1, -0.2))),
+    )
+
+
+def _network(signal: str, evidence: str) -> Iterator[Cell]:
+    """One network with drawn weights, standardised by real records, in every form it is run in."""
+    radar = Radar(9.85e9, 25e3, 1000)
+    inputs = model_inputs(
+        draw_records(radar, 48, 0, purpose="bench").iq,
+        carrier_hz=radar.carrier_hz,
+        prf_hz=radar.prf_hz,
+        names=(signal, evidence),
+    )
+    net: EvidenceNet = _NETS[signal](INPUT_SHAPES[signal], INPUT_SHAPES[evidence][0], seed=0)
+    net.measure(inputs)
+    exact = copy.deepcopy(net).double().eval()
+
+    def reference(given: Inputs) -> NDArray[np.float64]:
+        with torch.inference_mode():
+            scores = exact(*(torch.as_tensor(given[name]).double() for name in (signal, evidence)))
+        return softmax(scores.numpy())
+
+    onnx_bytes = export_network(net, {name: INPUT_SHAPES[name] for name in (signal, evidence)}, Calibration())
+    forms: dict[str, tuple[float, Callable[[Inputs], NDArray]]] = {
+        "float32": (1e-4, lambda given: softmax(network_scores(net, given))),
+        "ONNX": (1e-4, _runner(onnx_bytes)),
+        # coarse by design: eight bits of weights and activations
+        "int8": (0.1, _runner(_int8(onnx_bytes))),
+    }
+    for form, (limit, run) in forms.items():
+        yield from _forms(f"{signal} network, {form}", limit, run, reference, inputs)
+
+
+def _forms(
+    stage: str,
+    limit: float,
+    run: Callable[[Inputs], NDArray],
+    reference: Callable[[Inputs], NDArray],
+    inputs: Inputs,
+) -> Iterator[Cell]:
+    measured = "largest error of a probability against float64 [1]"
+    yield from sweep(
+        stage,
+        "inputs times",
+        [1e-38, 1e-6, 1.0, 10.0, 1e6, 1e30],
+        measured,
+        limit,
+        _CLIP_GUARD,
+        lambda factor: _difference(run, reference, {k: v * np.float32(factor) for k, v in inputs.items()}),
+    )
+    yield from sweep(
+        stage,
+        "records at once",
+        [1, len(next(iter(inputs.values())))],
+        measured,
+        limit,
+        "only the batch's axis is free",
+        lambda count: _difference(run, reference, {k: v[:count] for k, v in inputs.items()}),
+        "{:d}".format,
+    )
+
+
+def _difference(run: Callable[[Inputs], NDArray], reference: Callable[[Inputs], NDArray], given: Inputs) -> float:
+    return float(np.abs(run(given) - reference(given)).max())
+
+
+def _runner(onnx_bytes: bytes) -> Callable[[Inputs], NDArray[np.float32]]:
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    session = onnxruntime.InferenceSession(onnx_bytes, options, providers=["CPUExecutionProvider"])
+    return lambda given: session.run(["probabilities"], given)[0]
+
+
+def _int8(onnx_bytes: bytes) -> bytes:
+    """The same network with its products in eight bits."""
+    from onnxruntime.quantization import QuantType, quantize_dynamic
+
+    level = logging.root.level
+    logging.root.setLevel(logging.ERROR)  # its advice to optimise first is not for here
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            plain, small = Path(folder) / "plain.onnx", Path(folder) / "small.onnx"
+            plain.write_bytes(onnx_bytes)
+            quantize_dynamic(
+                plain, small, weight_type=QuantType.QUInt8, op_types_to_quantize=["Conv", "MatMul", "Gemm"]
+            )
+            return small.read_bytes()
+    finally:
+        logging.root.setLevel(level)

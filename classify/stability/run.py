@@ -1,0 +1,166 @@
+"""The work behind `bladewing stability`: every stage to its extremes, and the table of what holds there."""
+
+import html
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import fields
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from ..bounds import MOST_TEXT_BYTES
+from ..errors import BadInput
+from ..files import read_bounded, result_folder, write_together
+from ..progress import Progress
+from .cell import Cell
+
+#: Version of `stability.json`.
+FORMAT = 1
+
+
+def run_stability(out: Path, *, quick: bool = False, progress: bool = True) -> dict[str, Any]:
+    """Measure every cell and write ``stability.json``, ``stability.md`` and ``stability.html``.
+
+    Parameters
+    ----------
+    out : Path
+        Folder for the three files; made if it is missing. They change together at the end.
+    quick : bool
+        Leave out what takes minutes.
+    progress : bool
+        Show progress and the summary.
+
+    Returns
+    -------
+    dict
+        The content of ``stability.json``.
+
+    Raises
+    ------
+    BadInput
+        The folder cannot be made.
+    """
+    result_folder(out)
+    found: list[Cell] = []
+    parts = _parts()
+    with Progress(visible=progress) as bars:
+        for title, cells in parts.items():
+            with bars.phase(title, 1):
+                found += cells(quick)
+        table = {"format": FORMAT, "quick": quick, "cells": [cell.as_dict() for cell in found]}
+        files: dict[str, bytes | str] = {
+            "stability.json": json.dumps(table, indent=1, allow_nan=False) + "\n",
+            "stability.md": markdown(found),
+            "stability.html": page(found),
+        }
+        write_together(out, files)
+    lost = [cell for cell in found if not cell.holds]
+    for cell in lost:
+        bars.say(f"does not hold: {cell.stage}, {cell.parameter} {cell.value}: {_shown(cell)}")
+    bars.say(f"{len(found) - len(lost)} of {len(found)} cells hold; {out / 'stability.html'} has them all")
+    return table
+
+
+def worst_of_each(folder: Path) -> list[dict[str, Any]] | None:
+    """The worst cell of every stage and parameter of a table written earlier, for the report.
+
+    Parameters
+    ----------
+    folder : Path
+        Where ``stability.json`` may lie.
+
+    Returns
+    -------
+    list of dict or None
+        The cell nearest to its limit, with ``cells`` and ``held``: how many there are, and how many hold. None where
+        there is no table.
+
+    Raises
+    ------
+    BadInput
+        The file is not such a table.
+    """
+    path = folder / "stability.json"
+    try:
+        table = json.loads(read_bounded(path, MOST_TEXT_BYTES))
+        if table["format"] != FORMAT:
+            raise ValueError(f"format {table['format']!r}, this version reads {FORMAT}")
+        names = {field.name for field in fields(Cell)}
+        cells = [Cell(**{name: cell[name] for name in names}) for cell in table["cells"]]
+        found = []
+        for _, group in groupby(cells, key=lambda cell: (cell.stage, cell.parameter)):
+            same = list(group)
+            worst = max(same, key=lambda cell: (not cell.holds, (cell.error or 0.0) / (cell.limit or 1.0)))
+            held = sum(cell.holds for cell in same)
+            found.append({**worst.as_dict(), "shown": _shown(worst), "cells": len(same), "held": held})
+        return found
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise BadInput(
+            f"{path}: not a stability table ({error}): run `bladewing stability` again, or remove it"
+        ) from None
+
+
+def _parts() -> dict[str, Callable[[bool], Iterator[Cell]]]:
+    from . import chain, networks, spectra, waves
+
+    return {
+        "simulator": waves.cells,
+        "features": spectra.cells,
+        "models": networks.cells,
+        "whole chain": chain.cells,
+    }
+
+
+def _shown(cell: Cell) -> str:
+    """The error, or why there is none."""
+    text = cell.said if cell.error is None else f"{cell.error:.2g}"
+    return f"{text or 'no number and no reason'}{f' ({cell.warned})' if cell.warned else ''}"
+
+
+_HEADS = ("parameter", "at", "error", "allowed", "holds", "guard")
+
+
+def _row(cell: Cell) -> tuple[str, ...]:
+    return cell.parameter, cell.value, _shown(cell), f"{cell.limit:g}", "yes" if cell.holds else "NO", cell.guard
+
+
+def markdown(cells: list[Cell]) -> str:
+    """The table, a section a stage."""
+    lines = ["# Stability", "", "Errors against a more precise oracle; a reason stands where there is no number.", ""]
+    for (stage, measure), group in groupby(cells, key=lambda cell: (cell.stage, cell.measure)):
+        lines += [
+            f"## {stage}",
+            "",
+            f"Error: {measure}.",
+            "",
+            "| " + " | ".join(_HEADS) + " |",
+            "|---" * len(_HEADS) + "|",
+        ]
+        lines += ["| " + " | ".join(text.replace("|", "\\|") for text in _row(cell)) + " |" for cell in group]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def page(cells: list[Cell]) -> str:
+    """The table as one HTML page without any request outside."""
+    style = (
+        "body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;padding:0 1rem;color:#1b1f24}"
+        "table{border-collapse:collapse;width:100%;margin:.5rem 0 2rem}th,td{text-align:left;padding:.25rem .6rem;"
+        "border-bottom:1px solid #d9dee4;vertical-align:top}td:nth-child(3){font-variant-numeric:tabular-nums}"
+        ".no{background:#fbe3e0}"
+    )
+    parts = [
+        "<!doctype html><html lang=en><meta charset=utf-8><title>Stability</title>",
+        f"<style>{style}</style><h1>Stability</h1>",
+        f"<p>{sum(cell.holds for cell in cells)} of {len(cells)} cells hold.</p>",
+    ]
+    for (stage, measure), group in groupby(cells, key=lambda cell: (cell.stage, cell.measure)):
+        heads = "".join(f"<th>{head}" for head in _HEADS)
+        parts.append(f"<h2>{html.escape(stage)}</h2><p>Error: {html.escape(measure)}.</p><table><tr>{heads}")
+        for cell in group:
+            kind = "" if cell.holds else " class=no"
+            parts.append(f"<tr{kind}>" + "".join(f"<td>{html.escape(text)}" for text in _row(cell)))
+        parts.append("</table>")
+    return "\n".join(parts) + "\n"

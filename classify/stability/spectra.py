@@ -1,0 +1,347 @@
+"""Stages of the features against the same arithmetic in long double, exact invariances and known truth."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from bladewing.features import measure
+from bladewing.features.bandwidth import energy_band_mps, threshold_band_hz
+from bladewing.features.chopping import cepstrum
+from bladewing.features.inputs import model_inputs
+from bladewing.features.notch import body_line, notch_mask, residual
+from bladewing.features.schema import INPUT_SHAPES
+from bladewing.features.spectrum import KAISER_BETA, Spectrum, centred_power, doppler_spectrum, noise_floor, unit_scale
+from numpy.typing import NDArray
+from scipy import fft
+
+from .cell import Cell, Outcome, sweep
+
+_CARRIER_HZ, _PRF_HZ = 10e9, 20e3
+_WAVELENGTH_M = 299_792_458.0 / _CARRIER_HZ
+
+_SCALE_GUARD = "scaled by a power of two to [0.5, 1) first: no digit changes, no square overflows or vanishes"
+_COUNTS = (2, 3, 16, 127, 1000, 1021, 8191, 65536)
+
+#: Records that no target makes: name to a function of (pulses, rng).
+ODD: dict[str, Callable[[int, np.random.Generator], NDArray[np.complex64]]] = {}
+
+
+def cells(quick: bool) -> Iterator[Cell]:
+    """Every cell of these stages; `quick` leaves out the dear ones."""
+    yield from _spectra(quick)
+    yield from _shapes(quick)
+    yield from _combs(quick)
+    yield from _features(quick)
+
+
+def rotor_record(
+    pulses: int = 2000, *, snr_db: float = 20.0, chopping_hz: float = 200.0, seed: int = 0
+) -> NDArray[np.complex64]:
+    """A body line, a comb of a two-bladed rotor about it, and noise of unit power."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(pulses) / _PRF_HZ
+    comb = np.exp(1j * 40 * np.cos(np.pi * chopping_hz * t)) + np.exp(-1j * 40 * np.cos(np.pi * chopping_hz * t))
+    noise = rng.normal(scale=np.sqrt(0.5), size=(2, pulses))
+    signal = np.exp(2j * np.pi * 300 * t) * (3 + comb) * 10 ** (snr_db / 20)
+    return (signal + noise[0] + 1j * noise[1]).astype(np.complex64)
+
+
+def _exact_power(iq: NDArray[np.complex64], bins: int | None = None) -> NDArray[np.longdouble]:
+    """`centred_power` in long double, of the same samples and window."""
+    pulses = iq.shape[-1]
+    bins = fft.next_fast_len(pulses) if bins is None else bins
+    window = np.kaiser(pulses, KAISER_BETA).astype(np.longdouble)
+    window /= np.sqrt(np.sum(window**2))
+    lines = fft.fft(iq.astype(np.clongdouble) * window, n=bins)
+    return fft.fftshift(lines.real**2 + lines.imag**2)
+
+
+def _power_error(iq: NDArray[np.complex64]) -> float:
+    """Largest error of a bin's power, over the larger of that power and the mean of all."""
+    scaled = iq * unit_scale(iq)
+    exact = _exact_power(scaled)
+    return float((np.abs(centred_power(scaled) - exact) / np.maximum(exact, exact.mean() * 1e-6)).max())
+
+
+def _floor_error(iq: NDArray[np.complex64]) -> Outcome:
+    spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
+    scaled = iq * unit_scale(iq)
+    exact = _exact_power(scaled)
+    level = max(float(noise_floor(exact)), float(exact.mean()) * 1e-14)  # type: ignore[arg-type]
+    natural = np.longdouble(level) / unit_scale(iq)[0].astype(np.longdouble) ** 2
+    return float(abs(10 * np.log10(np.longdouble(spectrum.floor) / natural)))
+
+
+def _spectra(quick: bool) -> Iterator[Cell]:
+    error = "largest error of a bin over max(its power, 1e-6 of the mean) [1]"
+    counts = [*_COUNTS, *([] if quick else [1 << 20])]
+    amplitudes = [1e-45, 1e-42, 1e-38, 1e-30, 1.0, 1e30, 1e36]
+    for stage, measured, limit, work in (
+        ("spectrum", error, 0.02, _power_error),
+        ("noise floor", "error [dB]", 0.05, _floor_error),
+    ):
+        yield from _sweeps(stage, measured, limit, work, counts, amplitudes)
+
+
+def _sweeps(
+    stage: str,
+    measured: str,
+    limit: float,
+    work: Callable[[NDArray[np.complex64]], Outcome],
+    counts: list[int],
+    amplitudes: list[float],
+) -> Iterator[Cell]:
+    ordinary = rotor_record()
+    yield from sweep(
+        stage, "amplitude", amplitudes, measured, limit, _SCALE_GUARD,
+        lambda a: work(_scaled(ordinary, a)),
+    )  # fmt: skip
+    yield from sweep(
+        stage, "pulses", counts, measured, limit, "a transform of the next fast length, for any count",
+        lambda n: work(rotor_record(int(n))), "{:d}".format,
+    )  # fmt: skip
+    yield from sweep(
+        stage, "SNR", [-100.0, -20.0, 0.0, 60.0, 100.0], measured, limit, _SCALE_GUARD,
+        lambda snr: work(rotor_record(snr_db=snr)), "{:g} dB".format,
+    )  # fmt: skip
+    # complex64 itself ends 144 dB under the largest sample: beyond, the floor is that of its rounding
+    yield from sweep(
+        stage, "SNR beyond float32", [140.0, 200.0], measured, limit if stage == "spectrum" else 6.0,
+        "the floor is held 140 dB under the record: it never falls to zero",
+        lambda snr: work(rotor_record(snr_db=snr)), "{:g} dB".format,
+    )  # fmt: skip
+
+
+def _scaled(iq: NDArray[np.complex64], gain: float) -> NDArray[np.complex64]:
+    """A record of that largest part."""
+    largest = float(np.abs(iq.view(np.float32)).max())
+    return (iq.astype(np.complex128) * (gain / largest)).astype(np.complex64)
+
+
+def _long(spectrum: Spectrum) -> Spectrum:
+    """The same spectrum in long double, for stages that keep the type they are given."""
+    return Spectrum(
+        spectrum.relative_power.astype(np.longdouble),
+        spectrum.floor,
+        spectrum.carrier_hz,
+        spectrum.prf_hz,
+        spectrum.pulses,
+        spectrum.scale,
+    )
+
+
+def _cepstrum_error(iq: NDArray[np.complex64]) -> float:
+    spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
+    mask = notch_mask(spectrum, body_line(spectrum))
+    found, exact = cepstrum(spectrum, mask), cepstrum(_long(spectrum), mask)
+    return float(np.abs(found - exact).max() / max(float(exact.max()), 1e-30))
+
+
+def _band_error(iq: NDArray[np.complex64]) -> float:
+    """Edges of the energy band against long double, in bins."""
+    edges = []
+    spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
+    mask = notch_mask(spectrum, body_line(spectrum))
+    for one in (spectrum, _long(spectrum)):
+        excess = residual(one, mask)
+        edges.append(np.array([*energy_band_mps(one, excess)[:2], *threshold_band_hz(one, mask=mask)], np.float64))
+    step_hz = _PRF_HZ / spectrum.bins
+    steps = np.array([step_hz * _WAVELENGTH_M / 2] * 2 + [step_hz] * 2)
+    return float(np.abs((edges[0] - edges[1]) / steps).max())
+
+
+def _shapes(quick: bool) -> Iterator[Cell]:
+    counts = [*_COUNTS[2:], *([] if quick else [1 << 20])]
+    for stage, measured, limit, guard, work in (
+        (
+            "cepstrum",
+            "largest error over the highest peak [1]",
+            1e-4,
+            "levels held to -20..30 dB, each period over what noise gives there",
+            _cepstrum_error,
+        ),
+        (
+            "bandwidth",
+            "error of the edges [bins]",
+            1.0,
+            "energies add up in float64, in blocks; no band without energy",
+            _band_error,
+        ),
+    ):
+        yield from _shape_sweeps(stage, measured, limit, guard, work, counts)
+
+
+def _shape_sweeps(
+    stage: str,
+    measured: str,
+    limit: float,
+    guard: str,
+    work: Callable[[NDArray[np.complex64]], float],
+    counts: list[int],
+) -> Iterator[Cell]:
+    snrs = [-100.0, 0.0, 60.0, 200.0]
+    yield from sweep(
+        stage, "pulses", counts, measured, limit, guard,
+        lambda n: work(rotor_record(int(n))), "{:d}".format,
+    )  # fmt: skip
+    yield from sweep(
+        stage, "SNR", snrs, measured, limit, guard,
+        lambda snr: work(rotor_record(snr_db=snr)), "{:g} dB".format,
+    )  # fmt: skip
+    yield from sweep(
+        stage, "amplitude", [1e-45, 1e-38, 1.0, 1e36], measured, limit, _SCALE_GUARD,
+        lambda a: work(_scaled(rotor_record(), a)),
+    )  # fmt: skip
+
+
+def _comb_error(iq: NDArray[np.complex64], chopping_hz: float, carrier_hz: float = _CARRIER_HZ) -> Outcome:
+    """Error of the measured chopping frequency, or the reason why there is none."""
+    found = measure(iq, carrier_hz=carrier_hz, prf_hz=_PRF_HZ)
+    if np.isfinite(found.chopping_hz):
+        return abs(float(found.chopping_hz) / chopping_hz - 1)
+    return np.nan, str(found.reason)
+
+
+def _combs(quick: bool) -> Iterator[Cell]:
+    stage, measured = "comb estimator", "error of the chopping frequency, relative [1]"
+    rates = [0.0, 0.1, 600.0, 6000.0, 30_000.0, 1e5, 1e6]
+    yield from sweep(
+        stage, "rotation rate", rates, measured, 0.01,
+        "sought from 18 to 1600 Hz and 3 bins; what lies outside gets a reason",
+        lambda rpm: _comb_error(rotor_record(chopping_hz=rpm / 30), max(rpm / 30, 1e-9)), "{:g} rpm".format,
+    )  # fmt: skip
+    yield from sweep(
+        stage, "SNR", [-100.0, -40.0, 0.0, 60.0, 140.0, 200.0], measured, 0.01,
+        "judged against chance; without a comb there is a reason, never a number",
+        lambda snr: _comb_error(rotor_record(snr_db=snr, chopping_hz=210.0), 210.0), "{:g} dB".format,
+    )  # fmt: skip
+    yield from sweep(
+        stage, "pulses", [2, 3, 17, 127, 1021, 8191], measured, 0.01,
+        "judged against chance; too few pulses get a reason",
+        lambda n: _comb_error(rotor_record(int(n), chopping_hz=210.0), 210.0), "{:d}".format,
+    )  # fmt: skip
+    yield from sweep(
+        stage, "amplitude", [1e-45, 1e-42, 1e-38, 1.0, 1e36], measured, 0.01, _SCALE_GUARD,
+        lambda a: _comb_error(_scaled(rotor_record(chopping_hz=210.0), a), 210.0),
+    )  # fmt: skip
+    yield from sweep(
+        stage, "carrier", [0.1e9, 1e9, 300e9], measured, 0.01, "lines are sought in cycles a sample",
+        lambda f: _comb_error(rotor_record(chopping_hz=210.0), 210.0, f), lambda f: f"{f / 1e9:g} GHz",
+    )  # fmt: skip
+    yield from sweep(
+        stage, "record", list(ODD), measured, 0.01, "no comb, no number: a reason",
+        lambda name: _odd_comb(name), str,
+    )  # fmt: skip
+
+
+def _odd_comb(name: str) -> Outcome:
+    found = measure(ODD[name](1000, np.random.default_rng(0)), carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
+    return (np.nan, str(found.reason)) if np.isnan(found.chopping_hz) else 0.0
+
+
+def _inputs(
+    iq: NDArray[np.complex64], carrier_hz: float = _CARRIER_HZ, prf_hz: float = _PRF_HZ
+) -> dict[str, NDArray[np.float32]]:
+    return model_inputs(iq, carrier_hz=carrier_hz, prf_hz=prf_hz, names=tuple(INPUT_SHAPES))
+
+
+def _difference(one: dict[str, NDArray[np.float32]], other: dict[str, NDArray[np.float32]]) -> float:
+    return max(float(np.abs(one[name] - other[name]).max()) for name in one)
+
+
+def _finite(inputs: dict[str, NDArray[np.float32]]) -> float:
+    """0 where every input is finite."""
+    return float(sum(np.count_nonzero(~np.isfinite(values)) for values in inputs.values()))
+
+
+def _odd(name: str) -> Callable[[Callable], Callable]:
+    def keep(make: Callable) -> Callable:
+        ODD[name] = make
+        return make
+
+    return keep
+
+
+@_odd("all zero")
+def _zero(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
+    return np.zeros(pulses, np.complex64)
+
+
+@_odd("constant")
+def _constant(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
+    return np.full(pulses, 0.3 - 0.7j, np.complex64)
+
+
+@_odd("a single sample that is not zero")
+def _single(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
+    return np.where(np.arange(pulses) == pulses // 3, 1, 0).astype(np.complex64)
+
+
+@_odd("one huge spike")
+def _spike(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
+    iq = rotor_record(pulses)
+    iq[pulses // 3] = 1e37
+    return iq
+
+
+@_odd("pure DC under noise 200 dB down")
+def _dc(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
+    return (1e10 + rng.normal(size=pulses) + 1j * rng.normal(size=pulses)).astype(np.complex64)
+
+
+@_odd("clipped to one bit")
+def _clipped(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
+    iq = rotor_record(pulses)
+    return (np.sign(iq.real) + 1j * np.sign(iq.imag)).astype(np.complex64)
+
+
+@_odd("I only")
+def _real(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
+    return rotor_record(pulses).real.astype(np.complex64)
+
+
+@_odd("largest and smallest floats")
+def _extremes(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
+    return np.where(np.arange(pulses) % 2, 3e38 * (1 + 1j), 1e-45 * (1 - 1j)).astype(np.complex64)
+
+
+def _features(quick: bool) -> Iterator[Cell]:
+    stage, invariant = "features", "largest change of a model input [its unit]"
+    ordinary = rotor_record()
+    reference = _inputs(ordinary)
+    yield from sweep(
+        stage, "gain", [-120, -60, -1, 1, 60, 120], invariant, 0.0, _SCALE_GUARD,
+        lambda power: _difference(_inputs(np.ldexp(ordinary.view(np.float32), power).view(np.complex64)), reference),
+        lambda power: f"2^{power:d}",
+    )  # fmt: skip
+    yield from sweep(
+        stage, "gain", [1e-30, 1e-3, 1e3, 1e30], invariant, 0.05, _SCALE_GUARD,
+        lambda gain: _difference(_inputs((ordinary * np.float64(gain)).astype(np.complex64)), reference), "{:g}".format,
+    )  # fmt: skip
+    swapped = ordinary.imag + 1j * ordinary.real
+    yield from sweep(
+        stage, "I and Q swapped", [0], "largest change of an unsigned feature [its unit]", 1.0,
+        "velocity mirrors, no feature is signed",
+        lambda _: float(np.abs(_inputs(swapped.astype(np.complex64))["features"] - reference["features"]).max()),
+        lambda _: "-",
+    )  # fmt: skip
+    wrong = "inputs that are not finite [count]"
+    yield from sweep(
+        stage, "record", list(ODD), wrong, 0.0, "floor held 140 dB under the record; no value is 0 in its column",
+        lambda name: _finite(_inputs(ODD[name](1000, np.random.default_rng(0)))), str,
+    )  # fmt: skip
+    yield from sweep(
+        stage, "pulses", [2, 15, 16, 17, 127, 8191, *([] if quick else [1 << 20])], wrong, 0.0,
+        "fewer than 16 pulses are refused", lambda n: _finite(_inputs(rotor_record(int(n)))), "{:d}".format,
+    )  # fmt: skip
+    yield from sweep(
+        stage, "carrier", [0.1e9, 2e9, 100e9, 300e9], wrong, 0.0, "levels outside the span hold their own mark",
+        lambda f: _finite(_inputs(ordinary, f)), lambda f: f"{f / 1e9:g} GHz",
+    )  # fmt: skip
+    yield from sweep(
+        stage, "dwell of 2000 pulses", [1e-4, 1.0, 60.0], wrong, 0.0, "each column held in the schema's range",
+        lambda dwell: _finite(_inputs(ordinary, prf_hz=2000 / dwell)), "{:g} s".format,
+    )  # fmt: skip
+    yield from sweep(
+        stage, "SNR", [-100.0, 200.0], wrong, 0.0, "each column held in the schema's range",
+        lambda snr: _finite(_inputs(rotor_record(snr_db=snr))), "{:g} dB".format,
+    )  # fmt: skip

@@ -1,0 +1,159 @@
+"""Raw IQ to the model inputs "spectrum" and "features" in graph operators, for one radar and one dwell."""
+
+from collections.abc import Collection
+
+import numpy as np
+
+from ..axis import pooling
+from ..change import PARTS, _frame_starts, part_length
+from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
+from ..spectrum import LEAST_FLOOR, Spectrum, doppler_spectrum
+from ..vector import _BANDS, _SIGNIFICANT, radar_columns
+from .measurements import (
+    band_levels_db,
+    body_line,
+    centroid_mps,
+    cepstral_chopping,
+    change_levels_db,
+    energy_band,
+    entropy,
+    log10,
+    notch_weights,
+    ratio,
+    ripple_db,
+    smearing_index,
+    symmetry,
+    threshold_width_hz,
+)
+from .operators import Graph, Value
+from .spectrum import centred_power, noise_floor, pooled, pooled_mean, to_db, unit_scale
+
+#: Name of the graph's input: float32, shape (records, pulses, 2), I and Q.
+IQ = "iq"
+
+
+def input_graph(
+    graph: Graph, *, carrier_hz: float, prf_hz: float, pulses: int, names: Collection[str]
+) -> tuple[dict[str, Value], Value]:
+    """Append what makes model inputs of the value named `IQ`.
+
+    Parameters
+    ----------
+    graph : Graph
+        To be appended to.
+    carrier_hz, prf_hz : float
+        Carrier and pulse repetition frequency [Hz], > 0.
+    pulses : int
+        Pulses of a record, at least `inputs.MIN_PULSES`.
+    names : collection of str
+        "spectrum", "features" or both.
+
+    Returns
+    -------
+    inputs : dict of str to Value
+        As `inputs.model_inputs` gives them, shape (records, *INPUT_SHAPES[name]).
+    live : Value
+        Whether a record holds a signal and only finite samples, shape (records, 1).
+
+    Raises
+    ------
+    ValueError
+        If a name is not one of the two.
+    """
+    unknown = set(names) - {"spectrum", "features"}
+    if unknown:
+        raise ValueError(f"model input {sorted(unknown)[0]!r} is not made in a graph: only spectrum and features are")
+    # a spectrum without signal, for what depends on the radar alone
+    radar = doppler_spectrum(np.zeros(pulses, np.complex64), carrier_hz=carrier_hz, prf_hz=prf_hz)
+    iq = Value(graph, IQ, np.float32)
+    flat = iq.reshape(-1, 2 * pulses)
+    largest = flat.apply("Abs").max()
+    live = (largest > 0.0) & (largest <= float(np.finfo(np.float32).max)) & ((flat - flat).sum() >= 0.0)
+    packed = iq.transpose(0, 2, 1)
+    packed = graph.where(live.reshape(-1, 1, 1), packed, 0.0) * unit_scale(largest).reshape(-1, 1, 1)
+
+    power = centred_power(packed, pulses, radar.bins)
+    floor = noise_floor(power, radar.bins).at_least(power.mean() * float(LEAST_FLOOR))
+    safe = graph.where(floor > 0.0, floor, 1.0)
+    relative_power = power / safe
+    mean, peak = pooled(relative_power, pooling(radar.bins, radar.carrier_hz, radar.prf_hz, AXIS_BINS))
+
+    length = part_length(pulses)
+    starts, _ = _frame_starts(pulses, length, PARTS)
+    frames = graph.concat(*(packed.slice(start, start + length) for start in starts), axis=1).reshape(-1, 2, length)
+    bins = doppler_spectrum(np.zeros(length, np.complex64), carrier_hz=carrier_hz, prf_hz=prf_hz).bins
+    parts = centred_power(frames, length, bins).reshape(-1, PARTS, bins) / safe.reshape(-1, 1, 1)
+    pool = pooling(bins, radar.carrier_hz, radar.prf_hz, AXIS_BINS)
+    parts_db = pooled_mean(parts, pool).at_least(0.0)
+    away = parts_db - parts_db.sum(-2) / PARTS
+    change = ((away * away).sum(-2, keep=False) / PARTS).apply("Sqrt")
+
+    out = {}
+    if "spectrum" in names:
+        out["spectrum"] = graph.concat(*(row.reshape(-1, 1, AXIS_BINS) for row in (mean, peak, change)), axis=1)
+    if "features" in names:
+        out["features"] = _feature_vector(radar, relative_power, mean, parts_db, change)
+    return {name: out[name] for name in INPUT_SHAPES if name in out}, live
+
+
+def _feature_vector(radar: Spectrum, relative_power: Value, axis_db: Value, parts_db: Value, change: Value) -> Value:
+    """As `vector.feature_vector`, without its NaN: a feature that has no value is 0."""
+    graph, bins = relative_power.graph, radar.bins
+    level_db = to_db(relative_power)
+    body = body_line(radar, relative_power, level_db)
+    kept = notch_weights(radar, body)
+    over = (relative_power - 1.0).at_least(0.0)
+    excess = over * kept
+    energy = excess * (excess > float(_SIGNIFICANT)).to(np.float32)
+    residual_db = 10.0 * log10(((relative_power * kept).sum() / kept.sum().at_least(1.0)).at_least(1e-2))
+    width_hz = threshold_width_hz(radar, relative_power, kept)
+    low, high, occupancy = energy_band(radar, energy)
+    faster_positive = high.apply("Abs") >= low.apply("Abs")
+    changes = change_levels_db(change, AXIS_BINS)
+    centroid = centroid_mps(parts_db, AXIS_BINS)
+    strong, weak = band_levels_db(axis_db, AXIS_BINS)
+    half = bins // 2
+    left, right = relative_power.slice(0, half).mean(), relative_power.slice(bins - half, bins).mean()
+
+    columns: dict[str, Value | float] = {
+        **radar_columns(radar),
+        "body_level_db": body.level_db,
+        "body_speed_mps": body.velocity_mps.apply("Abs"),
+        "rest_level_db": level_db.slice(half - 1, half + 2).max(),
+        "notch_residual_db": residual_db,
+        "notch_residual_share": ratio(excess.sum(), over.sum()),
+        "bandwidth_log": log10(width_hz.at_least(1.0)),
+        "bandwidth_speed_mps": width_hz * (radar.wavelength_m / 2),
+        "span_share": width_hz / radar.prf_hz,
+        "energy_speed_high_mps": graph.where(faster_positive, high, -low),
+        "energy_speed_low_mps": graph.where(faster_positive, low, -high),
+        "energy_width_mps": high - low,
+        "occupancy": occupancy,
+        "entropy": entropy(energy, bins),
+        "ripple_db": ripple_db(level_db, kept),
+        "peak_over_mean_db": 10.0 * log10((excess.max() + 1.0).at_least(1.0)) - residual_db,
+        "symmetry": symmetry(radar, energy, body),
+        **{f"change_{speed}_db": changes.slice(i, i + 1) for i, speed in enumerate(("slow", "middle", "fast"))},
+        "centroid_swing_mps": centroid.std(),
+        "centroid_drift_mps": (centroid.slice(PARTS - 1, PARTS) - centroid.slice(0, 1)).apply("Abs"),
+        "busy_swing_db": parts_db.mean().squeeze().std(),
+        "empty_side_db": (10.0 * log10(left.at_least(1e-2) / right.at_least(1e-2))).apply("Abs"),
+    }
+    for names, levels in zip(_BANDS, (strong, weak), strict=True):
+        columns.update((name, levels.slice(i, i + 1)) for i, name in enumerate(names))
+    comb = cepstral_chopping(radar, level_db, kept)
+    if comb is not None:
+        frequency, dwell_s = comb.frequency_hz, radar.pulses / radar.prf_hz
+        told = {
+            "chopping_log": log10(frequency.at_least(1.0)),
+            "chopping_step_mps": frequency * (radar.wavelength_m / 2),
+            "chopping_turns": log10((frequency * dwell_s).at_least(0.01)),
+            "chopping_orders": width_hz / frequency.at_least(1.0),
+        }
+        columns |= {name: graph.where(comb.given, value, 0.0) for name, value in told.items()}
+        columns |= {"chopping_strength": comb.strength, "chopping_repeats": comb.repeats}
+        columns["smearing_index"] = smearing_index(radar, energy, body, comb)
+    nothing = relative_power.slice(0, 1) * 0.0
+    table = [columns.get(feature.name, 0.0) for feature in FEATURES]
+    rows = [column if isinstance(column, Value) else nothing + float(column) for column in table]
+    return graph.concat(*rows).at_least(FEATURES.low).at_most(FEATURES.high)

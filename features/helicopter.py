@@ -1,0 +1,325 @@
+"""Main and tail rotor of a helicopter: a second comb about the same body line, a gear ratio away from the first.
+
+The first comb is fitted and taken out, and its places no longer count; what the lines left over repeat at is the second
+one. Other things leave lines between those of a comb too: unequal blades, further rotors of nearly the same rate, a
+rate that changed. None of these repeats at a gear ratio without repeating as well at a fraction or a multiple of it, so
+a second comb must beat all of these.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .comb import Comb
+from .comb_fit import LEAST_LEVEL, MARGIN_ORDERS, CombFit, dirichlet, fit_comb, line_matrix, smoothed
+from .comb_search import FINE_STEPS, Candidate, line_evidence, score, spacing_limits
+from .periodogram import BLOCK_BINS, Periodogram, local_level
+from .rotors import Rotors, separate_rotors
+
+#: Ratio of tail to main chopping frequency: 4.73 in the paper, 4 to 6 in general, and some room.
+GEAR_RANGE = (2.5, 9.0)
+
+#: Score a second comb must exceed [nats]. Checked by tests/benchmarks/measurement_tables.py.
+THRESHOLD = 16.0
+
+#: A comb at a multiple of the second one's spacing must not reach this share of its score.
+MULTIPLES = np.array([3 / 2, 2.0, 3.0, 4.0, 5.0])
+MULTIPLE_SHARE = 0.9
+
+#: The lines that a fraction of the spacing adds must not reach this share of its lines' mean power over the noise.
+FRACTIONS = (2, 3, 4, 5, 6, 7, 8)
+FRACTION_SHARE = 0.12
+
+#: Places this near to a line of the first comb do not count [bins].
+SHADOW_BINS = 1.3
+
+#: Lines of the two combs nearer than this tell no frequency [bins]; Gauss-Newton steps of both combs together.
+MEETING_BINS = 1.5
+JOINT_STEPS = 4
+
+#: Keeps the amplitudes of lines that meet finite, as a share of a line's power.
+LEAST_RIDGE = 1e-4
+
+#: Candidates looked at closely.
+CLOSER = 4
+
+#: Rounds in which each comb is fitted with the other taken out.
+ROUNDS = 1
+
+
+@dataclass(frozen=True)
+class Gear:
+    """Two combs of one record.
+
+    Parameters
+    ----------
+    first : Comb
+        The comb that was found first, fitted again without the second.
+    second : CombFit
+        The other one.
+    alone : Periodogram
+        The record without the second comb.
+    """
+
+    first: Comb
+    second: CombFit
+    alone: Periodogram
+
+    @property
+    def rates(self) -> NDArray[np.float64]:
+        """Chopping frequency of main and tail rotor and their standard deviations, shape (2, 2) [cycles a sample]."""
+        one = (self.first.chopping, self.first.chopping_std)
+        return np.array(sorted((one, (self.second.spacing, self.second.spacing_std))))
+
+    @property
+    def ratio(self) -> float:
+        """Tail over main chopping frequency: the gear ratio where both rotors have as many blades."""
+        (main, _), (tail, _) = self.rates
+        return float(tail / main)
+
+    @property
+    def ratio_std(self) -> float:
+        """Its standard deviation."""
+        return self.ratio * float(np.hypot(*(self.rates[:, 1] / self.rates[:, 0])))
+
+
+def find_gear(data: Periodogram, comb: Comb, edge: float) -> tuple[Gear | None, Rotors, str]:
+    """Find a second comb a gear ratio from the first, and the single rotors of the first.
+
+    Several rotors of nearly one rate leave so many lines that some of them pass for a second comb. So the rotors are
+    separated without the second comb's lines: a helicopter leaves a single one.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    comb : Comb
+        The comb found in it; it may be the main rotor's or the tail's.
+    edge : float
+        Edge of its line family [cycles a sample from the body].
+
+    Returns
+    -------
+    gear : Gear or None
+        None where there is no second comb.
+    rotors : Rotors
+        Single rotors of the comb given.
+    reason : str
+        Why there is no second comb; empty where there is one.
+    """
+    gear, reason = _second_comb(data, comb)
+    rotors = separate_rotors(data if gear is None else gear.alone, comb, edge)
+    if gear is not None and (len(rotors.rates) > 1 or not rotors.resolved):
+        gear, reason = None, "no second comb: several rotors of nearly one rate, or of a changing one"
+        rotors = separate_rotors(data, comb, edge)
+    return gear, rotors, reason
+
+
+def _second_comb(data: Periodogram, comb: Comb) -> tuple[Gear | None, str]:
+    """The second comb of a record, or why there is none."""
+    if comb.fit.spacing * data.pulses < 2 * SHADOW_BINS + 1:
+        return None, "dwell too short: a second comb could not be told from the first one's lines"
+    comb = _about_body(data, comb)
+    rest, hidden = _left_over(data, comb.fit)
+    evidence = _evidence(rest, hidden)
+    limits = spacing_limits(data.pulses, data.prf_hz)
+    best = _loudest(rest, evidence, comb.chopping, comb.fit.centre, limits)
+    if best is None or best.score < THRESHOLD:
+        return None, f"no second comb: evidence {best.score if best else 0.0:.1f} below {THRESHOLD:.0f} nats"
+    rival = _rival(rest, evidence, hidden, best)
+    if rival > 0:
+        return None, f"no second comb: the lines left over repeat every {rival * data.prf_hz:.1f} Hz as well"
+    second = fit_comb(_clear_of(rest, best, comb.fit), best)
+    if second is None:
+        return None, "no second comb: fewer than three lines of it are clear of the first one's"
+    first, second = _together(data, comb.fit, second)
+    gear = Gear(Comb(first, comb.per_turn), second, data.without(_lines(data, second)))
+    if not GEAR_RANGE[0] <= gear.ratio <= GEAR_RANGE[1]:
+        return None, "no second comb: its fit left the range of gear ratios"
+    # a whole ratio: every line of the one falls on one of the other, and unequal blades do the same
+    (main, _), (tail, _) = gear.rates
+    off = abs(gear.ratio - round(gear.ratio)) * main
+    reach = max(-best.low, best.high) * best.spacing
+    if off * reach / tail * data.pulses < MEETING_BINS:
+        return None, f"no second comb: {gear.ratio:.3f} to 1 is a whole ratio, as of unequal blades"
+    return gear, ""
+
+
+def _about_body(data: Periodogram, comb: Comb) -> Comb:
+    """The comb counted from the body's line: any of its lines serves itself as centre, but not the other rotor."""
+    fit = comb.fit
+    for centre in data.centres:
+        shift = round((centre - fit.centre) / fit.spacing)
+        if abs(fit.centre + shift * fit.spacing - centre) * data.pulses < 1.0:
+            fit = replace(fit, centre=fit.centre + shift * fit.spacing, orders=fit.orders - shift)
+            break
+    return Comb(fit, comb.per_turn)
+
+
+def _together(data: Periodogram, first: CombFit, second: CombFit) -> tuple[CombFit, CombFit]:
+    """Fit both combs at once, about one centre.
+
+    As `fit_comb` does for one: fitted in turn, each keeps what the other holds of lines that nearly meet. Such lines
+    take part in the amplitudes, not in the frequencies.
+    """
+    pulses, fits = data.pulses, (first, second)
+    time = np.arange(pulses) - (pulses - 1) / 2
+    moment = (pulses**2 - 1) / 12
+    centre, spacings = first.centre, np.array([first.spacing, second.spacing])
+    # what the lines past the ends hold must not leak into the others
+    ranges = [np.arange(fit.orders.min() - MARGIN_ORDERS, fit.orders.max() + MARGIN_ORDERS + 1) for fit in fits]
+    ranges = [n[np.abs(n) * fit.spacing < 0.49] for n, fit in zip(ranges, fits, strict=True)]
+    ranges = [n[~data.removed(centre + fit.spacing * n) & (n != 0)] for n, fit in zip(ranges, fits, strict=True)]
+    size = len(ranges[0])
+    # columns: the centre, and each comb's spacing
+    design = np.ones((3, size + len(ranges[1])))
+    design[1:] = 0
+    design[1, :size], design[2, size:] = ranges
+    halves = ((slice(size), ranges[0]), (slice(size, None), ranges[1]))
+    for _ in range(JOINT_STEPS):
+        frequency = centre + spacings @ design[1:]
+        apart = np.abs(frequency[:size, None] - frequency[size:])
+        used = data.usable(frequency)
+        used[:size] &= apart.min(axis=1) * pulses > MEETING_BINS
+        used[size:] &= apart.min(axis=0) * pulses > MEETING_BINS
+        parts = [line_matrix(pulses, centre, s, n) for s, n in zip(spacings, ranges, strict=True)]
+        lines = np.concatenate(parts)
+        seen = lines.conj() @ data.samples / pulses
+        gram = dirichlet(frequency, pulses)
+        # powers by the joint fit too: a weak line beside a strong one holds mostly what that one leaks
+        free = np.linalg.solve(gram + LEAST_RIDGE * np.eye(len(gram)), seen)
+        level = np.maximum(data.level_of(data.samples - free @ lines)(frequency), LEAST_LEVEL)
+        power = np.where(used, np.abs(free) ** 2 * pulses / level, 0.0).astype(np.float64)
+        snr = np.concatenate(
+            [smoothed(power[h], n) / np.maximum(smoothed(used[h].astype(np.float64), n), 1e-9) for h, n in halves]
+        )
+        snr = np.maximum(snr - 1, 1e-3)
+        amplitudes = np.asarray(np.linalg.solve(gram + np.diag(1 / snr), seen), np.complex128)
+        rest = data.samples - amplitudes @ lines
+        slope = (lines.conj() @ (time * rest)) / pulses
+        pull = np.where(used, (amplitudes.conj() * slope).imag / level * pulses, 0.0)
+        weight = np.where(used, np.abs(amplitudes) ** 2 / level * pulses * moment, 0.0)
+        normal = (design * weight) @ design.T
+        step = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(3), design @ pull) / (2 * np.pi)
+        limit = 0.5 / pulses / np.array([1, np.abs(ranges[0]).max(), np.abs(ranges[1]).max()])
+        step = np.clip(step, -limit, limit)
+        centre, spacings = centre + step[0], spacings + step[1:]
+    effective = np.where(used, snr**2 / (1 + snr), 0.0)
+    information = (design * (2 * (2 * np.pi) ** 2 * effective * moment)) @ design.T
+    std = np.sqrt(np.diag(np.linalg.inv(information + 1e-12 * np.trace(information) * np.eye(3))))
+    out = [
+        replace(
+            fit,
+            spacing=float(spacings[number]),
+            centre=float(centre),
+            spacing_std=float(std[1 + number]),
+            centre_std=float(std[0]),
+            orders=orders,
+            amplitudes=amplitudes[half],
+            snr=snr[half],
+        )
+        for number, (fit, (half, orders)) in enumerate(zip(fits, halves, strict=True))
+    ]
+    return out[0], out[1]
+
+
+def _clear_of(rest: Periodogram, mine: Candidate | CombFit, other: CombFit) -> Periodogram:
+    """The record with those of the other comb's places marked that a line of this one falls on."""
+    reach = int(0.5 / other.spacing)
+    places = other.centre + other.spacing * np.arange(-reach, reach + 1)
+    order = (places - mine.centre) / mine.spacing
+    meets = np.abs(order - np.rint(order)) * mine.spacing * rest.pulses < 1.5
+    return replace(rest, blocked=(*rest.blocked, *((float(place), 0.0) for place in places[meets])))
+
+
+def _left_over(data: Periodogram, fit: CombFit) -> tuple[Periodogram, NDArray[np.bool_]]:
+    """The record without a comb over its own local level, and the bins hidden: strong lines leaked into the old one."""
+    rest = data.without(_lines(data, fit))
+    hidden = _hidden(rest, fit)
+    power = rest.power * rest.level
+    block = int(BLOCK_BINS * len(power) / rest.pulses)
+    level = np.maximum(local_level(power, ~hidden, 1.0, block), LEAST_LEVEL)
+    return replace(rest, power=power / level, level=level), hidden
+
+
+def _lines(data: Periodogram, fit: CombFit) -> NDArray[np.complex128]:
+    return fit.amplitudes @ line_matrix(data.pulses, fit.centre, fit.spacing, fit.orders)
+
+
+def _hidden(rest: Periodogram, first: CombFit) -> NDArray[np.bool_]:
+    """True in the bins that the first comb or what was taken out hides."""
+    bins = np.arange(len(rest.power)) / len(rest.power)
+    away = bins - first.centre
+    away = (away - np.rint(away)) / first.spacing
+    near = np.abs(away - np.rint(away)) * first.spacing * rest.pulses < SHADOW_BINS
+    return np.asarray(near | ~rest.usable(bins), np.bool_)
+
+
+def _evidence(rest: Periodogram, hidden: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Evidence of a line in every bin [nats], 0 where it is hidden."""
+    block = int(BLOCK_BINS * len(rest.power) / rest.pulses)
+    evidence = line_evidence(np.where(hidden, 1.0, rest.power), block)
+    evidence[:, hidden] = 0.0
+    return evidence
+
+
+def _rival(rest: Periodogram, evidence: NDArray[np.float32], hidden: NDArray[np.bool_], best: Candidate) -> float:
+    """A fraction or multiple of a spacing that explains the lines as well [cycles a sample]; 0 if none does."""
+    multiple = _closest(rest, evidence, best.spacing * MULTIPLES[best.spacing * MULTIPLES < 0.4], best.centre)
+    if multiple.score > MULTIPLE_SHARE * best.score:
+        return multiple.spacing
+    size = len(rest.power)
+
+    def mean_excess(orders: NDArray[np.floating]) -> float:
+        place = np.rint((best.centre + best.spacing * orders) * size).astype(np.intp) % size
+        place = place[~hidden[place]]
+        return float(rest.power[place].mean() - 1) if len(place) else 0.0
+
+    own = mean_excess(np.arange(best.low, best.high + 1.0))
+    for part in FRACTIONS:
+        order = np.arange(best.low * part, best.high * part + 1)
+        if mean_excess(order[order % part != 0] / part) > FRACTION_SHARE * own:
+            return best.spacing / part
+    return 0.0
+
+
+def _loudest(
+    rest: Periodogram, evidence: NDArray[np.float32], chopping: float, centre: float, limits: tuple[float, float]
+) -> Candidate | None:
+    """The comb a gear ratio from the first that speaks loudest."""
+    low, high = GEAR_RANGE
+    spacings = np.concatenate(
+        [
+            _geometric(max(chopping / high, limits[0]), chopping / low, rest.pulses),
+            _geometric(chopping * low, min(chopping * high, limits[1]), rest.pulses),
+        ]
+    )
+    if not len(spacings):
+        return None
+    order = np.arange(1, int(0.5 / spacings[0]) + 1)
+    size = evidence.shape[-1]
+    place = np.rint(spacings[:, None] * order * size).astype(np.intp)
+    beyond = spacings[:, None] * order > 0.5
+    middle = round(centre * size)
+    both = evidence[:, (middle + place) % size] + evidence[:, (middle - place) % size]
+    both[:, beyond] = 0.0
+    heights = both.cumsum(axis=2).max(axis=(0, 2))
+    loudest = spacings[np.argsort(heights)[: -CLOSER - 1 : -1]]
+    return _closest(rest, evidence, loudest, centre)
+
+
+def _geometric(low: float, high: float, pulses: int) -> NDArray[np.float64]:
+    """Spacings in steps of a bin at the end of the span."""
+    if low >= high:
+        return np.empty(0)
+    return np.geomspace(low, high, int(np.log(high / low) * pulses / 2) + 2)
+
+
+def _closest(
+    rest: Periodogram, evidence: NDArray[np.float32], spacings: NDArray[np.float64], centre: float
+) -> Candidate:
+    """The best of spacings and of those near them."""
+    factors = 1 + 0.25 / rest.pulses * np.arange(-FINE_STEPS, FINE_STEPS + 1)
+    found = score(rest, evidence, (spacings[:, None] * factors).ravel(), centre)
+    return max(found, key=lambda c: c.score)

@@ -1,0 +1,140 @@
+"""The threshold on "uav" for a false-alarm rate that a user chooses, and the detection probability that remains."""
+
+import json
+import math
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._checks import CLASS_COUNT, require_finite, require_labels
+
+#: False alarms that a threshold must rest on: with fewer its rate is wrong by more than a third (1 / sqrt(10)).
+SUPPORT = 10
+
+_RATES_A_DECADE = 10  # 0.1, 0.01 and 0.001 are among them
+_HIGHEST_RATE = 0.5
+_EVERY_WIN = 0.3333333  # the most probable of three reaches it
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """One choice between false alarms and misses.
+
+    Parameters
+    ----------
+    false_alarm
+        Share of birds and clutter that are named UAV, at most.
+    threshold
+        Least probability at which a record is named UAV.
+    detection
+        Share of UAVs that are named so.
+    """
+
+    false_alarm: float
+    threshold: float
+    detection: float
+
+
+@dataclass(frozen=True)
+class OperatingCurve:
+    """What calibration records say of every threshold on "uav", in steps of a tenth of a decade.
+
+    Parameters
+    ----------
+    uavs, others
+        Calibration records that are UAVs, and that are birds or clutter.
+    points
+        In falling false-alarm rate; rates that rest on fewer than `SUPPORT` false alarms are left out.
+    """
+
+    uavs: int
+    others: int
+    points: tuple[OperatingPoint, ...]
+
+    def at(self, false_alarm: float) -> OperatingPoint:
+        """Give the point that finds most UAVs without exceeding a false-alarm rate.
+
+        Raises
+        ------
+        ValueError
+            The rate is not between 0 and 1, or the calibration records cannot support one so low.
+        """
+        if not 0 < false_alarm < 1:
+            raise ValueError(f"false-alarm rate {false_alarm:g}: it must be above 0 and below 1")
+        kept = [point for point in self.points if point.false_alarm <= false_alarm * (1 + 1e-9)]
+        if not kept:
+            least = f"{self.points[-1].false_alarm:.2g}" if self.points else "any"
+            raise ValueError(
+                f"false-alarm rate {false_alarm:g} cannot be supported by {self.others} calibration records of birds "
+                f"and clutter: a rate must rest on {SUPPORT} false alarms or more: ask for {least} or more, or train "
+                "with more records"
+            )
+        return kept[0]
+
+    def to_json(self) -> str:
+        """Give the curve as it stands in a model's metadata."""
+        rows = [[round(value, 7) for value in asdict(point).values()] for point in self.points]
+        return json.dumps({"uavs": self.uavs, "others": self.others, "points": rows})
+
+    @classmethod
+    def from_json(cls, text: str) -> "OperatingCurve":
+        """Read what `to_json` gave.
+
+        Raises
+        ------
+        ValueError
+            It is something else.
+        """
+        try:
+            table = json.loads(text)
+            points = tuple(OperatingPoint(*map(float, row)) for row in table["points"])
+            return cls(int(table["uavs"]), int(table["others"]), points)
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"the operating curve is damaged: {error}") from None
+
+
+def operating_curve(probabilities: ArrayLike, labels: NDArray[np.integer]) -> OperatingCurve:
+    """Find the threshold of each false-alarm rate that the records support.
+
+    A record is named UAV where that is the most probable class and its probability reaches the threshold. With the
+    threshold just above the k-th highest of n false ones, a new bird or clutter record exceeds it with probability at
+    most k / (n + 1) (the argument of conformal prediction: its rank among them is uniform).
+
+    Parameters
+    ----------
+    probabilities
+        Calibrated, of records that the model did not train on, shape (n, 3), UAV first.
+    labels
+        Shape (n,), whole numbers 0 to 2.
+
+    Returns
+    -------
+    OperatingCurve
+
+    Raises
+    ------
+    ValueError
+        Where shapes disagree, a value is not finite, or there is no UAV or nothing else.
+    """
+    table = np.asarray(probabilities, dtype=np.float64)
+    if table.ndim != 2 or table.shape[1] != CLASS_COUNT:
+        raise ValueError(f"probabilities has shape {table.shape}; it must be (n, {CLASS_COUNT})")
+    require_finite(table, "probabilities")
+    require_labels(labels, len(table), "labels")
+    named = np.where(table.argmax(axis=1) == 0, table[:, 0], 0.0)
+    true, false = named[labels == 0], np.sort(named[labels != 0])[::-1]
+    if not len(true) or not len(false):
+        raise ValueError(f"{len(true)} UAVs and {len(false)} others; an operating curve needs both")
+    points = []
+    steps = math.ceil(-_RATES_A_DECADE * math.log10(_HIGHEST_RATE))
+    while True:
+        rate = round(10 ** (-steps / _RATES_A_DECADE), 7)
+        steps += 1
+        rank = math.floor(rate * (len(false) + 1) * (1 + 1e-9))  # the threshold stands just above this one, from 1
+        if rank < SUPPORT:
+            break
+        # 1e-6 above: probabilities are float32, and the curve is stored with 7 decimals
+        threshold = max(round(float(false[rank - 1]) + 1e-6, 7), _EVERY_WIN)
+        points.append(OperatingPoint(rate, threshold, float(np.mean(true >= threshold))))
+    return OperatingCurve(len(true), len(false), tuple(points))

@@ -1,0 +1,115 @@
+"""A scene's randomness and its receiver: streams of their own for every part, clutter of a level, effects by name."""
+
+import zlib
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator, Philox, SeedSequence
+from numpy.typing import NDArray
+
+from .clutter import draw_clutter
+from .discretes import DISCRETES, draw_discrete
+from .insects import INSECT_LAWS, draw_insects
+from .laws import LAWS, WIDTH, Draws
+from .parts import ClutterPart
+from .radar import Radar
+from .receiver import NormalsOf, Receiver
+from .setting import Setting
+from .target import mean_power
+
+
+def stream(seed: int, name: str) -> Generator:
+    """The generator of one part: it depends on the seed and the part's name alone."""
+    return Generator(Philox(SeedSequence(seed, spawn_key=(zlib.crc32(name.encode()),))))
+
+
+class Chosen(Draws):
+    """Draws of which some parameters are fixed by name."""
+
+    def __init__(self, uniforms: NDArray[np.float64], values: dict[str, float]) -> None:
+        super().__init__(uniforms)
+        self._values = values
+
+    def value(self, law: str, columns: int | None = None) -> NDArray[np.float64]:
+        """Draw by the law of that name, insects' among them, or give the value that is fixed."""
+        drawn = (LAWS | INSECT_LAWS)[law](self.uniform(columns))
+        return np.full_like(drawn, self._values[law]) if law in self._values else drawn
+
+    def change(self, law: str, dwell_s: float) -> NDArray[np.float64]:
+        """Draw a rate of change, or give the value that is fixed."""
+        return self.value(law) if law in self._values else super().change(law, dwell_s)
+
+
+def pulse_times_s(scene: Setting, seed: int) -> NDArray[np.float64]:
+    """Instants of the pulses, with the PRF's jitter [s], shape (pulses,)."""
+    times = scene.sight.times_s
+    if scene.receiver.jitter_s:
+        times = times + scene.receiver.jitter_s * stream(seed, "jitter").standard_normal(len(times))
+    return times
+
+
+def clutter_echo(part: ClutterPart, radar: Radar, seed: int) -> tuple[NDArray[np.complex64], dict[str, Any]]:
+    """Clutter of mean power `level_db`, and what was drawn of it."""
+    rng = stream(seed, part.name)
+    draws = Chosen(rng.random((1, WIDTH)), part.values)
+    if part.kind == "insects":
+        target = draw_insects(draws, radar)
+    elif part.kind in DISCRETES:
+        target = draw_discrete(draws, radar, part.kind)
+    else:
+        target = draw_clutter(draws, radar, part.kind, NormalsOf([rng])(np.array([0])))
+    iq = target.micro
+    if target.body is not None and target.body_db is not None:
+        iq = _unit(iq) + _unit(target.body) * (10 ** (target.body_db / 20)).astype(np.float32)[:, None]
+    drawn = {name: float(values[0]) for name, values in target.truth.items()}
+    return (_unit(iq) * np.float32(10 ** (part.level_db / 20)))[0], drawn
+
+
+def _unit(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
+    power = mean_power(iq)
+    gain = 1 / np.sqrt(np.where(power > 0, power, 1))
+    return iq * gain.astype(np.float32)[:, None]
+
+
+class Reception:
+    """The receiver of one rendering of a scene.
+
+    Parameters
+    ----------
+    scene : Setting
+        The scene.
+    seed : int
+        Root of all randomness, >= 0.
+    """
+
+    def __init__(self, scene: Setting, seed: int) -> None:
+        part, self.radar, self._seed = scene.receiver, scene.sight, seed
+        self.drawn = Receiver(Chosen(stream(seed, "receiver").random((1, WIDTH)), part.values))
+        self.drawn.gain_db = np.zeros(1)
+        if part.mains_hz is not None:
+            self.drawn.mains_hz = np.array([part.mains_hz])
+        #: Names of the effects that are on; "dc" is the offset.
+        self.effects = {name for name in part.effects if name not in scene.off}
+        if part.dc_db is not None:
+            self.effects.add("dc")
+        self.offset = np.complex64(0 if part.dc_db is None else 10 ** (part.dc_db / 20))
+        self.noise = np.zeros((1, self.radar.pulses), np.complex64)
+        if scene.noise:
+            white = stream(seed, "noise").standard_normal((1, self.radar.pulses, 2), dtype=np.float32)
+            self.noise = white.view(np.complex64)[..., 0] * np.float32(np.sqrt(0.5))
+
+    def receive(
+        self, signal: NDArray[np.complex64], effects: Collection[str], *, quiet: bool = False
+    ) -> NDArray[np.complex64]:
+        """Pass a signal, shape (pulses,), through these effects; leaving one out changes nothing of the others."""
+        self.drawn.on = {name: np.array([name in effects]) for name in self.drawn.on}
+        if "dc" in effects:
+            signal = signal + self.offset
+        iq = self.drawn.receive(
+            np.array(signal[None, :], np.complex64),
+            np.zeros_like(self.noise) if quiet else self.noise,
+            self.radar,
+            lambda effect: NormalsOf([stream(self._seed, f"receiver {effect}")]),
+        )
+        return iq[0].astype(np.complex64, copy=False)

@@ -1,0 +1,124 @@
+"""What a radar looks at, checked as a whole: the parts together, and what is right but may not be meant."""
+
+import math
+
+from pydantic import BaseModel, ConfigDict, model_validator
+
+from .motion import TWO_PI
+from .parts import BirdPart, ClutterPart, RadarPart, ReceiverPart, TargetPart, UavPart
+from .radar import Radar
+from .receiver import FAULT_CHANCE
+
+_SOUND_MPS = 340.0
+
+#: Names that random streams of the receiver go by.
+_RESERVED = ("noise", "jitter", "receiver")
+
+
+class Setting(BaseModel):
+    """What a radar looks at.
+
+    Parameters
+    ----------
+    title, source : str
+        What it is, and where its numbers come from.
+    radar : RadarPart
+        Carrier, PRF, pulses.
+    uav, bird, clutter : tuple of parts
+        What is in the range cell; names are unique.
+    receiver : ReceiverPart
+        Noise and effects.
+    off : tuple of str
+        Names of parts and receiver effects that are left out.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    title: str = ""
+    source: str = ""
+    radar: RadarPart
+    uav: tuple[UavPart, ...] = ()
+    bird: tuple[BirdPart, ...] = ()
+    clutter: tuple[ClutterPart, ...] = ()
+    receiver: ReceiverPart = ReceiverPart()
+    off: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _names(self) -> "Setting":
+        parts: tuple[TargetPart | ClutterPart, ...] = (*self.uav, *self.bird, *self.clutter)
+        names = [part.name for part in parts]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two parts are named {name!r}: every name must be its own")
+            if name in _RESERVED or name in FAULT_CHANCE:
+                raise ValueError(f"a part is named {name!r}: that is the receiver's: give it another name")
+        known = [*names, *self.receiver.effects, "noise"]
+        for name in self.off:
+            if name not in known:
+                raise ValueError(f"off holds {name!r}: it may hold {', '.join(known)}")
+        return self
+
+    @model_validator(mode="after")
+    def _ranges(self) -> "Setting":
+        for part in (*self.uav, *self.bird):
+            nearest = part.nearest_m(self.radar.pulses / self.radar.prf_hz)
+            if not nearest > part.reach_m:
+                raise ValueError(
+                    f"{part.name}: range_m is {part.range_m}: within the dwell it comes to {nearest:.6g} m, which must "
+                    f"exceed its own reach of {part.reach_m:.6g} m"
+                )
+        return self
+
+    @property
+    def sight(self) -> Radar:
+        """The radar."""
+        return Radar(self.radar.carrier_hz, self.radar.prf_hz, self.radar.pulses)
+
+    @property
+    def uavs(self) -> list[UavPart]:
+        """The UAVs that are on."""
+        return [part for part in self.uav if part.on and part.name not in self.off]
+
+    @property
+    def birds(self) -> list[BirdPart]:
+        """The birds that are on."""
+        return [part for part in self.bird if part.on and part.name not in self.off]
+
+    @property
+    def clutters(self) -> list[ClutterPart]:
+        """The clutter that is on."""
+        return [part for part in self.clutter if part.on and part.name not in self.off]
+
+    @property
+    def noise(self) -> bool:
+        """Whether thermal noise is on."""
+        return self.receiver.noise and "noise" not in self.off
+
+    def warnings(self) -> list[str]:
+        """What is right but may not be meant: one line each."""
+        radar, said = self.sight, []
+        for part in self.uavs:
+            for number, rotor in enumerate(part.rotors):
+                where = f"{part.name}: rotors[{number}]"
+                beta = math.radians(part.beta_deg if rotor.beta_deg is None else rotor.beta_deg)
+                tip = TWO_PI * abs(rotor.rotation_hz) * rotor.blade_length_m
+                fastest = tip * math.cos(beta) + abs(part.velocity_mps)
+                if tip > _SOUND_MPS:
+                    said.append(f"{where}: its tips move at {tip:.1f} m/s, faster than sound")
+                if math.cos(beta) < 1e-9:
+                    said.append(f"{where}: seen along its axis (90 degrees) it shows no micro-Doppler")
+                elif fastest > radar.unambiguous_mps:
+                    said.append(
+                        f"{where}: its tips show {fastest:.1f} m/s, beyond the unambiguous {radar.unambiguous_mps:.1f} "
+                        f"m/s (wavelength x PRF / 4): they alias; a PRF of "
+                        f"{4 * fastest / radar.wavelength_m:.0f} Hz would not"
+                    )
+        for target in (*self.uavs, *self.birds):
+            ends = [target.velocity_mps, target.velocity_mps + target.acceleration_mps2 * radar.dwell_s]
+            fastest = max(abs(v) for v in ends)
+            if fastest > radar.unambiguous_mps:
+                said.append(
+                    f"{target.name}: it moves at {fastest:.1f} m/s, beyond the unambiguous {radar.unambiguous_mps:.1f} "
+                    "m/s: its line aliases"
+                )
+        return said

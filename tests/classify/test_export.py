@@ -1,0 +1,201 @@
+"""`bladewing export`: the graph answers from raw IQ what `Classifier.predict` answers."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+from bladewing.classify import BadInput, Classifier
+from bladewing.classify.cli import main
+from bladewing.classify.export import PRODUCT, export_raw_iq
+from bladewing.features.graph.inputs import IQ, input_graph
+from bladewing.features.graph.operators import Graph
+from bladewing.features.inputs import model_inputs
+from bladewing.features.schema import FEATURES, INPUT_SHAPES
+from bladewing.models.seal import verify
+from onnx import TensorProto, helper
+
+RADARS = [
+    {"carrier_hz": 9.85e9, "prf_hz": 25e3, "pulses": 2000},
+    {"carrier_hz": 24e9, "prf_hz": 9.7e3, "pulses": 539},  # transforms of odd length
+    {"carrier_hz": 3e9, "prf_hz": 2e3, "pulses": 77},  # one that must be padded, no side of the axis in full
+    {"carrier_hz": 77e9, "prf_hz": 100e3, "pulses": 1021},
+]
+LABELS = np.array(["uav", "bird", "clutter", "unknown"])
+
+
+def records(count: int, *, prf_hz: float, pulses: int, seed: int = 0, **_: float) -> np.ndarray:
+    """Noise with lines, combs and nothing, at every strength."""
+    rng = np.random.default_rng(seed)
+    iq = rng.normal(size=(count, pulses, 2)).astype(np.float32).view(np.complex64)[..., 0]
+    time = np.arange(pulses) / prf_hz
+    body = 10 ** rng.uniform(-2, 2, (count, 1)) * np.exp(
+        2j * np.pi * rng.uniform(-0.1, 0.1, (count, 1)) * prf_hz * time
+    )
+    chopping_hz = rng.uniform(30, 300, (count, 1))
+    phases = rng.uniform(0, 2 * np.pi, (15, count, 1))
+    orders = enumerate(range(-7, 8))
+    comb = sum(np.exp(1j * (2 * np.pi * order * chopping_hz * time + phases[i])) for i, order in orders)
+    return (iq + body + 10 ** rng.uniform(-3, 0.5, (count, 1)) * comb).astype(np.complex64)
+
+
+def extremes(pulses: int, *, prf_hz: float, **_: float) -> np.ndarray:
+    """One record each of what leaves ordinary ranges."""
+    ordinary = records(1, prf_hz=prf_hz, pulses=pulses, seed=9)[0]
+    spike = np.zeros(pulses, np.complex64)
+    spike[pulses // 3] = 1
+    late = ordinary.copy()
+    late[: pulses // 2] = 0
+    gains = [1e-20, 1e-10, 1e10, 1e20, 2.0**40]
+    return np.stack(
+        [
+            np.zeros(pulses), np.full(pulses, 1 + 2j), spike, ordinary.real, np.tile([1, -1], pulses)[:pulses], late,
+            *(ordinary * np.float32(gain) for gain in gains),
+        ]
+    ).astype(np.complex64)  # fmt: skip
+
+
+def opened(path: Path) -> onnxruntime.InferenceSession:
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+
+
+def run(session: onnxruntime.InferenceSession, iq: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return session.run(["probabilities", "label"], {IQ: iq.view(np.float32).reshape(*iq.shape, 2)})
+
+
+@pytest.mark.parametrize("radar", RADARS, ids=lambda radar: f"{radar['pulses']}")
+def test_the_graph_makes_the_inputs_that_python_makes(radar):
+    graph = Graph()
+    inputs, live = input_graph(graph, **radar, names=INPUT_SHAPES.keys() & {"spectrum", "features"})
+    outputs = [graph.name(value, name) for name, value in {**inputs, "live": live}.items()]
+    shapes = {**INPUT_SHAPES, "live": (1,)}
+    kinds = {np.dtype(bool): TensorProto.BOOL, np.dtype(np.float32): TensorProto.FLOAT}
+    model = helper.make_model(
+        helper.make_graph(
+            graph.nodes,
+            "inputs",
+            [helper.make_tensor_value_info(IQ, TensorProto.FLOAT, ["batch", radar["pulses"], 2])],
+            [helper.make_tensor_value_info(v.name, kinds[v.dtype], ["batch", *shapes[v.name]]) for v in outputs],
+            graph.initializers,
+        ),
+        opset_imports=[helper.make_opsetid("", 18)],
+        ir_version=10,
+    )
+    iq = records(60, **radar)
+    session = onnxruntime.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
+    feed = {IQ: iq.view(np.float32).reshape(*iq.shape, 2)}
+    found = dict(
+        zip(("spectrum", "features", "live"), session.run(["spectrum", "features", "live"], feed), strict=True)
+    )
+    expected = model_inputs(iq, carrier_hz=radar["carrier_hz"], prf_hz=radar["prf_hz"])
+    assert found["live"].all()
+    # what does not change over the dwell is the small difference of large squares
+    np.testing.assert_allclose(found["spectrum"][:, :2], expected["spectrum"][:, :2], atol=2e-3)
+    np.testing.assert_allclose(found["spectrum"][:, 2], expected["spectrum"][:, 2], atol=0.05)
+    # a threshold or a choice of peaks that rounding decides may fall the other way in a rare record
+    scale = FEATURES.high - FEATURES.low
+    off = np.abs(found["features"] - expected["features"]) / scale > 1e-4
+    assert off.any(axis=1).sum() <= 1, [FEATURES[i].name for i in np.flatnonzero(off.any(axis=0))]
+
+
+@pytest.mark.parametrize("radar", RADARS, ids=lambda radar: f"{radar['pulses']}")
+def test_the_shipped_model_answers_the_same_from_raw_iq(radar, tmp_path):
+    out = tmp_path / "raw.onnx"
+    export_raw_iq(out, **radar)
+    classifier = Classifier.load()
+    iq = np.concatenate([records(100, **radar, seed=3), extremes(**radar)])
+    expected = classifier.predict(iq, carrier_hz=radar["carrier_hz"], prf_hz=radar["prf_hz"])
+    probabilities, label = run(opened(out), iq)
+    np.testing.assert_allclose(probabilities, expected.probabilities, atol=1e-3)
+    limits = np.asarray(classifier.accept)[expected.probabilities.argmax(axis=-1)]
+    clear = np.abs(expected.probabilities.max(axis=-1) - limits) > 1e-3
+    np.testing.assert_array_equal(LABELS[label][clear], expected.labels[clear])
+    assert clear.sum() > 90
+
+
+@pytest.fixture(scope="module")
+def linear(tmp_path_factory):
+    """A small exported graph and the records it answers for."""
+    radar = {"carrier_hz": 10e9, "prf_hz": 20e3, "pulses": 200}
+    out = tmp_path_factory.mktemp("raw") / "linear.onnx"
+    export_raw_iq(out, **radar, model="features-linear")
+    return out, radar, opened(out)
+
+
+def test_a_batch_answers_like_its_records_alone(linear):
+    _, radar, session = linear
+    iq = records(8, **radar)
+    together, apart = run(session, iq), [run(session, one[None]) for one in iq]
+    np.testing.assert_allclose(together[0], np.concatenate([one[0] for one in apart]), atol=1e-5)
+    np.testing.assert_array_equal(together[1], np.concatenate([one[1] for one in apart]))
+
+
+def test_records_that_cannot_be_judged_are_unknown_and_spoil_no_other(linear):
+    _, radar, session = linear
+    iq = records(5, **radar)
+    alone = run(session, iq)
+    iq[1], iq[2, 7], iq[3, 9] = 0, np.nan, np.inf
+    probabilities, label = run(session, iq)
+    np.testing.assert_array_equal(label[1:4], 3)
+    np.testing.assert_allclose(probabilities[1:4], 1 / 3, rtol=1e-6)
+    np.testing.assert_allclose(probabilities[[0, 4]], alone[0][[0, 4]], atol=1e-6)
+
+
+def test_the_file_says_what_it_is_for_and_shows_any_change(linear):
+    out, radar, _ = linear
+    content = out.read_bytes()
+    verify(content)
+    said = {entry.key: entry.value for entry in onnx.load_model_from_string(content).metadata_props}
+    assert said["product"] == PRODUCT
+    assert json.loads(said["labels"]) == LABELS.tolist()
+    assert (float(said["carrier_hz"]), float(said["prf_hz"]), int(said["pulses"])) == tuple(radar.values())
+    assert {"classes", "envelope", "accept", "schema_sha256", "model_sha256", "calibration"} <= set(said)
+    with pytest.raises(BadInput, match="not a bladewing model"):
+        Classifier.load(out)
+
+
+def test_the_graph_needs_only_the_standard(linear):
+    out, *_ = linear
+    model = onnx.load_model_from_string(out.read_bytes())
+    assert {entry.domain for entry in model.opset_import} <= {"", "ai.onnx.ml"}
+    assert {node.domain for node in model.graph.node} <= {"", "ai.onnx.ml"}
+    code = """
+import sys, numpy, onnxruntime
+session = onnxruntime.InferenceSession(sys.argv[1])
+iq = numpy.ones((2, 200, 2), numpy.float32)
+probabilities, label = session.run(["probabilities", "label"], {"iq": iq})
+assert probabilities.shape == (2, 3) and label.shape == (2,)
+assert not any(name.startswith("bladewing") for name in sys.modules)
+"""
+    subprocess.run([sys.executable, "-c", code, str(out)], check=True)
+
+
+@pytest.mark.parametrize(
+    ("options", "rule"),
+    [
+        (["--prf-hz", "500"], "PRF 500 Hz is below 1000 Hz"),
+        (["--pulses", "50"], "50 pulses are fewer than 64"),
+        (["--carrier-hz", "1e9"], "carrier 1 GHz is outside"),
+        (["--carrier-hz", "-1"], "carrier_hz is -1"),
+        (["--model", "image-cnn"], "image-cnn reads 'image'"),
+        (["--model", "nothing"], "no model 'nothing'"),
+    ],
+)
+def test_what_cannot_be_exported_is_refused_and_nothing_written(options, rule, tmp_path, capsys):
+    out = tmp_path / "raw.onnx"
+    given = ["--carrier-hz", "10e9", "--prf-hz", "20e3", "--pulses", "200", "--model", "features-linear", *options]
+    assert main(["export", str(out), *given]) == 2
+    assert rule in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_is_missing_is_bad_input(tmp_path, capsys):
+    given = ["--carrier-hz", "10e9", "--prf-hz", "20e3", "--pulses", "200", "--model", "features-linear"]
+    assert main(["export", str(tmp_path / "none" / "raw.onnx"), *given]) == 2
+    assert "cannot be written" in capsys.readouterr().err

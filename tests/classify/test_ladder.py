@@ -1,0 +1,62 @@
+"""A model by its place on the front, or by a budget of time."""
+
+import numpy as np
+import pytest
+from bladewing.classify import BadInput, Classifier, inference, ladder
+from bladewing.classify.ladder import by_budget, by_place, front
+
+
+def account(**models: tuple[float, float]) -> dict:
+    return {
+        name: {"cost_ffts": cost, "test": {"balanced_accuracy": accuracy}} for name, (cost, accuracy) in models.items()
+    }
+
+
+LADDER = account(tiny=(5, 0.5), worse=(9, 0.45), small=(10, 0.6), middle=(19, 0.7), dear=(50, 0.7), great=(80, 0.8))
+
+
+def test_only_models_that_no_other_beats_stand_on_the_front():
+    assert front(LADDER) == [("tiny", 5), ("small", 10), ("middle", 19), ("great", 80)]
+
+
+def test_places():
+    # balanced: at least half way from 0.5 to 0.8
+    assert [by_place(place, LADDER) for place in ladder.PLACES] == ["tiny", "middle", "great"]
+    assert {by_place(place, account(only=(3, 0.4))) for place in ladder.PLACES} == {"only"}
+
+
+@pytest.mark.parametrize(("budget_us", "name"), [(10, "tiny"), (38, "middle"), (37.9, "small"), (1e6, "great")])
+def test_a_budget_buys_the_most_accurate_model_within_it(budget_us, name):
+    assert by_budget(budget_us, LADDER, fft_us=2.0) == name
+
+
+def test_a_budget_that_buys_nothing_names_the_cheapest():
+    with pytest.raises(BadInput, match=r"budget 9\.9 us: the cheapest model, tiny, takes 10 us here"):
+        by_budget(9.9, LADDER, fft_us=2.0)
+
+
+def test_models_without_costs_are_refused_by_one_line():
+    with pytest.raises(BadInput, match="holds no 'cost_ffts': name a model"):
+        by_place("fast", {"old": {"test": {"balanced_accuracy": 0.5}}})
+
+
+def test_the_classifier_loads_by_place_and_by_budget(monkeypatch):
+    shipped = account(**{"features-linear": (40, 0.5), "spectrum-cnn": (50, 0.7)})
+    monkeypatch.setattr(inference, "shipped_account", lambda: shipped)
+    monkeypatch.setattr(inference, "measured_fft_us", lambda: 2.0)
+    assert Classifier.load("fast").metadata["name"] == "features-linear"
+    assert Classifier.load("best").metadata["name"] == "spectrum-cnn"
+    assert Classifier.load(budget_us=99).metadata["name"] == "features-linear"
+    assert Classifier.load(budget_us=100).metadata["name"] == "spectrum-cnn"
+    for wrong, rule in [({"budget_us": -1}, "budget_us is -1"), ({"name_or_path": "fast", "budget_us": 9}, "one of")]:
+        with pytest.raises(BadInput, match=rule):
+            Classifier.load(**wrong)
+
+
+def test_the_bare_fft_has_a_time():
+    assert np.isfinite(ladder.measured_fft_us())
+    assert ladder.measured_fft_us() > 0
+
+
+def test_every_place_of_the_shipped_ladder_loads():
+    assert {Classifier.load(place).metadata["product"] for place in ladder.PLACES} == {"bladewing"}

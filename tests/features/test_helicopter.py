@@ -1,0 +1,117 @@
+import numpy as np
+import pytest
+from bladewing.features import measure
+
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, rotors, white
+
+RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+MAIN_HZ, GEAR = 41.3, 4.73
+NAMES = ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
+
+
+def helicopter(main_hz=MAIN_HZ, gear=GEAR, *, snr_db=5.0, tail_db=-8.0, velocity_mps=6.0, seed=0, body=10.0):
+    main = rotors([main_hz], length_m=0.4, velocity_mps=velocity_mps, body=body)
+    tail = rotors([main_hz * gear], length_m=0.08, velocity_mps=velocity_mps, body=0.0)
+    noise = white(np.random.default_rng(seed), PULSES)
+    return (main + 10 ** (tail_db / 20) * tail) * 10 ** (snr_db / 20) + noise
+
+
+def values(found) -> list[float]:
+    return [float(getattr(found, name)) for name in NAMES]
+
+
+@pytest.mark.parametrize("tail_db", [-8.0, 3.0])
+def test_both_combs_and_the_gear_are_within_their_error_bars(tail_db):
+    found = measure(helicopter(tail_db=tail_db), **RADAR)
+    truth = (2 * MAIN_HZ, 2 * GEAR * MAIN_HZ, GEAR)
+    for name, value, true in zip(NAMES, values(found), truth, strict=True):
+        std = float(getattr(found, f"{name}_std"))
+        assert abs(value - true) < 4.5 * std, name
+        assert 0 < std < 1e-3 * true
+    assert found.gear_reason == ""
+
+
+def test_normalised_errors_have_unit_variance():
+    rng = np.random.default_rng(3)
+    errors = []
+    for seed in range(8):
+        gear, main_hz = rng.uniform(4.2, 4.8), rng.uniform(33, 45)
+        found = measure(helicopter(main_hz, gear, snr_db=3.0, tail_db=-6.0, seed=seed), **RADAR)
+        errors.append((float(found.gear_ratio) - gear) / float(found.gear_ratio_std))
+    assert np.isfinite(errors).all()
+    # chi-squared of 8 degrees of freedom over 8 lies within 0.12..3.0 in 99.7 %
+    assert 0.12 < np.mean(np.square(errors)) < 3.0
+
+
+def one_rotor(amplitudes=(1.0, 1.0), rates_hz=(46.7,), **options):
+    iq = sum(rotors([rate_hz], body=0.0, amplitudes=amplitudes, length_m=0.3, **options) for rate_hz in rates_hz)
+    return (iq + 10) * 3 + white(np.random.default_rng(1), PULSES)
+
+
+@pytest.mark.parametrize(
+    "iq",
+    [
+        one_rotor(),
+        one_rotor((1.0, 0.6)),
+        one_rotor((1.0, 0.9, 0.5)),
+        one_rotor((1.0, 0.0)),
+        one_rotor(rates_hz=(44.1, 47.9)),
+        one_rotor(rates_hz=(44.1, 44.9, 46.0, 47.2)),
+        one_rotor(rates_hz=(40.3, 42.7, 44.1, 46.9, 48.0, 51.2)),
+        helicopter(gear=5.0),
+        helicopter(tail_db=-60.0),
+    ],
+    ids=[
+        "one rotor",
+        "unequal blades",
+        "three unequal blades",
+        "one blade",
+        "two rotors",
+        "four rotors",
+        "six rotors in a manoeuvre",
+        "tail on the main's lines",
+        "tail too weak",
+    ],
+)
+def test_what_is_no_second_comb_has_a_reason_and_no_number(iq):
+    found = measure(iq, **RADAR)
+    assert np.isfinite(found.chopping_hz)
+    assert str(found.gear_reason).startswith("no second comb")
+    for name in NAMES:
+        assert np.isnan(getattr(found, name))
+        assert np.isnan(getattr(found, f"{name}_std"))
+
+
+def test_the_reasons_of_no_comb_and_of_a_short_dwell():
+    noise = white(np.random.default_rng(2), PULSES)
+    assert measure(noise, **RADAR).gear_reason == "no comb"
+    assert measure(np.zeros(PULSES), **RADAR).gear_reason == "no comb"
+    # 1300 pulses: the main's lines are 3.1 bins apart, no room for others
+    assert "dwell too short" in str(measure(helicopter(snr_db=20.0)[:1300], **RADAR).gear_reason)
+
+
+def test_a_batch_gives_what_a_loop_gives():
+    batch = np.stack([helicopter(), one_rotor(), white(np.random.default_rng(4), PULSES)])
+    together = measure(batch, **RADAR)
+    for index, iq in enumerate(batch):
+        alone = measure(iq, **RADAR)
+        for name in (*NAMES, "gear_ratio_std", "gear_reason"):
+            np.testing.assert_array_equal(getattr(together, name)[index], getattr(alone, name))
+
+
+def test_gain_phase_time_reversal_and_scale():
+    iq = helicopter()
+    base = measure(iq, **RADAR)
+    turned = measure(iq * 32 * np.exp(1j), **RADAR)
+    np.testing.assert_allclose(values(turned), values(base), rtol=1e-6)
+    back = measure(iq[::-1], **RADAR)
+    assert back.gear_ratio == pytest.approx(float(base.gear_ratio), abs=2 * float(base.gear_ratio_std))
+    scaled = measure(iq, carrier_hz=2 * CARRIER_HZ, prf_hz=2 * PRF_HZ)
+    np.testing.assert_allclose(values(scaled), np.array(values(base)) * (2, 2, 1), rtol=1e-6)
+
+
+def test_the_main_rotor_is_measured_without_the_tails_lines():
+    found = measure(helicopter(tail_db=0.0), **RADAR, blades=2, beta_rad=0.0)
+    assert found.rotor_count == 1
+    assert found.rotors_resolved
+    assert found.chopping_hz == found.main_chopping_hz

@@ -1,0 +1,271 @@
+"""Faults while results are written: killed, no room, read-only, two at once, a clock that goes back.
+
+    python -m tests.fuzz.faults [--kills 50] [--seed 0] [--only train] [--out faults.json]
+
+Every run works on a folder that holds an older result. Half of the kills fall at a random moment of the run, half
+within milliseconds of the first file that it writes. Afterwards the old or the new result must be whole.
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from bladewing.classify.files import settle
+from bladewing.classify.report.page import draw_page
+
+#: The commands at their smallest. A pool needs a script to start from, so each is one.
+TRAIN = """
+import sys
+from pathlib import Path
+from bladewing.classify.train import run_training
+from bladewing.classify.training_config import TrainingConfig
+TrainingConfig.sets = property(lambda self: {"train": 96, "validate": 24, "calibrate": 96, "test": 96})
+if __name__ == "__main__":
+    config = Path(sys.argv[1] + ".toml")
+    config.write_text('models = ["features-linear", "features-boosted"]\\niterations = 2\\n')
+    run_training(Path(sys.argv[1]), seed=int(sys.argv[2]), config=config, progress=False)
+"""
+DATASET = """
+import sys
+from pathlib import Path
+from bladewing.classify import dataset
+from bladewing.classify.progress import Progress
+dataset.SHARD_RECORDS = 48
+plan = dataset.Plan(3, {"train": 960, "validate": 240, "calibrate": 240, "test": 240})
+if __name__ == "__main__":
+    dataset.write_dataset(Path(sys.argv[1]), plan, Progress(visible=False), workers=2)
+"""
+REPORT = """
+import sys
+from pathlib import Path
+from bladewing.classify.report import run
+run.QUICK = run.Effort(records=48, reference_records=64, chain_s=0.1, stft_s=0.05, least_rounds=1)
+models = Path(sys.argv[1] + "-models")
+if __name__ == "__main__":
+    run.run_report(Path(sys.argv[1]), models=models, quick=True, seed=int(sys.argv[2]), progress=False)
+"""
+
+
+class Bench:
+    """A folder for scripts and results, and what came of them."""
+
+    def __init__(self, place: Path, kills: int, rng: np.random.Generator) -> None:
+        self.place, self.kills, self.rng = place, kills, rng
+        for name, code in (("train", TRAIN), ("dataset", DATASET), ("report", REPORT)):
+            (place / f"{name}.py").write_text(code)
+
+    def start(self, name: str, out: Path, seed: int = 0, **options: object) -> subprocess.Popen:
+        """Start a command on a folder."""
+        command = [sys.executable, str(self.place / f"{name}.py"), str(out), str(seed)]
+        return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True, **options)  # type: ignore[call-overload]
+
+    def whole(self, name: str, out: Path, seed: int = 0) -> float:
+        """Run to the end; the seconds it took."""
+        started = time.monotonic()
+        process = self.start(name, out, seed)
+        _, said = process.communicate()
+        if process.returncode:
+            raise RuntimeError(f"{name}: {said}")
+        return time.monotonic() - started
+
+    def kill(self, name: str, out: Path, takes_s: float, seed: int = 0, *, writing: bool) -> bool:
+        """Start, and kill at random or as it writes; False where it was done before."""
+        before = {path.name for path in out.iterdir()}
+        process = self.start(name, out, seed)
+        if writing:
+            while process.poll() is None and {path.name for path in out.iterdir()} <= before:
+                time.sleep(0.0003)
+            time.sleep(float(self.rng.exponential(0.004)))
+        else:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(float(self.rng.uniform(0, takes_s)))
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        return process.returncode == -signal.SIGKILL
+
+    def train(self) -> dict[str, int]:
+        """Models and their account must be of one training."""
+        out = self.place / "trained"
+        takes = self.whole("train", out, 0)
+        models = {0: content(out, "*.onnx")}
+        self.whole("train", self.place / "other", 1)
+        models[1] = content(self.place / "other", "*.onnx")
+
+        def lost() -> bool:
+            settle(out)
+            seed = json.loads((out / "train.json").read_text())["settings"]["seed"]
+            return content(out, "*.onnx") != models[seed]
+
+        return self.killed("train", out, takes, lost)
+
+    def report(self) -> dict[str, int]:
+        """The page must be the one that is drawn from the numbers beside it."""
+        out = self.place / "reported"
+        shipped = Path(__file__).parents[2] / "models" / "pretrained" / "features-linear.onnx"
+        (self.place / "reported-models").mkdir()
+        shutil.copy(shipped, self.place / "reported-models")
+        takes = self.whole("report", out)
+
+        def lost() -> bool:
+            settle(out)
+            return draw_page(json.loads((out / "report.json").read_text())) != (out / "report.html").read_text()
+
+        return self.killed("report", out, takes, lost)
+
+    def killed(self, name: str, out: Path, takes_s: float, lost: Callable[[], bool]) -> dict[str, int]:
+        """Kill again and again; nothing may be lost, and what stays of it all is nothing but the results."""
+        killed = losses = runs = 0
+        while killed < self.kills:
+            killed += self.kill(name, out, takes_s, runs % 2, writing=runs % 2 == 1)
+            losses += lost()
+            runs += 1
+        self.whole(name, out)
+        litter = len(list(out.glob(".bladewing-*.new")))
+        return {"kills": killed, "runs": runs, "lost": losses + lost(), "litter": litter}
+
+    def dataset(self) -> dict[str, int]:
+        """Killed and resumed until it is done, a data set is to the byte one that nothing interrupted."""
+        takes = self.whole("dataset", self.place / "reference")
+        reference = content(self.place / "reference", "*")
+        killed = losses = sets = runs = 0
+        while killed < self.kills:
+            out = self.place / f"data-{sets}"
+            out.mkdir()
+            for turn in range(12):
+                killed += self.kill("dataset", out, takes, writing=turn % 2 == 1)
+                runs += 1
+            self.whole("dataset", out)
+            losses += content(out, "*") != reference
+            sets += 1
+            shutil.rmtree(out)
+        return {"kills": killed, "runs": runs, "data_sets": sets, "lost": losses}
+
+    def disk(self) -> dict[str, int]:
+        """No room, by a limit on the size of files and by a small disk, and a disk that may only be read."""
+        faults = losses = wrong = 0
+        for name, pattern in (("train", "*.onnx"), ("dataset", "*")):
+            out = _made(self.place / f"full-{name}")
+            if name == "train":
+                self.whole(name, out, 0)
+            old = content(out, pattern)
+            self.whole(name, self.place / f"full-{name}-reference", 1)
+            new = content(self.place / f"full-{name}-reference", pattern)
+            for limit in (0, 100, 1000, 4000, 20_000, 100_000):
+                process = self.start(name, out, 1, preexec_fn=lambda limit=limit: _limit_files(limit))
+                _, said = process.communicate()
+                faults += 1
+                wrong += process.returncode != 0 and not ("BadInput" in said or "OSError" in said)
+                settle(out)
+                if name == "train":
+                    losses += content(out, pattern) != (old if process.returncode else new)
+            self.whole(name, out, 1)
+            losses += content(out, pattern) != new
+        for options in ("size=400k", "size=400k,ro"):
+            place = self.place / f"mounted-{options[-2:]}"
+            place.mkdir()
+            if subprocess.run(["mount", "-t", "tmpfs", "-o", options, "tmpfs", place], capture_output=True).returncode:
+                continue
+            try:
+                for name in ("dataset", "train"):
+                    out = place / name
+                    process = self.start(name, out)
+                    _, said = process.communicate()
+                    faults += 1
+                    fits = name == "train" and "ro" not in options
+                    wrong += (process.returncode == 0) != fits
+            finally:
+                subprocess.run(["umount", place], check=True)
+        return {"faults": faults, "lost": losses, "wrong": wrong}
+
+    def pairs(self) -> dict[str, int]:
+        """Two at once in one place: one after the other, or one of them refused; never a mixture."""
+        models = {}
+        for seed in (0, 1):
+            self.whole("train", self.place / f"pair-{seed}", seed)
+            models[seed] = content(self.place / f"pair-{seed}", "*.onnx")
+        out = self.place / "pair"
+        losses = 0
+        for _ in range(6):
+            both = [self.start("train", out, seed) for seed in (0, 1)]
+            for process in both:
+                process.communicate()
+                losses += process.returncode != 0
+            seed = json.loads((out / "train.json").read_text())["settings"]["seed"]
+            losses += content(out, "*.onnx") != models[seed]
+        self.whole("dataset", self.place / "pair-reference")
+        both = [self.start("dataset", self.place / "pair-data") for _ in range(2)]
+        said = [process.communicate()[1] for process in both]
+        refused = sum("another process is writing there" in text for text in said)
+        losses += content(self.place / "pair-data", "*") != content(self.place / "pair-reference", "*")
+        return {"pairs": 7, "refused": refused, "lost": losses}
+
+    def clock(self) -> dict[str, int]:
+        """A clock that goes back: older results from the future, and a clock that runs backwards meanwhile."""
+        out = self.place / "clock"
+        self.whole("dataset", self.place / "clock-reference")
+        self.whole("train", self.place / "clock-train-reference", 1)
+        for name in ("train", "dataset"):
+            script = self.place / f"{name}.py"
+            script.write_text(
+                "import itertools, time\nback = itertools.count(2e9, -3600.0)\ntime.time = lambda: next(back)\n"
+                + script.read_text()
+            )
+        with contextlib.suppress(FileNotFoundError):
+            self.whole("train", out)
+        self.kill("dataset", _made(self.place / "clock-data"), 3.0, writing=True)
+        for path in (*out.iterdir(), *(self.place / "clock-data").iterdir()):
+            os.utime(path, (4e9, 4e9))
+        self.whole("train", out, 1)
+        self.whole("dataset", self.place / "clock-data")
+        lost = content(out, "*.onnx") != content(self.place / "clock-train-reference", "*.onnx")
+        lost += content(self.place / "clock-data", "*") != content(self.place / "clock-reference", "*")
+        return {"faults": 3, "lost": int(lost)}
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir()
+    return folder
+
+
+def _limit_files(size: int) -> None:
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+def content(folder: Path, pattern: str) -> dict[str, bytes]:
+    """Names and contents of a folder's files."""
+    return {path.name: path.read_bytes() for path in sorted(folder.glob(pattern)) if path.is_file()}
+
+
+def main() -> int:
+    """Run, print a line a fault, write the counts; 1 where anything was lost."""
+    arguments = argparse.ArgumentParser()
+    arguments.add_argument("--kills", type=int, default=50)
+    arguments.add_argument("--seed", type=int, default=0)
+    arguments.add_argument("--only")
+    arguments.add_argument("--out", type=Path)
+    given = arguments.parse_args()
+    counts = {}
+    for name in [given.only] if given.only else ["train", "dataset", "report", "disk", "pairs", "clock"]:
+        with tempfile.TemporaryDirectory() as place:
+            bench = Bench(Path(place), given.kills, np.random.default_rng(given.seed))
+            counts[name] = getattr(bench, name)()
+        print(name, json.dumps(counts[name]), flush=True)
+    if given.out:
+        given.out.write_text(json.dumps(counts, indent=1) + "\n")
+    return int(any(one["lost"] for one in counts.values()))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,95 @@
+"""Mutated real files for every reader, by the ten thousand: counts of crashes, hangs and wrong refusals.
+
+    python -m tests.fuzz.long_run [--inputs 10000] [--seed 0] [--reader NAME] [--out fuzz.json]
+
+Each thousand runs in a process of its own under a limit of memory, so that a crash of C code is seen, with the input
+that made it.
+"""
+
+import argparse
+import json
+import multiprocessing
+import resource
+import sys
+import tempfile
+import time
+import warnings
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .readers import mutate, readers, verdict
+
+_MEMORY_BYTES = 6 << 30
+_BATCH = 1000
+
+
+def work(name: str, seed: int, first: int, count: int, place: str, answer: Any) -> None:
+    """Try inputs first..first + count; the answer goes through a pipe, the input under way lies in a file."""
+    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
+    warnings.simplefilter("error")  # a warning from inside a library is wrong too
+    folder = Path(place) / f"{name}-{first}"
+    folder.mkdir(parents=True)
+    reader = readers(folder / "seeds")[name]
+    said: Counter[str] = Counter()
+    slowest = 0.0
+    wrong = []
+    for number in range(first, first + count):
+        content = mutate(reader.seeds, np.random.default_rng((seed, number)))
+        (folder / "under way").write_bytes(content)
+        started = time.perf_counter()
+        result = verdict(reader, content, folder)
+        slowest = max(slowest, time.perf_counter() - started)
+        kind = result if result in ("read", "refused", "hang") else "wrong"
+        said[kind] += 1
+        if kind in ("hang", "wrong"):
+            wrong.append((number, result))
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    answer.send((dict(said), wrong, slowest, peak))
+
+
+def main() -> int:
+    """Run, print a line a reader, write the counts; 1 where anything went wrong."""
+    arguments = argparse.ArgumentParser()
+    arguments.add_argument("--inputs", type=int, default=10_000)
+    arguments.add_argument("--seed", type=int, default=0)
+    arguments.add_argument("--reader")
+    arguments.add_argument("--out", type=Path)
+    given = arguments.parse_args()
+    context = multiprocessing.get_context("spawn")
+    counts = {}
+    with tempfile.TemporaryDirectory() as place:
+        for name in [given.reader] if given.reader else list(readers(Path(place) / "seeds")):
+            total: Counter[str] = Counter(inputs=given.inputs, crash=0, hang=0, wrong=0)
+            slowest, peak, found = 0.0, 0, []
+            for first in range(0, given.inputs, _BATCH):
+                ours, theirs = context.Pipe(duplex=False)
+                count = min(_BATCH, given.inputs - first)
+                process = context.Process(target=work, args=(name, given.seed, first, count, place, theirs))
+                process.start()
+                theirs.close()
+                try:
+                    said, wrong, longest, memory = ours.recv()
+                    total.update(said)
+                    found += wrong
+                    slowest, peak = max(slowest, longest), max(peak, memory)
+                except EOFError:
+                    process.join()
+                    total["crash"] += 1
+                    kept = Path(f"crash-{name.replace(' ', '-')}-{first}")
+                    kept.write_bytes((Path(place) / f"{name}-{first}" / "under way").read_bytes())
+                    found.append((first, f"died with {process.exitcode}, its input is in {kept}"))
+                process.join()
+            counts[name] = {**total, "slowest_s": round(slowest, 2), "peak_mb": peak // 1024, "found": found[:20]}
+            print(name, json.dumps({k: v for k, v in counts[name].items() if k != "found"}), flush=True)
+            for number, text in found[:5]:
+                print("   ", number, text, flush=True)
+    if given.out:
+        given.out.write_text(json.dumps(counts, indent=1) + "\n")
+    return int(any(one["crash"] or one["hang"] or one["wrong"] for one in counts.values()))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
