@@ -121,7 +121,8 @@ def _pooled_power(some: NDArray[np.complex64]) -> NDArray[np.float32]:
         part = slice(first, first + step)
         begin, end = starts[part][0], ends[part][-1]
         pooled[part] = np.add.reduceat(_squares(transformed(some[begin:end])), starts[part] - begin, axis=0)
-    return pooled / (ends - starts)[:, None].astype(np.float32)
+    pooled /= (ends - starts)[:, None].astype(np.float32)
+    return pooled
 
 
 def cadence_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
@@ -129,8 +130,9 @@ def cadence_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float
     swings, _ = joint.cadence_velocity(_frames_of(iq, radar, CADENCE_WINDOW_S))
     few = _grouped(swings**2, IMAGE_FRAMES)
     level = np.median(few, axis=(1, 2), keepdims=True)
+    few /= np.where(level > 0, level, np.float32(1))
     pool = pooling(few.shape[-1], radar.carrier_hz, radar.prf_hz, IMAGE_BINS)
-    return np.swapaxes(pool.mean_db(few / np.where(level > 0, level, np.float32(1))), -1, -2)[:, None]
+    return np.swapaxes(pool.mean_db(few), -1, -2)[:, None]
 
 
 def cepstral_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:

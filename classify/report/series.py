@@ -73,8 +73,11 @@ def choice_looks(choices: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], 
     for row in choices:
         if row["kind"] != "model":
             family = row["name"].split("-")[0]
-            among = [name for name in others if name.split("-")[0] == family].index(row["name"])
+            among = [name for name in others if name.split("-")[0] == family]
             place = families.index(family)
             number = (len(SERIES) - 1 - place) % len(SERIES)
-            found[row["name"], row["kind"]] = Look(number, (number + among) % len(MARKERS))
+            # a lone one takes a marker that no model has: its colour may be a model's
+            spare = len(LADDER) + place % (len(MARKERS) - len(LADDER))
+            outline = spare if len(among) == 1 else among.index(row["name"]) % len(MARKERS)
+            found[row["name"], row["kind"]] = Look(number, outline)
     return found

@@ -130,9 +130,9 @@ def front_budgets(report: Mapping[str, Any], *, batch: int | None = None) -> lis
         if one["choice"] is None:
             lines.append(f"{head}: nothing.")
             continue
-        what = one["choice"] if one["kind"] == "model" else f"{one['words']}, trained here"
+        what = one["choice"] if one["kind"] == "model" else f"{one['words']} (trained here)"
         lines.append(
-            f"{head}: {what} on dwells of {millis(one['dwell_s'])}, balanced accuracy "
+            f"{head}: {what}, dwells of {millis(one['dwell_s'])}, balanced accuracy "
             f"{_with_interval(one['balanced_accuracy'])} for {micros(one['cost_us'])}; at one false alarm in 100 it "
             f"finds {_with_interval(one['uav_found'])} of the UAVs."
         )

@@ -194,6 +194,15 @@ def test_the_front_holds_every_choice_at_every_dwell(report: dict[str, Any]) -> 
     assert len(weights) == 8
 
 
+def test_no_two_choices_look_alike() -> None:
+    from bladewing.classify.report.series import choice_looks
+    from bladewing.models import LADDER
+
+    rows = [{"name": name, "kind": "picture"} for name in pictures.PICTURES]
+    rows += [{"name": "features", "kind": "features"}, *({"name": name, "kind": "model"} for name in LADDER)]
+    assert len(set(choice_looks(rows).values())) == len(rows)
+
+
 def test_what_is_marked_is_not_beaten_and_a_budget_buys_the_best_within(report: dict[str, Any]) -> None:
     points = [(row, point) for row in report["front"]["choices"] for point in row["dwells"]]
     for place, batch in enumerate((1, 64)):
