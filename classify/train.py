@@ -171,7 +171,7 @@ def _train_one(
     from bladewing.models.seal import seal
 
     started = time.perf_counter()
-    network = name.endswith("cnn")
+    network = "cnn" in name
     scores_of, export, detail = (_network if network else _tabular)(name, settings, sets, on_fraction)
     calibration = fit_vector_scaling(scores_of(sets.calibrate), sets.calibrate.labels)
     calibrated = calibration.probabilities(scores_of(sets.calibrate))
@@ -245,14 +245,17 @@ def _network(
     name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction
 ) -> tuple[ScoresOf, Callable[[Any], bytes], dict[str, Any]]:
     from bladewing.models.augment import VelocityMirror
-    from bladewing.models.cnn import ImageNet, SpectrumNet
+    from bladewing.models.cnn import EvidenceNet, ImageNet, SpectrumNet
     from bladewing.models.export import export_network
     from bladewing.models.training import network_scores, train_network
 
     signal, evidence = LADDER[name]
     shapes = {key: INPUT_SHAPES[key] for key in (signal, evidence)}
-    network = {"spectrum": SpectrumNet, "image": ImageNet}[signal]
-    net = network(shapes[signal], shapes[evidence][0], seed=settings.seed)
+    net: EvidenceNet
+    if signal == "image":
+        net = ImageNet(shapes[signal], shapes[evidence][0], seed=settings.seed)
+    else:
+        net = SpectrumNet(shapes[signal], shapes[evidence][0], seed=settings.seed, widen=1 + name.endswith("wide"))
 
     def inputs(part: Gathered) -> dict[str, NDArray]:
         return {key: part.inputs[key] for key in shapes}
@@ -271,6 +274,7 @@ def _network(
         augment=VelocityMirror(axes={signal: {"spectrum": -1, "image": -2}[signal]}, odd={}),
         on_epoch=lambda epoch, epochs, _: on_fraction(epoch / epochs),
     )
+    net.compact()
     detail = {
         "device": result.device,
         "best_epoch": result.best_epoch,

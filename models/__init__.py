@@ -1,6 +1,6 @@
 """Models: arrays in, scores and self-contained ONNX bytes out; nothing here knows a radar or a file.
 
-Five models stand on a ladder from a few microseconds to a few tens of microseconds a record, so that a report
+Six models stand on a ladder from a few microseconds to a few tens of microseconds a record, so that a report
 can say what each step buys (`LADDER`). Their outputs are always in the order uav, bird, clutter.
 
 Modules
@@ -23,6 +23,7 @@ LADDER: dict[str, tuple[str, ...]] = {
     "features-linear": ("features",),
     "features-boosted": ("features",),
     "spectrum-cnn": ("spectrum", "features"),
+    "spectrum-cnn-wide": ("spectrum", "features"),
     "joint-boosted": ("joint_features",),
     "image-cnn": ("image", "joint_features"),
 }

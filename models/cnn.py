@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
+from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 from ._checks import CLASS_COUNT, require_finite
 
@@ -167,6 +168,24 @@ class EvidenceNet(nn.Module):
             raise ValueError(f"inputs hold {sorted(counts)} records; they must hold the same number")
         return counts.pop()
 
+    def compact(self) -> None:
+        """Fold each normalisation into its convolution and round the weights to half precision, for good.
+
+        What is left computes in float32 as before and is stored in half the bytes without a further change. Call it
+        after training and before calibration, so that every figure is that of the network which is stored.
+        """
+        self.eval()
+        with torch.no_grad():
+            for part in self.modules():
+                if isinstance(part, nn.Sequential):
+                    for place in range(len(part) - 1):
+                        convolution, normalisation = part[place], part[place + 1]
+                        if isinstance(convolution, nn.Conv2d) and isinstance(normalisation, nn.BatchNorm2d):
+                            part[place] = fuse_conv_bn_eval(convolution, normalisation)
+                            part[place + 1] = nn.Identity()
+            for weights in self.parameters():
+                weights.copy_(weights.half().float())
+
     def forward(self, signal: Tensor, evidence: Tensor) -> Tensor:
         """Return the scores.
 
@@ -192,7 +211,7 @@ class EvidenceNet(nn.Module):
 class SpectrumNet(EvidenceNet):
     """1-D network over the velocity spectrum ("spectrum") beside its measurements ("features").
 
-    About 39 000 parameters and 0.8 million multiplications a record of 3 x 256.
+    About 39 000 parameters and 0.8 million multiplications a record of 3 x 256; twice as wide, 134 000 and 2.8 million.
 
     Parameters
     ----------
@@ -202,20 +221,23 @@ class SpectrumNet(EvidenceNet):
         Number of measurements F.
     seed
         Draws the first weights; the global generator of torch is left as it was.
+    widen
+        Factor on the channels of every layer, 1 or 2.
     """
 
-    def __init__(self, spectrum_shape: tuple[int, int], feature_count: int, *, seed: int) -> None:
+    def __init__(self, spectrum_shape: tuple[int, int], feature_count: int, *, seed: int, widen: int = 1) -> None:
+        first, second, third, last = (widen * channels for channels in (16, 24, 32, 48))
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             trunk = nn.Sequential(
-                _Convolution(spectrum_shape[0], 16, (1, 7), (1, 2)),
-                _Convolution(16, 24, (1, 5), (1, 2)),
-                _Convolution(24, 32, (1, 5), (1, 2)),
-                _Residual(32, (1, 5)),
-                _Convolution(32, 48, (1, 5), (1, 2)),
-                _Residual(48, (1, 5)),
+                _Convolution(spectrum_shape[0], first, (1, 7), (1, 2)),
+                _Convolution(first, second, (1, 5), (1, 2)),
+                _Convolution(second, third, (1, 5), (1, 2)),
+                _Residual(third, (1, 5)),
+                _Convolution(third, last, (1, 5), (1, 2)),
+                _Residual(last, (1, 5)),
             )
-            super().__init__({"spectrum": spectrum_shape, "features": (feature_count,)}, trunk, 48)
+            super().__init__({"spectrum": spectrum_shape, "features": (feature_count,)}, trunk, last)
 
 
 class ImageNet(EvidenceNet):

@@ -1,4 +1,4 @@
-"""Tables of what the classifier keeps of its promises. Run: python tests/benchmarks/classification_tables.py [TABLE ...].
+"""Tables of the classifier's promises. Run: python tests/benchmarks/classification_tables.py [TABLE ...].
 
 Records are drawn for purpose "bench": neither training nor calibration, nor the test of a training, has seen them.
 """
@@ -7,6 +7,7 @@ import argparse
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +56,7 @@ def detection(classifier: Classifier, count: int) -> None:
         print(f"\ndetection at 1 % false alarms, 2048 pulses, {name}, {uav.sum()} UAVs")
         print(" SNR of the blades [dB] | against noise (no background)   n | against birds and clutter     n")
         thresholds = [np.quantile(p, 0.99) for p in (noise["p"][empty, 0], everything["p"][~uav, 0])]
-        for low, high in zip(SNR_EDGES_DB[:-1], SNR_EDGES_DB[1:], strict=True):
+        for low, high in pairwise(SNR_EDGES_DB):
             cells = []
             for among, threshold in zip((clear, uav), thresholds, strict=True):
                 rows = among & (everything["snr_db"] >= low) & (everything["snr_db"] < high)

@@ -6,7 +6,6 @@ from bladewing.classify import Classifier
 from bladewing.classify.errors import BadInput
 from bladewing.classify.train import _figures, run_training
 from bladewing.classify.training_config import TrainingConfig, training_config
-from bladewing.models import LADDER
 from bladewing.simulate import Radar, draw_records
 
 
@@ -20,7 +19,7 @@ def trained(tmp_path_factory):
 
 def test_training_writes_every_model_and_its_account(trained):
     out, account = trained
-    assert {path.stem for path in out.glob("*.onnx")} == set(LADDER) == set(account["models"])
+    assert {path.stem for path in out.glob("*.onnx")} == set(TrainingConfig().models) == set(account["models"])
     assert json.loads((out / "train.json").read_text()) == account
     for name, model in account["models"].items():
         assert model["bytes"] == (out / f"{name}.onnx").stat().st_size
@@ -29,7 +28,7 @@ def test_training_writes_every_model_and_its_account(trained):
     assert not list(out.glob(".bladewing*"))
 
 
-@pytest.mark.parametrize("name", list(LADDER))
+@pytest.mark.parametrize("name", TrainingConfig().models)
 def test_trained_models_answer_through_the_classifier(trained, name):
     out, account = trained
     clf = Classifier.load(out / f"{name}.onnx")

@@ -48,7 +48,7 @@ def test_bad_settings_are_refused(window_s, overlap):
 
 @pytest.mark.parametrize("blades", [1, 2, 3])
 def test_flashes_are_a_chopping_period_apart(blades):
-    frames = stft(rotors([RATE_HZ], blades=blades, velocity_mps=-7.0), **RADAR, window_s=1e-3)
+    frames = stft(rotors([RATE_HZ], amplitudes=(1.0,) * blades, velocity_mps=-7.0), **RADAR, window_s=1e-3)
     assert 1 / flash_period_s(frames) == pytest.approx(blades * RATE_HZ, rel=0.005)
 
 
