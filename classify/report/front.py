@@ -276,12 +276,13 @@ def _timed(
 
 
 def _weights(onnx_bytes: bytes) -> str:
-    """Whether a graph holds weights of one byte."""
+    """The smallest type that a graph's weights are kept in."""
     import onnx
 
-    small = (onnx.TensorProto.INT8, onnx.TensorProto.UINT8)
-    graph = onnx.load_model_from_string(onnx_bytes).graph
-    return "int8" if any(one.data_type in small for one in graph.initializer) else "float32"
+    kept = {one.data_type for one in onnx.load_model_from_string(onnx_bytes).graph.initializer}
+    if kept & {onnx.TensorProto.INT8, onnx.TensorProto.UINT8}:
+        return "int8"
+    return "float16" if onnx.TensorProto.FLOAT16 in kept else "float32"
 
 
 def _row(

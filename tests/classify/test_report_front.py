@@ -161,6 +161,16 @@ def test_operations_of_a_convolution_and_of_trees() -> None:
     assert network_operations(model(tree, shape=(1,), out=(1,))) == pytest.approx(5 / 3 + 1)
 
 
+@pytest.mark.parametrize(("dtype", "said"), [("int8", "int8"), ("float16", "float16"), ("float32", "float32")])
+def test_weights_are_named_by_their_smallest_type(dtype: str, said: str) -> None:
+    from onnx import TensorProto, helper, numpy_helper
+
+    weights = [numpy_helper.from_array(np.zeros(3, kind), kind) for kind in {"float32", dtype}]
+    out = helper.make_tensor_value_info("float32", TensorProto.FLOAT, [3])
+    graph = helper.make_graph([], "one", [], [out], weights)
+    assert front._weights(helper.make_model(graph).SerializeToString()) == said
+
+
 def hold(count: int) -> Callable[[], object]:
     return lambda: np.ones(count)
 
