@@ -134,18 +134,23 @@ def test_operations_of_a_convolution_and_of_trees() -> None:
     import onnx
     from onnx import TensorProto, helper, numpy_helper
 
-    def model(node: Any, *weights: Any, shape: tuple[int, ...], out: tuple[int, ...]) -> bytes:
+    def model(*nodes: Any, weights: Any = (), shape: tuple[int, ...], out: tuple[int, ...]) -> bytes:
         values = (("x", shape), ("y", out))
         x, y = (helper.make_tensor_value_info(n, TensorProto.FLOAT, ["batch", *s]) for n, s in values)
         opsets = [helper.make_opsetid("", 18), helper.make_opsetid("ai.onnx.ml", 3)]
-        graph = helper.make_graph([node], "one", [x], [y], list(weights))
+        graph = helper.make_graph(list(nodes), "one", [x], [y], list(weights))
         made: bytes = onnx.helper.make_model(graph, opset_imports=opsets).SerializeToString()
         return made
 
     kernel = numpy_helper.from_array(np.zeros((5, 2, 3, 3), np.float32), "w")
     node = helper.make_node("Conv", ["x", "w"], ["y"], strides=[2, 2], pads=[1, 1, 1, 1])
     # 5 maps of 4 x 3 places, each 2 x 3 x 3 multiplications and as many additions
-    assert network_operations(model(node, kernel, shape=(2, 8, 6), out=(5, 4, 3))) == 2 * 5 * 4 * 3 * 2 * 9
+    assert network_operations(model(node, weights=[kernel], shape=(2, 8, 6), out=(5, 4, 3))) == 2 * 5 * 4 * 3 * 2 * 9
+    # weights stored in half count no less
+    half = numpy_helper.from_array(np.zeros((5, 2, 3, 3), np.float16), "half")
+    cast = helper.make_node("Cast", ["half"], ["w"], to=TensorProto.FLOAT)
+    stored = model(cast, node, weights=[half], shape=(2, 8, 6), out=(5, 4, 3))
+    assert network_operations(stored) == 2 * 5 * 4 * 3 * 2 * 9
     # one tree, left leaf after one comparison, two right ones after two: 5 / 3 in the mean, and one addition
     tree = helper.make_node(
         "TreeEnsembleRegressor",
