@@ -28,6 +28,7 @@ VALUES = (
     "comb_order",
     "comb_snr_db",
     "rotor_count",
+    "rotor_spread_hz",
     "smearing_index",
     "bandwidth_hz",
     "bandwidth_hz_std",

@@ -1,17 +1,18 @@
 """The comb of a rotor in one record: sought, judged against chance, fitted; or why there is none."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .comb_fit import CombFit, fit_comb
+from .comb_fit import CombFit, fit_combs
 from .comb_search import best_candidate
+from .lines import LineSpace
 from .periodogram import LINE_DB, Periodogram
 
 #: Score that chance alone exceeds in under 1 % of the records: of white noise; where a line was taken out; where the
 #: static background was, with its skirt [nats]. Checked by tests/benchmarks/measurement_tables.py.
-THRESHOLDS = (13.0, 16.0, 25.0)
+THRESHOLDS = (17.0, 17.5, 25.0)
 
 #: A rotor's lines reach at least so far from the body [m/s]; wings, limbs and wheels seldom do with so few lines.
 LEAST_REACH_MPS = 12.0
@@ -22,10 +23,17 @@ LEAST_LINES = 4
 #: A comb whose lines all lie on multiples of the mains is taken for the supply's, this near to them, relative.
 MAINS_HZ = (50.0, 60.0)
 MAINS_MULTIPLES = (1, 2, 3, 4, 6)
-MAINS_SHARE = 0.005
+MAINS_SHARE = 0.0055
+
+#: Beside a static background a comb of less evidence [nats] is not believed at such a spacing, wherever its centre is:
+#: supplies click.
+MAINS_SCORE = 70.0
 
 #: Every k-th line stronger than the others by this factor in power: unequal blades, k to a turn.
 UNEQUAL_FACTOR = 4.0
+
+#: And so much must speak for two kinds of lines [nats]: near the noise every other one is strong by chance.
+UNEQUAL_NATS = 8.0
 
 
 @dataclass(frozen=True)
@@ -36,11 +44,17 @@ class Comb:
     ----------
     fit : CombFit
         All its lines, weak ones between the strong included.
+    rest : ndarray of complex128, shape (pulses,)
+        Samples that its lines leave.
+    last : int
+        Outermost order that speaks for it.
     per_turn : int
         Strong lines are this many spacings apart: 1 for equal blades (or a lone one), else the number of blades.
     """
 
     fit: CombFit
+    rest: NDArray[np.complex128]
+    last: int
     per_turn: int
 
     @property
@@ -70,20 +84,23 @@ def strong_multiple(orders: NDArray[np.intp], power: NDArray[np.float64]) -> int
         # the outermost lines are edges; four of each kind tell them apart
         if strong.sum() < 4 or (~strong).sum() < 4:
             continue
-        ratio = max(power[strong].mean() - 1, 0) / max(power[~strong].mean() - 1, 0.1)
-        if ratio > factor:
+        means = np.maximum([power[strong].mean(), power[~strong].mean()], 1e-9)
+        ratio = max(means[0] - 1, 0) / max(means[1] - 1, 0.1)
+        # log likelihood ratio of two means of exponentials against one
+        nats = len(power) * np.log(power.mean()) - strong.sum() * np.log(means[0]) - (~strong).sum() * np.log(means[1])
+        if ratio > factor and nats > UNEQUAL_NATS:
             best, factor = multiple, ratio
     return best
 
 
-def of_mains(fit: CombFit, data: Periodogram) -> bool:
-    """True where spacing and centre of a comb are both multiples of the mains, and with them every line."""
+def of_mains(fit: CombFit, data: Periodogram, score: float) -> bool:
+    """True where spacing and centre of a comb are both multiples of the mains, or a weak comb's spacing is."""
     for mains_hz in MAINS_HZ:
         multiple = round(fit.spacing * data.prf_hz / mains_hz)
         if multiple in MAINS_MULTIPLES and abs(fit.spacing * data.prf_hz / (multiple * mains_hz) - 1) < MAINS_SHARE:
             base = fit.spacing / multiple
             off = abs(fit.centre - base * round(fit.centre / base)) * data.pulses
-            return off < max(0.2, 3 * fit.centre_std * data.pulses)
+            return (data.rest_half > 0 and score < MAINS_SCORE) or off < max(0.2, 3 * fit.centre_std * data.pulses)
     return False
 
 
@@ -114,15 +131,17 @@ def find_comb(data: Periodogram) -> tuple[Comb | None, str]:
         return None, "dwell too short: no chopping frequency could be told from its neighbours"
     if start.score < threshold(data):
         return None, f"no comb: evidence {start.score:.1f} below {threshold(data):.0f} nats"
-    fit = fit_comb(data, start)
-    if fit is None or len(fit.orders) < LEAST_LINES:
+    fitted = fit_combs(data, start.centre, [start.spacing], [(start.low, start.high)])
+    if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
         return None, f"no comb: fewer than {LEAST_LINES} lines"
+    fit = fitted[0][0]
     reach_mps = max(start.high, -start.low) * fit.spacing * data.prf_hz * data.wavelength_m / 2
     if reach_mps < LEAST_REACH_MPS:
         return None, f"no rotor: lines reach {reach_mps:.1f} m/s, rotors {LEAST_REACH_MPS:.0f} m/s and more"
-    if of_mains(fit, data):
+    if of_mains(fit, data, start.score):
         return None, f"no rotor: lines every {fit.spacing * data.prf_hz:.1f} Hz may be the mains"
+    seen = fit.amplitudes + LineSpace(fitted[1]).at(fit.frequencies)[0]
+    power = np.abs(seen) ** 2 * data.pulses / data.level_of(fitted[1])(fit.frequencies)
     within = (fit.orders >= start.low) & (fit.orders <= start.high)
-    fit = replace(fit, orders=fit.orders[within], amplitudes=fit.amplitudes[within], snr=fit.snr[within])
-    power = np.abs(fit.amplitudes) ** 2 * data.pulses / data.level_at(fit.centre + fit.spacing * fit.orders)
-    return Comb(fit, strong_multiple(fit.orders, power)), ""
+    per_turn = strong_multiple(fit.orders[within], power[within])
+    return Comb(fit, fitted[1], max(start.high, -start.low), per_turn), ""

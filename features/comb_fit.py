@@ -1,24 +1,33 @@
-"""A comb fitted line by line: spacing and centre below the bin, with the variance the bound gives."""
+"""Combs fitted line by line, several at once: spacings and centre below the bin, with the variance the bound gives."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .comb_search import Candidate
+from .lines import line_products, sum_of_lines
 from .periodogram import Periodogram
+from .slow_lines import remove_bands, without_bands
 
-#: Gauss-Newton steps; the error of the start falls by an order of magnitude at each.
-STEPS = 5
+#: Gauss-Newton steps at most, and the step below which they end, in standard deviations.
+STEPS = 8
+ENOUGH = 0.02
 
 #: Orders to each side over which line powers are averaged to weigh the lines.
 SMOOTHED_ORDERS = 2
 
+#: Added to one over the lines' snr: a line that lies half in a band taken out has little left to be fitted by.
+LEAST_RIDGE = 1e-6
+
+#: Added besides where that is not enough.
+NOTCH_RIDGE = 1e-2
+
+#: Well above this snr a line's amplitude is not held back: what that leaves of it would pull at its neighbours.
+CLEAR_SNR = 30.0
+
 #: Lines beyond the outermost that speak for the comb, fitted with it: what they hold must not leak into the others.
 MARGIN_ORDERS = 3
-
-#: The level under the lines is not taken to be below this share of the record's floor: the fit takes noise out too.
-LEAST_LEVEL = 0.8
 
 
 @dataclass(frozen=True)
@@ -34,11 +43,9 @@ class CombFit:
     orders : ndarray of int, shape (lines,)
         Orders of the lines that take part.
     amplitudes : ndarray of complex128, shape (lines,)
-        Their amplitudes, least squares, in units of the noise's rms a sample.
+        Their amplitudes, held back as far as noise makes them, in units of the noise's rms a sample.
     snr : ndarray of float64, shape (lines,)
         Power of each line over the local noise of a bin, smoothed over neighbouring orders [1].
-    score : float
-        Log likelihood ratio of the search [nats].
     """
 
     spacing: float
@@ -48,102 +55,120 @@ class CombFit:
     orders: NDArray[np.intp]
     amplitudes: NDArray[np.complex128]
     snr: NDArray[np.float64]
-    score: float
+
+    @property
+    def frequencies(self) -> NDArray[np.float64]:
+        """Where its lines are [cycles a sample]."""
+        return np.asarray(self.centre + self.spacing * self.orders, np.float64)
 
 
-def line_matrix(pulses: int, centre: float, spacing: float, orders: NDArray[np.intp]) -> NDArray[np.complex128]:
-    """Unit lines, shape (lines, pulses), with time counted from the middle of the record."""
-    time = np.arange(pulses) - (pulses - 1) / 2
-    step = np.exp(2j * np.pi * spacing * time)
-    out = np.empty((len(orders), pulses), np.complex128)
-    for row, order in enumerate(orders):
-        if row and order == orders[row - 1] + 1:
-            np.multiply(out[row - 1], step, out=out[row])
-        else:
-            out[row] = np.exp(2j * np.pi * (centre + order * spacing) * time)
-    return out
+def fit_combs(
+    data: Periodogram,
+    centre: float,
+    spacings: Sequence[float],
+    reaches: Sequence[tuple[int, int]],
+    steps: int = STEPS,
+) -> tuple[list[CombFit], NDArray[np.complex128]] | None:
+    """Refine combs about one centre, jointly, by Gauss-Newton steps on the frequencies of their lines.
 
-
-def dirichlet(frequencies: NDArray[np.floating], pulses: int) -> NDArray[np.float64]:
-    """Inner products of unit lines over the record's length, shape (lines, lines)."""
-    difference = frequencies[:, None] - frequencies[None, :]
-    below = pulses * np.sin(np.pi * difference)
-    safe = np.where(np.abs(below) < 1e-9, 1.0, below)
-    return np.where(np.abs(below) < 1e-9, 1.0, np.sin(np.pi * pulses * difference) / safe)
-
-
-def smoothed(power: NDArray[np.float64], orders: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Mean of values over orders near each, itself included."""
-    near = np.abs(orders[:, None] - orders[None, :]) <= SMOOTHED_ORDERS
-    return (near @ power) / near.sum(axis=1)
-
-
-def fit_comb(data: Periodogram, start: Candidate) -> CombFit | None:
-    """Refine a candidate by Gauss-Newton steps on the frequencies of its lines.
-
-    The lines are fitted jointly, so that no line leaks into its neighbours' frequencies. Each line's frequency error is
-    read off its phase slope; a weighted regression on the order gives the steps of the centre and the spacing.
-
-    The stated variance is the Cramer-Rao bound for unknown body frequency with each line's snr replaced by
-    snr^2 / (1 + snr): near the noise a line's own phase is uncertain too.
+    Lines are complex Gaussian amplitudes of the power seen about them, in noise; given the frequencies their means are
+    a linear estimate, so that no line leaks into its neighbours. The steps and the variances come from the Fisher
+    matrix of centre and spacings with the amplitudes eliminated, at the estimated amplitudes: for one comb the
+    Cramer-Rao bound for unknown body frequency, with each line's snr replaced by snr^2 / (1 + snr).
 
     Parameters
     ----------
     data : Periodogram
         The record.
-    start : Candidate
-        From the search.
+    centre : float
+        Start of the centre [cycles a sample].
+    spacings : sequence of float
+        Starts of the spacings [cycles a sample].
+    reaches : sequence of (int, int)
+        Outermost orders of each, low <= 0 <= high.
+    steps : int
+        Steps at most, >= 1.
 
     Returns
     -------
-    CombFit or None
-        None where fewer than three usable lines are left.
+    (list of CombFit, ndarray of complex128 of shape (pulses,)) or None
+        A fit for each spacing and the samples that the lines leave. None where a comb has fewer than three usable
+        lines.
     """
-    widest = int(0.49 / start.spacing)
-    orders = np.arange(max(start.low - MARGIN_ORDERS, -widest), min(start.high + MARGIN_ORDERS, widest) + 1)
-    frequency = start.centre + start.spacing * orders
-    orders = orders[~data.removed(frequency)]
-    used = data.usable(start.centre + start.spacing * orders)
-    if used.sum() < 3:
-        return None
+    from scipy.linalg import cho_factor, cho_solve  # here, because predicting needs no such import
+
     pulses = data.pulses
-    time = np.arange(pulses) - (pulses - 1) / 2
-    moment = (pulses**2 - 1) / 12
-    centre, spacing = start.centre, start.spacing
-    information = np.zeros((2, 2))
-    rest = data.samples
-    for number in range(STEPS):
-        frequency = centre + spacing * orders
-        lines = line_matrix(pulses, centre, spacing, orders)
-        # what the lines leak lifts the level between them: once they are fitted, it is taken from what they leave
-        level = data.level_at(frequency) if number == 0 else np.maximum(data.level_of(rest)(frequency), LEAST_LEVEL)
-        seen = lines.conj() @ data.samples / pulses
-        power = np.abs(seen) ** 2 * pulses / level
-        snr = np.maximum(smoothed(power, orders) - 1, 1e-3)
-        gram = dirichlet(frequency, pulses) + np.diag(1 / snr)
-        amplitudes = np.asarray(np.linalg.solve(gram, seen), np.complex128)
-        rest = data.samples - amplitudes @ lines
-        slope = (lines.conj() @ (time * rest)) / pulses
-        # each line's own frequency error, times its weight: Im(conj(a) slope) = |a|^2 moment x 2 pi error
-        pull = (amplitudes.conj() * slope).imag / level * pulses
-        pull = np.where(used, pull, 0.0)
-        weight = np.where(used, np.abs(amplitudes) ** 2 / level * pulses * moment, 0.0)
-        design = np.stack([np.ones(len(orders)), orders])
-        normal = (design * weight) @ design.T
-        step = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(2), design @ pull) / (2 * np.pi)
-        limit = 0.5 / pulses / max(1, np.abs(orders).max())
-        spacing += float(np.clip(step[1], -limit, limit))
-        centre += float(np.clip(step[0], -0.5 / pulses, 0.5 / pulses))
-        effective = np.where(used, snr**2 / (1 + snr), 0.0)
-        information = np.asarray((design * (2 * (2 * np.pi) ** 2 * effective * moment)) @ design.T, np.float64)
-    covariance = np.linalg.inv(information)
-    return CombFit(
-        spacing,
-        centre,
-        float(np.sqrt(covariance[1, 1])),
-        float(np.sqrt(covariance[0, 0])),
-        orders[used],
-        amplitudes[used],
-        snr[used],
-        start.score,
-    )
+    which, orders = [], []
+    for number, (spacing, (low, high)) in enumerate(zip(spacings, reaches, strict=True)):
+        widest = int(0.49 / spacing)
+        own = np.arange(max(low - MARGIN_ORDERS, -widest), min(high + MARGIN_ORDERS, widest) + 1)
+        own = own[~data.removed(centre + spacing * own)]
+        orders.append(own)
+        which.append(np.full(len(own), number))
+    count = len(orders)
+    comb, order = np.concatenate(which), np.concatenate(orders)
+    values = np.array([centre, *spacings])
+    used = data.usable(centre + values[1 + comb] * order)
+    if min(np.bincount(comb, used, count)) < 3:
+        return None
+    # change of each line's frequency with the centre and the spacings
+    design = np.zeros((len(order), 1 + count))
+    design[:, 0] = 1.0
+    design[np.arange(len(order)), 1 + comb] = order
+    near = (comb[:, None] == comb) & (np.abs(order[:, None] - order) <= SMOOTHED_ORDERS)
+    share = near / near.sum(axis=1, keepdims=True)
+    limit = np.concatenate([[0.5], 0.5 / np.array([max(1, np.abs(own).max()) for own in orders])]) / pulses
+    level = data.level_at(centre + values[1 + comb] * order)
+    relevelled = False
+    for number in range(steps):
+        frequency = values[0] + values[1 + comb] * order
+        seen, moment = data.lines.at(frequency)
+        plain, first, second = products = line_products(frequency, pulses)
+        without_bands(products, frequency, pulses, data.bands)
+        if number == 0:
+            snr = np.maximum(share @ (np.abs(seen) ** 2 * pulses / level) - 1, 1e-3)
+        held_back = 1 / (snr * (1 + (snr / CLEAR_SNR) ** 2)) + LEAST_RIDGE
+        try:
+            factor = cho_factor(plain + np.diag(held_back))
+        except np.linalg.LinAlgError:  # what is tabulated of the notch is a little off where nearly all was taken out
+            factor = cho_factor(plain + np.diag(held_back + NOTCH_RIDGE))
+        amplitudes = cho_solve(factor, seen)
+        left = seen - plain @ amplitudes
+        snr = np.maximum(share @ (np.abs(amplitudes + left) ** 2 * pulses / level) - 1, 1e-3)
+        slope = moment - 1j * (first.T @ amplitudes)
+        weighed = np.where(used, amplitudes, 0.0) / np.sqrt(level)
+        # the score of each line's frequency, and the Fisher matrix of centre and spacings
+        pull = (weighed.conj() * slope).imag / np.sqrt(level) * (4 * np.pi * pulses)
+        sway = weighed[:, None] * design
+        leaked = first @ sway
+        fisher = (sway.conj().T @ (second @ sway) - leaked.conj().T @ cho_solve(factor, leaked)).real
+        fisher *= 8 * np.pi**2 * pulses
+        fisher[np.diag_indices_from(fisher)] *= 1 + 1e-9
+        step = np.linalg.solve(fisher, design.T @ pull)
+        step = np.clip(step, -limit, limit)
+        if np.all(step**2 * np.diag(fisher) < ENOUGH**2):
+            if relevelled or steps == 1:
+                break
+            # what the lines leak lifts the level between them: once they are fitted, it is taken from what they leave
+            rest = remove_bands(data.samples - sum_of_lines(pulses, frequency, amplitudes), data.bands)
+            level = data.level_of(rest)(frequency)
+            relevelled = True
+        values = values + step
+    covariance = np.linalg.inv(fisher)
+    std = np.sqrt(np.maximum(np.diag(covariance), 0))
+    rest = remove_bands(data.samples - sum_of_lines(pulses, frequency, amplitudes), data.bands)
+    out = []
+    for number in range(count):
+        own = (comb == number) & used
+        out.append(
+            CombFit(
+                float(values[1 + number]),
+                float(values[0]),
+                float(std[1 + number]),
+                float(std[0]),
+                order[own],
+                amplitudes[own],
+                snr[own],
+            )
+        )
+    return out, rest

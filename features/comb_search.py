@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .chopping import CHOPPING_RANGE_HZ
-from .periodogram import BLOCK_BINS, NEIGHBOUR_SHARE, Periodogram
+from .flashes import flash_evidence
+from .periodogram import BLOCK_BINS, LINE_DB, NEIGHBOUR_SHARE, Periodogram
 
 #: Lines nearer than this are not told apart [bins].
 MIN_SPACING_BINS = 3.0
@@ -33,11 +34,18 @@ LINE_CAP = 5.0
 #: What a comb whose sides reach unequally far must have more [nats].
 UNEVEN_COST = 4.0
 
-#: A comb counted from a stronger line a whole number of spacings away must keep this share of the evidence.
-SAME_COMB_SHARE = 0.6
+#: What speaks for the comb's centre where a strong line is [nats], and more for each dB.
+STRONG_LINE = 10.0
+STRONG_LINE_DB = 1.0
 
-#: Fine steps to each side of a coarse spacing.
-FINE_STEPS = 8
+#: What is at rest may be the background: its level counts up to so much over that of the strongest line that moves.
+REST_DB = 15.0
+
+#: Steps to each side of a coarse spacing, of one bin at the PRF; then finer ones about the best families.
+COARSE_STEPS = 4
+FAMILIES = 8
+FINE_STEPS = 4
+CENTRE_SHIFTS = (-0.3, 0.0, 0.3)
 
 
 @dataclass(frozen=True)
@@ -48,19 +56,19 @@ class Candidate:
     ----------
     spacing : float
         Chopping frequency [cycles a sample].
-    score : float
-        Log likelihood ratio against noise [nats].
-    low, high : int
-        Outermost orders that speak for it, low <= 0 <= high.
     centre : float
         The line about which the orders count [cycles a sample].
+    low, high : int
+        Outermost orders that speak for it, low <= 0 <= high.
+    score : float
+        Log likelihood ratio against noise [nats].
     """
 
     spacing: float
-    score: float
+    centre: float
     low: int
     high: int
-    centre: float
+    score: float
 
 
 @dataclass(frozen=True)
@@ -179,45 +187,80 @@ def _apart(periods: NDArray[np.float64], sums: NDArray[np.float64], least: float
 
 
 def score(
-    data: Periodogram, evidence: NDArray[np.float32], spacings: NDArray[np.float64], centre: float
-) -> list[Candidate]:
-    """Score spacings by their lines, each side of the centre out to where its lines stop.
+    evidence: NDArray[np.float32],
+    spacings: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    *,
+    even: bool = False,
+) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
+    """Score combs by their lines, each side of the centre out to where its lines stop.
 
     Parameters
     ----------
-    data : Periodogram
-        The record.
-    evidence : ndarray of float32, shape (line SNRs, bins)
-        From `line_evidence`; 0 where a line cannot be seen.
-    spacings : ndarray, shape (candidates,)
+    evidence : ndarray of float32, shape (bins, line SNRs)
+        From `line_evidence`, 0 where a line cannot be seen.
+    spacings, centres : ndarray, shape (candidates,)
         [cycles a sample].
-    centre : float
-        The comb's centre [cycles a sample].
+    even : bool
+        True where both sides must reach equally far.
+
+    Returns
+    -------
+    score : ndarray of float64, shape (candidates,)
+        [nats]
+    low, high : ndarray of int, shape (candidates,)
+        Outermost orders.
     """
-    size = evidence.shape[-1]
-    rows = np.arange(len(evidence))
-    out = []
-    for spacing in spacings:
-        order = np.arange(1, int(0.5 / spacing) + 1)
-        sides = [
-            np.cumsum(evidence[:, np.rint((centre + sign * spacing * order) * size).astype(np.intp) % size], axis=1)
-            for sign in (-1, 1)
-        ]
+    size = len(evidence)
+    best = np.zeros(len(spacings))
+    reach = np.zeros((2, len(spacings)), np.intp)
+    widest = (0.5 / spacings).astype(np.intp)
+    octave = np.floor(2 * np.log2(widest)).astype(np.intp)  # combs of about as many lines are summed together
+    for group in np.unique(octave):
+        rows = np.flatnonzero(octave == group)
+        order = np.arange(1, widest[rows].max() + 1)
+        beyond = order > widest[rows][:, None]
+        sides = []
+        for sign in (-1, 1):
+            place = (centres[rows][:, None] + sign * spacings[rows][:, None] * order) * size
+            seen = evidence[np.rint(place).astype(np.intp) % size]
+            seen[beyond] = 0.0
+            sides.append(np.cumsum(seen, axis=1))
         # a rotor's lines reach equally far to both sides; other reaches cost as much as the choice of two ends gives
-        even = sides[0] + sides[1]
-        last = even.argmax(axis=1)
-        best = np.maximum(even[rows, last], 0)
-        reach = [last + 1, last + 1]
-        apart = [side.argmax(axis=1) for side in sides]
-        heights = [np.maximum(side[rows, end], 0) for side, end in zip(sides, apart, strict=True)]
-        uneven = heights[0] + heights[1] - UNEVEN_COST
-        better = uneven > best
-        best = np.where(better, uneven, best)
-        for number in (0, 1):
-            reach[number] = np.where(better, np.where(heights[number] > 0, apart[number] + 1, 0), reach[number])
-        row = int(best.argmax())
-        out.append(Candidate(float(spacing), float(best[row]), -int(reach[0][row]), int(reach[1][row]), centre))
-    return out
+        both = sides[0] + sides[1]
+        last = both.argmax(axis=1)  # (rows, line SNRs)
+        equal = np.maximum(np.take_along_axis(both, last[:, None], 1)[:, 0], 0)
+        apart = np.stack([side.argmax(axis=1) for side in sides])
+        heights = np.stack(
+            [
+                np.maximum(np.take_along_axis(side, end[:, None], 1)[:, 0], 0)
+                for side, end in zip(sides, apart, strict=True)
+            ]
+        )
+        uneven = heights.sum(axis=0) - (np.inf if even else UNEVEN_COST)
+        total = np.maximum(equal, uneven)
+        column = total.argmax(axis=1)
+        at = np.arange(len(rows)), column
+        best[rows] = total[at]
+        ends = np.where(uneven > equal, np.where(heights > 0, apart + 1, 0), last + 1)
+        reach[:, rows] = ends[:, *at]
+    return best, -reach[0], reach[1]
+
+
+def _families(
+    spacings: NDArray[np.float64], scores: NDArray[np.float64], centres: NDArray[np.float64], pulses: int
+) -> list[int]:
+    """The best of each family of neighbouring spacings about one centre, best family first."""
+    taken: list[int] = []
+    for index in np.argsort(-scores)[:400]:
+        if all(
+            abs(spacings[index] / spacings[other] - 1) > 6 / pulses or abs(centres[index] - centres[other]) * pulses > 2
+            for other in taken
+        ):
+            taken.append(int(index))
+            if len(taken) == FAMILIES:
+                break
+    return taken
 
 
 def best_candidate(data: Periodogram) -> Candidate | None:
@@ -228,30 +271,77 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     evidence = line_evidence(data.power, int(BLOCK_BINS * len(data.power) / data.pulses))
     bins = np.arange(len(data.power)) / len(data.power)
     evidence[:, ~data.usable(bins)] = 0.0
-    factors = 1 + 0.5 / data.pulses * np.arange(-FINE_STEPS, FINE_STEPS + 1)
-    found: list[Candidate] = []
-    for centre in data.centres:
-        coarse = coarse_spacings(data, evidence, centre)
-        found += score(data, evidence, (coarse[:, None] * factors).ravel(), centre)
+    tried = [(coarse_spacings(data, evidence, centre), centre) for centre in data.centres]
     if data.rest_half > 0:
         for spacing, centre in free_spacings(data, evidence):
             if abs(centre) < data.rest_half:
                 octaves = spacing * np.array(OCTAVES)
                 octaves = octaves[(octaves >= low) & (octaves <= high)]
-                for shift in np.arange(-1, 2) * 0.3 / data.pulses:
-                    found += score(data, evidence, (octaves[:, None] * factors[::2]).ravel(), centre + shift)
-    best = max(found, key=lambda c: c.score, default=None)
-    if best is None:
+                tried.append((octaves, centre))
+    factors = 1 + np.arange(-COARSE_STEPS, COARSE_STEPS + 1) / data.pulses
+    spacings = np.concatenate([np.outer(s, factors).ravel() for s, _ in tried])
+    centres = np.concatenate([np.full(len(s) * len(factors), c) for s, c in tried])
+    columns = np.ascontiguousarray(evidence.T)
+    scores, _, _ = score(columns, spacings, centres)
+    if not len(scores):
         return None
-    # any line of a comb may pass for its centre: of lines a whole number of spacings apart the strongest is the body's
-    for centre in data.centres:
-        if centre == best.centre:
-            break
-        orders = (centre - best.centre) / best.spacing
-        if abs(orders - round(orders)) * best.spacing * data.pulses > 1.5:
-            continue
-        same = [c for c in found if c.centre == centre and abs(c.spacing / best.spacing - 1) < 0.01]
-        other = max(same, key=lambda c: c.score, default=best)
-        if other.score > SAME_COMB_SHARE * best.score:
-            return other
+    chosen = _families(spacings, scores, centres, data.pulses)
+    fine = 1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * data.pulses)
+    # a line's frequency is known to a hundredth of a bin; the phase of a correlation tells less
+    shifts = [(0.0,) if centres[i] in data.centres else CENTRE_SHIFTS for i in chosen]
+    family = np.repeat(np.arange(len(chosen)), [len(fine) * len(s) for s in shifts])
+    centres = np.concatenate(
+        [np.repeat(centres[i] + np.array(s) / data.pulses, len(fine)) for i, s in zip(chosen, shifts, strict=True)]
+    )
+    spacings = np.concatenate([np.tile(spacings[i] * fine, len(s)) for i, s in zip(chosen, shifts, strict=True)])
+    scores, lows, highs = score(columns, spacings, centres)
+    found = []
+    for number in range(len(chosen)):
+        index = int(np.where(family == number, scores, -np.inf).argmax())
+        place = (float(spacings[index]), float(centres[index]), int(lows[index]), int(highs[index]))
+        flash = flash_evidence(data, *place)
+        # flashes must not make a comb of what hardly is one: they speak for as much as the lines' powers do
+        found.append(Candidate(*place, float(scores[index]) + min(flash, float(scores[index]))))
+    return _centred(data, columns, max(found, key=lambda c: c.score))
+
+
+def _centred(data: Periodogram, columns: NDArray[np.float32], found: Candidate) -> Candidate:
+    """The same comb, counted from the line that is most likely the body's.
+
+    Any line of a comb may pass for its centre. A rotor's lines reach equally far to both sides of the body, and the
+    body's own line is strong.
+    """
+    pulses = data.pulses
+    middle = found.centre + found.spacing * round((found.high + found.low) / 2)
+    options = [(found.centre, 0.0), (middle, 0.0)]
+    moving = max(
+        (db for c, db in zip(data.centres, data.centres_db, strict=True) if abs(c) > data.rest_half), default=99.0
+    )
+    for centre, level_db in zip(data.centres, data.centres_db, strict=True):
+        shown_db = level_db if abs(centre) > data.rest_half else min(level_db, moving + REST_DB)
+        orders = (centre - found.centre) / found.spacing
+        # several rotors' spacings differ: the further off, the less one comb for them all tells where a line must be
+        off = (orders - round(orders)) * found.spacing * pulses / (1 + 0.2 * abs(orders))
+        if abs(off) < 1.5 and level_db > LINE_DB:
+            options.append((centre, STRONG_LINE + STRONG_LINE_DB * (shown_db - LINE_DB) - 16 * off**2))
+    best, most = found, -np.inf
+    steps = found.spacing * (1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * pulses))
+    for centre, bonus in dict(options).items():
+        # one comb for several rotors may pass a little beside the body's line: either place will do
+        beside = found.centre + found.spacing * round((centre - found.centre) / found.spacing)
+        heights, _, _ = score(columns, np.tile(steps, 2), np.repeat([centre, beside], len(steps)), even=True)
+        index = int(heights.argmax())
+        if heights[index] + bonus > most:
+            most = heights[index] + bonus
+            if centre == found.centre:
+                best = found
+            else:
+                shift = round((centre - found.centre) / found.spacing)
+                best = Candidate(
+                    float(steps[index % len(steps)]),
+                    centre,
+                    min(found.low - shift, 0),
+                    max(found.high - shift, 0),
+                    found.score,
+                )
     return best

@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .comb import Comb
-from .comb_fit import LEAST_LEVEL, MARGIN_ORDERS, CombFit, dirichlet, fit_comb, line_matrix, smoothed
+from .comb_fit import MARGIN_ORDERS, CombFit, fit_combs
 from .comb_search import FINE_STEPS, Candidate, line_evidence, score, spacing_limits
-from .periodogram import BLOCK_BINS, Periodogram, local_level
+from .lines import sum_of_lines
+from .periodogram import BLOCK_BINS, LEAST_LEVEL, Periodogram, local_level
 from .rotors import Rotors, separate_rotors
+from .slow_lines import remove_bands
 
 #: Ratio of tail to main chopping frequency: 4.73 in the paper, 4 to 6 in general, and some room.
 GEAR_RANGE = (2.5, 9.0)
@@ -34,18 +36,11 @@ FRACTION_SHARE = 0.12
 #: Places this near to a line of the first comb do not count [bins].
 SHADOW_BINS = 1.3
 
-#: Lines of the two combs nearer than this tell no frequency [bins]; Gauss-Newton steps of both combs together.
+#: Lines of the two combs nearer than this are one [bins].
 MEETING_BINS = 1.5
-JOINT_STEPS = 4
-
-#: Keeps the amplitudes of lines that meet finite, as a share of a line's power.
-LEAST_RIDGE = 1e-4
 
 #: Candidates looked at closely.
 CLOSER = 4
-
-#: Rounds in which each comb is fitted with the other taken out.
-ROUNDS = 1
 
 
 @dataclass(frozen=True)
@@ -109,7 +104,7 @@ def find_gear(data: Periodogram, comb: Comb, edge: float) -> tuple[Gear | None, 
         Why there is no second comb; empty where there is one.
     """
     gear, reason = _second_comb(data, comb)
-    rotors = separate_rotors(data if gear is None else gear.alone, comb, edge)
+    rotors = separate_rotors(*((data, comb) if gear is None else (gear.alone, gear.first)), edge)
     if gear is not None and (len(rotors.rates) > 1 or not rotors.resolved):
         gear, reason = None, "no second comb: several rotors of nearly one rate, or of a changing one"
         rotors = separate_rotors(data, comb, edge)
@@ -121,7 +116,7 @@ def _second_comb(data: Periodogram, comb: Comb) -> tuple[Gear | None, str]:
     if comb.fit.spacing * data.pulses < 2 * SHADOW_BINS + 1:
         return None, "dwell too short: a second comb could not be told from the first one's lines"
     comb = _about_body(data, comb)
-    rest, hidden = _left_over(data, comb.fit)
+    rest, hidden = _left_over(data, comb)
     evidence = _evidence(rest, hidden)
     limits = spacing_limits(data.pulses, data.prf_hz)
     best = _loudest(rest, evidence, comb.chopping, comb.fit.centre, limits)
@@ -130,18 +125,22 @@ def _second_comb(data: Periodogram, comb: Comb) -> tuple[Gear | None, str]:
     rival = _rival(rest, evidence, hidden, best)
     if rival > 0:
         return None, f"no second comb: the lines left over repeat every {rival * data.prf_hz:.1f} Hz as well"
-    second = fit_comb(_clear_of(rest, best, comb.fit), best)
-    if second is None:
-        return None, "no second comb: fewer than three lines of it are clear of the first one's"
-    first, second = _together(data, comb.fit, second)
-    gear = Gear(Comb(first, comb.per_turn), second, data.without(_lines(data, second)))
+    orders = comb.fit.orders
+    reach = (min(int(orders.min()) + MARGIN_ORDERS, 0), max(int(orders.max()) - MARGIN_ORDERS, 0))
+    spacings = [comb.fit.spacing, best.spacing]
+    fitted = fit_combs(data, comb.fit.centre, spacings, [reach, (best.low, best.high)])
+    if fitted is None:
+        return None, "no second comb: fewer than three lines of it are usable"
+    (first, second), samples = fitted
+    lines = remove_bands(sum_of_lines(data.pulses, second.frequencies, second.amplitudes), data.bands)
+    gear = Gear(replace(comb, fit=first, rest=samples), second, data.left(data.samples - lines))
     if not GEAR_RANGE[0] <= gear.ratio <= GEAR_RANGE[1]:
         return None, "no second comb: its fit left the range of gear ratios"
     # a whole ratio: every line of the one falls on one of the other, and unequal blades do the same
     (main, _), (tail, _) = gear.rates
     off = abs(gear.ratio - round(gear.ratio)) * main
-    reach = max(-best.low, best.high) * best.spacing
-    if off * reach / tail * data.pulses < MEETING_BINS:
+    outer = max(-best.low, best.high) * best.spacing
+    if off * outer / tail * data.pulses < MEETING_BINS:
         return None, f"no second comb: {gear.ratio:.3f} to 1 is a whole ratio, as of unequal blades"
     return gear, ""
 
@@ -154,97 +153,17 @@ def _about_body(data: Periodogram, comb: Comb) -> Comb:
         if abs(fit.centre + shift * fit.spacing - centre) * data.pulses < 1.0:
             fit = replace(fit, centre=fit.centre + shift * fit.spacing, orders=fit.orders - shift)
             break
-    return Comb(fit, comb.per_turn)
+    return replace(comb, fit=fit)
 
 
-def _together(data: Periodogram, first: CombFit, second: CombFit) -> tuple[CombFit, CombFit]:
-    """Fit both combs at once, about one centre.
-
-    As `fit_comb` does for one: fitted in turn, each keeps what the other holds of lines that nearly meet. Such lines
-    take part in the amplitudes, not in the frequencies.
-    """
-    pulses, fits = data.pulses, (first, second)
-    time = np.arange(pulses) - (pulses - 1) / 2
-    moment = (pulses**2 - 1) / 12
-    centre, spacings = first.centre, np.array([first.spacing, second.spacing])
-    # what the lines past the ends hold must not leak into the others
-    ranges = [np.arange(fit.orders.min() - MARGIN_ORDERS, fit.orders.max() + MARGIN_ORDERS + 1) for fit in fits]
-    ranges = [n[np.abs(n) * fit.spacing < 0.49] for n, fit in zip(ranges, fits, strict=True)]
-    ranges = [n[~data.removed(centre + fit.spacing * n) & (n != 0)] for n, fit in zip(ranges, fits, strict=True)]
-    size = len(ranges[0])
-    # columns: the centre, and each comb's spacing
-    design = np.ones((3, size + len(ranges[1])))
-    design[1:] = 0
-    design[1, :size], design[2, size:] = ranges
-    halves = ((slice(size), ranges[0]), (slice(size, None), ranges[1]))
-    for _ in range(JOINT_STEPS):
-        frequency = centre + spacings @ design[1:]
-        apart = np.abs(frequency[:size, None] - frequency[size:])
-        used = data.usable(frequency)
-        used[:size] &= apart.min(axis=1) * pulses > MEETING_BINS
-        used[size:] &= apart.min(axis=0) * pulses > MEETING_BINS
-        parts = [line_matrix(pulses, centre, s, n) for s, n in zip(spacings, ranges, strict=True)]
-        lines = np.concatenate(parts)
-        seen = lines.conj() @ data.samples / pulses
-        gram = dirichlet(frequency, pulses)
-        # powers by the joint fit too: a weak line beside a strong one holds mostly what that one leaks
-        free = np.linalg.solve(gram + LEAST_RIDGE * np.eye(len(gram)), seen)
-        level = np.maximum(data.level_of(data.samples - free @ lines)(frequency), LEAST_LEVEL)
-        power = np.where(used, np.abs(free) ** 2 * pulses / level, 0.0).astype(np.float64)
-        snr = np.concatenate(
-            [smoothed(power[h], n) / np.maximum(smoothed(used[h].astype(np.float64), n), 1e-9) for h, n in halves]
-        )
-        snr = np.maximum(snr - 1, 1e-3)
-        amplitudes = np.asarray(np.linalg.solve(gram + np.diag(1 / snr), seen), np.complex128)
-        rest = data.samples - amplitudes @ lines
-        slope = (lines.conj() @ (time * rest)) / pulses
-        pull = np.where(used, (amplitudes.conj() * slope).imag / level * pulses, 0.0)
-        weight = np.where(used, np.abs(amplitudes) ** 2 / level * pulses * moment, 0.0)
-        normal = (design * weight) @ design.T
-        step = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(3), design @ pull) / (2 * np.pi)
-        limit = 0.5 / pulses / np.array([1, np.abs(ranges[0]).max(), np.abs(ranges[1]).max()])
-        step = np.clip(step, -limit, limit)
-        centre, spacings = centre + step[0], spacings + step[1:]
-    effective = np.where(used, snr**2 / (1 + snr), 0.0)
-    information = (design * (2 * (2 * np.pi) ** 2 * effective * moment)) @ design.T
-    std = np.sqrt(np.diag(np.linalg.inv(information + 1e-12 * np.trace(information) * np.eye(3))))
-    out = [
-        replace(
-            fit,
-            spacing=float(spacings[number]),
-            centre=float(centre),
-            spacing_std=float(std[1 + number]),
-            centre_std=float(std[0]),
-            orders=orders,
-            amplitudes=amplitudes[half],
-            snr=snr[half],
-        )
-        for number, (fit, (half, orders)) in enumerate(zip(fits, halves, strict=True))
-    ]
-    return out[0], out[1]
-
-
-def _clear_of(rest: Periodogram, mine: Candidate | CombFit, other: CombFit) -> Periodogram:
-    """The record with those of the other comb's places marked that a line of this one falls on."""
-    reach = int(0.5 / other.spacing)
-    places = other.centre + other.spacing * np.arange(-reach, reach + 1)
-    order = (places - mine.centre) / mine.spacing
-    meets = np.abs(order - np.rint(order)) * mine.spacing * rest.pulses < 1.5
-    return replace(rest, blocked=(*rest.blocked, *((float(place), 0.0) for place in places[meets])))
-
-
-def _left_over(data: Periodogram, fit: CombFit) -> tuple[Periodogram, NDArray[np.bool_]]:
+def _left_over(data: Periodogram, comb: Comb) -> tuple[Periodogram, NDArray[np.bool_]]:
     """The record without a comb over its own local level, and the bins hidden: strong lines leaked into the old one."""
-    rest = data.without(_lines(data, fit))
-    hidden = _hidden(rest, fit)
+    rest = data.left(comb.rest)
+    hidden = _hidden(rest, comb.fit)
     power = rest.power * rest.level
     block = int(BLOCK_BINS * len(power) / rest.pulses)
     level = np.maximum(local_level(power, ~hidden, 1.0, block), LEAST_LEVEL)
     return replace(rest, power=power / level, level=level), hidden
-
-
-def _lines(data: Periodogram, fit: CombFit) -> NDArray[np.complex128]:
-    return fit.amplitudes @ line_matrix(data.pulses, fit.centre, fit.spacing, fit.orders)
 
 
 def _hidden(rest: Periodogram, first: CombFit) -> NDArray[np.bool_]:
@@ -320,6 +239,8 @@ def _closest(
     rest: Periodogram, evidence: NDArray[np.float32], spacings: NDArray[np.float64], centre: float
 ) -> Candidate:
     """The best of spacings and of those near them."""
-    factors = 1 + 0.25 / rest.pulses * np.arange(-FINE_STEPS, FINE_STEPS + 1)
-    found = score(rest, evidence, (spacings[:, None] * factors).ravel(), centre)
-    return max(found, key=lambda c: c.score)
+    factors = 1 + 0.25 / rest.pulses * np.arange(-2 * FINE_STEPS, 2 * FINE_STEPS + 1)
+    tried = np.outer(spacings, factors).ravel()
+    heights, lows, highs = score(np.ascontiguousarray(evidence.T), tried, np.full(len(tried), centre))
+    index = int(heights.argmax())
+    return Candidate(float(tried[index]), centre, int(lows[index]), int(highs[index]), float(heights[index]))

@@ -8,7 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 from .bandwidth import threshold_band_hz
 from .chopping import Chopping
 from .comb import LEAST_REACH_MPS, Comb, find_comb
+from .comb_fit import CombFit
 from .helicopter import find_gear
+from .lines import LineSpace
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .periodogram import Periodogram, prepare
 from .rotor_band import fit_edge
@@ -21,6 +23,9 @@ PAPER_THRESHOLD_DB = 20.0
 
 #: Blade counts listed where none is given.
 BLADE_CHOICES = (1, 2, 3, 4, 5)
+
+#: Rates nearer than this at an order [bins] have one line there.
+MERGED_BINS = 1.0
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,8 @@ class Measurements:
         Rotors told apart; NaN without a comb.
     rotors_resolved : ndarray of bool
         False where rates lie nearer than the dwell tells apart: the count is then a lower bound.
+    rotor_spread_hz : ndarray
+        Range of the rotors' chopping frequencies [Hz], also where they are not resolved; 0 where there is one rate.
     smearing_index : ndarray
         Relative spread of the rotor rates from the growth of the line width with the order [1].
     bandwidth_hz, bandwidth_hz_std : ndarray
@@ -79,6 +86,7 @@ class Measurements:
     rotor_rates_hz_std: NDArray[np.float64]
     rotor_count: NDArray[np.float64]
     rotors_resolved: NDArray[np.bool_]
+    rotor_spread_hz: NDArray[np.float64]
     smearing_index: NDArray[np.float64]
     bandwidth_hz: NDArray[np.float64]
     bandwidth_hz_std: NDArray[np.float64]
@@ -206,7 +214,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     comb, out["reason"] = find_comb(data)
     prf_hz, wavelength_m = data.prf_hz, data.wavelength_m
     if comb is not None:
-        edge, edge_std = _edge(data, comb, np.array([comb.chopping]), blades or 2)
+        edge, edge_std = _edge(data, [comb.fit], comb.rest, comb.per_turn, blades or 2)
         edge_mps = edge * prf_hz * wavelength_m / 2
         if edge_mps < LEAST_REACH_MPS:
             comb, out["reason"] = (
@@ -217,7 +225,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     if comb is None:
         return out
     out["chopping_hz"], out["chopping_hz_std"] = comb.chopping * prf_hz, comb.chopping_std * prf_hz
-    out["comb_order"] = float(np.abs(comb.fit.orders).max() // comb.per_turn)
+    out["comb_order"] = float(comb.last // comb.per_turn)
     out["comb_snr_db"] = float(10 * np.log10(max(comb.fit.snr.sum() / data.pulses, 1e-9)))
 
     gear, rotors, out["gear_reason"] = find_gear(data, comb, edge)
@@ -229,12 +237,13 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         out["gear_ratio"], out["gear_ratio_std"] = gear.ratio, gear.ratio_std
     count = len(rotors.rates)
     if count > 1:
-        edge, edge_std = _edge(data, comb, rotors.rates, blades or 2)
+        edge, edge_std = _edge(data, rotors.fits, rotors.rest, 1, blades or 2)
     for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):
         padded = np.full(MAX_ROTORS, np.nan)
         padded[:count] = values * prf_hz
         out[name] = padded
     out["rotor_count"], out["rotors_resolved"] = float(count), rotors.resolved
+    out["rotor_spread_hz"] = rotors.spread * prf_hz
     # unequal blades tell their number; between the lines of several rotors the weak ones may be something else
     seen = comb.per_turn if comb.per_turn > 1 and count == 1 else None
     known = blades if blades is not None else seen
@@ -245,7 +254,8 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     if known is not None:
         rotation = out["chopping_hz"] / known
         out["rotation_hz"], out["rotation_hz_std"] = rotation, out["chopping_hz_std"] / known
-        length = tip / (2 * np.pi * rotation)
+        # the edge is the fastest rotor's
+        length = tip / (2 * np.pi * float(rotors.rates.max()) * prf_hz / known)
         out["blade_length_m"] = length
         out["blade_length_m_std"] = length * float(np.hypot(tip_std / tip, comb.chopping_std / comb.chopping))
 
@@ -277,18 +287,28 @@ def _body(data: Periodogram, comb: Comb | None) -> dict[str, float]:
     return {"body_velocity_mps": -turns * scale, "body_velocity_mps_std": std * scale}
 
 
-def _edge(data: Periodogram, comb: Comb, rates: NDArray[np.float64], blades: int) -> tuple[float, float]:
+def _edge(
+    data: Periodogram, fits: list[CombFit], rest: NDArray[np.complex128], per_turn: int, blades: int
+) -> tuple[float, float]:
     """Edge of the line family and its standard deviation [cycles a sample from the body], both sides together.
 
-    Each line's power is the mean over the single rotors' lines of that order, since they part at the outer orders.
+    Each line's power is what is seen there with all other fitted lines taken out; an order's is the mean over both
+    sides and the single rotors, since their lines part at the outer orders.
     """
-    fastest = float(rates.max())
+    spacings = np.array([fit.spacing * per_turn for fit in fits])
+    fastest = float(spacings.max())
     order = np.arange(1, int(0.49 / fastest) + 1)
-    away, power = [], []
-    for sign in (-1, 1):
-        frequency = comb.fit.centre + sign * order[:, None] * rates
-        usable = data.usable(frequency).all(axis=1)
-        away.append(order[usable] * fastest)
-        power.append(data.at(frequency)[usable].mean(axis=1))
-    distance = np.concatenate(away)
-    return fit_edge(distance, np.concatenate(power), np.full(len(distance), float(len(rates))), fastest / blades)
+    total, number = np.zeros(len(order)), np.zeros(len(order))
+    left, level = LineSpace(rest), data.level_of(rest)
+    for fit, spacing in zip(fits, spacings, strict=True):
+        own = dict(zip(fit.orders.tolist(), fit.amplitudes, strict=True))
+        for sign in (-1, 1):
+            frequency = fit.centre + sign * order * spacing
+            fitted = np.array([own.get(int(sign * per_turn * o), 0.0) for o in order])
+            power = np.abs(left.at(frequency)[0] + fitted) ** 2 * data.pulses / level(frequency)
+            usable = data.usable(frequency)
+            total += np.where(usable, power, 0.0)
+            number += usable
+    # where the single rotors' lines lie in one another they add up: those orders stand too high beside the outer ones
+    seen = (number > 0) & (order * np.ptp(spacings) * data.pulses >= MERGED_BINS * (len(fits) > 1))
+    return fit_edge(order[seen] * fastest, total[seen] / number[seen], number[seen], fastest / blades)

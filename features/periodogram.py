@@ -2,19 +2,25 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from itertools import pairwise
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .notch import NOTCH_MPS, Body, body_line
+from .lines import LineSpace
+from .notch import LOBE_BINS, NOTCH_MPS, Body, body_line
 from .slow_lines import remove_bands
 from .spectrum import NOISE_BANDWIDTH_BINS, Spectrum, doppler_spectrum
 
 #: A line counts as present from this level over the floor [dB]: noise alone reaches it in one of 10 000 spectra.
 LINE_DB = 17.0
+
+#: Noise alone seldom has so strong a bin [dB] in the notch about velocity zero; a background's skirt has.
+SKIRT_DB = 9.0
+
+#: So many bins beside what was taken out the noise is thinner: it would lower the level of its block.
+THINNED_BINS = 4
 
 #: Half width taken out about the body line [m/s]. A body is steadier than the clutter about velocity zero.
 BODY_NOTCH_MPS = 0.5
@@ -26,6 +32,9 @@ PADDING = 4
 #: may fill the rest. What that is of the mean of an exponential stands beside it.
 BLOCK_BINS = 24
 LEVEL_QUANTILE = -np.log(3 / 4)
+
+#: What fitted lines leave is not taken to be below this share of the floor: the fit takes noise out too.
+LEAST_LEVEL = 0.8
 
 #: Lines over the floor by more than this [dB] leak past the plain periodogram: it is then tapered.
 TAPER_FROM_DB = 23.0
@@ -43,12 +52,14 @@ class Periodogram:
     ----------
     samples : ndarray of complex128, shape (pulses,)
         Samples of unit noise power, the strong slow lines taken out, whitening not applied.
-    power : ndarray of float64, shape (PADDING * pulses, about)
-        Power over the local level in FFT order: noise has mean 1.
+    amplitude : ndarray of complex64, shape (PADDING * pulses, about)
+        Amplitude over the root of the local level in FFT order, its phase that in the middle of the record.
+    power : ndarray of float64, same shape
+        Its square: noise has mean 1.
     level : ndarray of float64, same shape
         The local level [noise power a sample].
-    blocked : tuple of (float, float)
-        Centre and half width [cycles a sample] of what was taken out.
+    bands : tuple of (float, float)
+        Centre [cycles a sample] and half width [bins] of what was taken out.
     centres : tuple of float
         Where the body line may be [cycles a sample], strongest first: about these a comb is sought.
     centres_db : tuple of float
@@ -58,13 +69,19 @@ class Periodogram:
     """
 
     samples: NDArray[np.complex128]
+    amplitude: NDArray[np.complex64]
     power: NDArray[np.float64]
     level: NDArray[np.float64]
-    blocked: tuple[tuple[float, float], ...]
+    bands: tuple[tuple[float, float], ...]
     centres: tuple[float, ...]
     centres_db: tuple[float, ...]
     wavelength_m: float
     prf_hz: float
+
+    @property
+    def blocked(self) -> tuple[tuple[float, float], ...]:
+        """Centre and half width [cycles a sample] of what was taken out, with a margin."""
+        return tuple((turn, (half + 2) / self.pulses) for turn, half in self.bands)
 
     @property
     def rest_half(self) -> float:
@@ -75,6 +92,11 @@ class Periodogram:
     def pulses(self) -> int:
         """Pulses of the record."""
         return len(self.samples)
+
+    @cached_property
+    def lines(self) -> LineSpace:
+        """The samples, to be read at any frequency."""
+        return LineSpace(self.samples)
 
     def at(self, frequency: NDArray[np.floating]) -> NDArray[np.float64]:
         """Power over the local level at frequencies [cycles a sample], any shape; aliases are folded."""
@@ -99,27 +121,26 @@ class Periodogram:
         out = np.zeros(np.shape(frequency), bool)
         for centre, half in self.blocked:
             away = frequency - centre
-            out |= np.abs(away - np.rint(away)) < half - 1.0 / self.pulses
+            out |= np.abs(away - np.rint(away)) < half - 3.0 / self.pulses
         return out
 
     def level_of(self, rest: NDArray[np.complex128]) -> Callable[[NDArray[np.floating]], NDArray[np.float64]]:
         """Local level of samples that lines were taken from, as a function of the frequency [cycles a sample]."""
-        power = _power(rest, len(self.power), tapered=False)
-        keep = np.ones(len(power), bool)
-        for centre, half in self.blocked:
-            keep &= ~_within(len(power), centre, half)
-        level = local_level(power, keep, 1.0, int(BLOCK_BINS * len(power) / self.pulses))
-        return lambda frequency: level[np.rint(frequency * len(level)).astype(np.intp) % len(level)]
-
-    def without(self, part: NDArray[np.complex128]) -> "Periodogram":
-        """The same record with a part of its samples subtracted, at the same local level."""
-        samples = self.samples - part
-        power = _power(samples, len(self.power), tapered=False) / self.level
-        for centre, half in self.blocked:
-            power[_within(len(power), centre, half)] = 1.0
-        return Periodogram(
-            samples, power, self.level, self.blocked, self.centres, self.centres_db, self.wavelength_m, self.prf_hz
+        size = len(self.power)
+        power = squared(_spectrum(rest, size, tapered=False))
+        level = local_level(
+            power, _kept(size, self.blocked, THINNED_BINS / self.pulses), 1.0, int(BLOCK_BINS * size / self.pulses)
         )
+        level = np.maximum(level, LEAST_LEVEL)
+        return lambda frequency: level[np.rint(frequency * size).astype(np.intp) % size]
+
+    def left(self, samples: NDArray[np.complex128]) -> "Periodogram":
+        """What is left of the same record, at the same local level."""
+        size = len(self.power)
+        amplitude = (_spectrum(samples, size, tapered=False) / np.sqrt(self.level)).astype(np.complex64)
+        power = squared(amplitude)
+        power[~_kept(size, self.blocked)] = 1.0
+        return replace(self, samples=samples, amplitude=amplitude, power=power)
 
 
 @lru_cache(maxsize=16)
@@ -128,15 +149,34 @@ def _taper(pulses: int) -> NDArray[np.float64]:
     return window / np.sqrt(np.mean(window**2))
 
 
-def _power(samples: NDArray[np.complex128], size: int, *, tapered: bool) -> NDArray[np.float64]:
+@lru_cache(maxsize=16)
+def _middle(pulses: int, size: int) -> NDArray[np.complex64]:
+    """Turns the phases of a spectrum to those in the middle of the record, and norms noise to the power 1."""
+    turn = np.exp(1j * np.pi * (pulses - 1) * fft.fftfreq(size)) / np.sqrt(pulses)
+    return turn.astype(np.complex64)
+
+
+def _spectrum(samples: NDArray[np.complex128], size: int, *, tapered: bool) -> NDArray[np.complex64]:
     shaped = samples * _taper(len(samples)) if tapered else samples
-    lines = fft.fft(shaped.astype(np.complex64), size)
-    return (lines.real.astype(np.float64) ** 2 + lines.imag.astype(np.float64) ** 2) / len(samples)
+    return np.asarray(fft.fft(shaped.astype(np.complex64), size) * _middle(len(samples), size), np.complex64)
+
+
+def squared(amplitude: NDArray[np.complexfloating]) -> NDArray[np.float64]:
+    """Power of amplitudes."""
+    return np.asarray(amplitude.real.astype(np.float64) ** 2 + amplitude.imag.astype(np.float64) ** 2, np.float64)
 
 
 def _within(size: int, centre: float, half: float) -> NDArray[np.bool_]:
     away = np.arange(size) / size - centre
     return np.abs(away - np.rint(away)) <= half
+
+
+def _kept(size: int, blocked: tuple[tuple[float, float], ...], margin: float = 0.0) -> NDArray[np.bool_]:
+    """False in the bins of what was taken out, and so far beside [cycles a sample]."""
+    keep = np.ones(size, bool)
+    for centre, half in blocked:
+        keep &= ~_within(size, centre, half + margin)
+    return keep
 
 
 def local_level(power: NDArray[np.float64], keep: NDArray[np.bool_], floor: float, block: int) -> NDArray[np.float64]:
@@ -155,17 +195,19 @@ def local_level(power: NDArray[np.float64], keep: NDArray[np.bool_], floor: floa
     """
     size = len(power)
     count = max(4, size // block)
-    edges = np.linspace(0, size, count + 1).astype(np.intp)
-    levels = np.full(count, np.nan)
-    for number, (start, stop) in enumerate(pairwise(edges)):
-        part = power[start:stop][keep[start:stop]]
-        if len(part) >= (stop - start) / 3:
-            levels[number] = np.partition(part, len(part) // 4)[len(part) // 4] / LEVEL_QUANTILE
-    known = np.flatnonzero(np.isfinite(levels))
+    length = size // count
+    # the few bins that whole blocks leave over are skipped, evenly
+    starts = (np.arange(count) * size) // count
+    inside = starts[:, None] + np.arange(length)
+    held = np.where(keep[inside], power[inside], np.inf)
+    number = keep[inside].sum(axis=1)
+    held.sort(axis=1)
+    levels = held[np.arange(count), np.minimum(number // 4, length - 1)] / LEVEL_QUANTILE
+    known = np.flatnonzero(number >= length / 3)
     if not len(known):
         return np.full(size, floor)
     levels = np.maximum(levels, 0.1 * floor)
-    middles = (edges[:-1] + edges[1:]) / 2
+    middles = starts + length / 2
     return np.exp(np.interp(np.arange(size), middles[known], np.log(levels[known]), period=size))
 
 
@@ -207,10 +249,19 @@ def _prepare(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram:
     middle = spectrum.bins // 2
     rest_db = float(spectrum.level_db[middle - 1 : middle + 2].max())
     rest_half = half_bins(NOTCH_MPS)
-    if rest_db > LINE_DB:
+    offset = np.abs(spectrum.frequency_hz) * pulses / spectrum.prf_hz
+    skirt = (offset <= rest_half) & (np.abs(np.arange(spectrum.bins) - body.index) > LOBE_BINS + 1)
+    # the only strong line, at rest, without a skirt: a body that hovers, not a background
+    hovers = (
+        abs(turns(body)) * pulses <= rest_half
+        and 2 * rest_half > 3 * LOBE_BINS
+        and float(spectrum.level_db[skirt].max()) < SKIRT_DB
+        and float(spectrum.level_db[offset > rest_half].max()) < LINE_DB
+    )
+    if rest_db > LINE_DB and not hovers:
         bands.append((0.0, rest_half))
         # what stands at rest may be the background; the body is then the strongest line that moves
-        moving = np.abs(spectrum.frequency_hz) * pulses / spectrum.prf_hz > rest_half + 2 * NOISE_BANDWIDTH_BINS
+        moving = offset > rest_half + 2 * NOISE_BANDWIDTH_BINS
         line = body_line(replace(spectrum, relative_power=np.where(moving, spectrum.relative_power, np.float32(0))))
         # the strongest line of all, if it is as slow as that, has its own level
         slow = abs(turns(body)) * pulses <= rest_half
@@ -230,23 +281,22 @@ def _prepare(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram:
     blocked = tuple((turn, (half + 2) / pulses) for turn, half in bands)
 
     size = fft.next_fast_len(PADDING * pulses)
-    power = _power(samples, size, tapered=False)
-    keep = np.ones(size, bool)
-    for middle_turns, half in blocked:
-        keep &= ~_within(size, middle_turns, half)
+    keep, full = _kept(size, blocked), _kept(size, blocked, THINNED_BINS / pulses)
     block = int(BLOCK_BINS * size / pulses)
-    level = local_level(power, keep, 1.0, block)
-    whitened = power / level
-    if whitened[keep].max(initial=0) > 10 ** (TAPER_FROM_DB / 10):
-        power = _power(samples, size, tapered=True)
-        level = local_level(power, keep, 1.0, block)
+    for tapered in (False, True):
+        amplitude = _spectrum(samples, size, tapered=tapered)
+        power = squared(amplitude)
+        level = local_level(power, full, 1.0, block)
         whitened = power / level
+        if whitened[keep].max(initial=0) <= 10 ** (TAPER_FROM_DB / 10):
+            break
     whitened[~keep] = 1.0
     return Periodogram(
         samples,
+        (amplitude / np.sqrt(level)).astype(np.complex64),
         whitened,
         level,
-        blocked,
+        tuple(bands),
         tuple(c for c, _ in centres),
         tuple(level for _, level in centres),
         spectrum.wavelength_m,

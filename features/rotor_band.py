@@ -13,11 +13,11 @@ _REACH = 6.0
 
 
 #: What strong lines leak past the edge, and blades unlike the uniform one put there, as a share of their power.
-LEAK_SHARE = 0.01
+LEAK_SHARE = 0.001
 
 
 #: What the fit is off by where noise is no limit, in spacings: a real blade's roll-off is not the uniform one's.
-MODEL_ERROR_SPACINGS = 0.35
+MODEL_ERROR_SPACINGS = 0.1
 
 
 @lru_cache(maxsize=1)
@@ -82,8 +82,8 @@ def fit_edge(
     """
     spacing = float(np.min(away))
     power = power / (1 + LEAK_SHARE * float(np.quantile(power, 0.9)))
-    levels = np.geomspace(0.3, max(10.0, 2 * float(power.max())), 10)
-    coarse = np.arange(1.5 * spacing, away.max() + spacing, spacing / 2)
+    levels = np.geomspace(0.3, max(10.0, 2 * float(power.max())), 8)
+    coarse = np.arange(1.5 * spacing, away.max() + spacing, spacing)
     best = coarse[_log_likelihood(away, power, bins, rotation, coarse, levels).argmax()]
     fine = best + spacing * np.arange(-3, 3.01, 1 / 16)
     fine = fine[fine > spacing]

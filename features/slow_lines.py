@@ -10,9 +10,13 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
 #: Sequences beyond the time-bandwidth product: what the band leaks past it falls under -100 dB.
 EXTRA_SEQUENCES = 11
+
+#: What lines lose to a band is tabulated in so many steps a bin.
+_HELD_STEPS = 8
 
 
 @lru_cache(maxsize=32)
@@ -53,15 +57,109 @@ def remove_bands(samples: NDArray[np.complex128], bands: Iterable[tuple[float, f
     ndarray of complex128, shape (pulses,)
         What is left; a line more than a few bins off the bands is unchanged.
     """
+    bands = tuple(bands)
     pulses = len(samples)
-    time = np.arange(pulses)
-    blocks = [slepian(pulses, float(half)) * np.exp(2j * np.pi * centre * time) for centre, half in bands]
-    if not blocks:
-        return samples
-    # jointly: taken out one after the other, each band would keep what the first took of the second's strong line
-    gram = np.block([[a.conj() @ b.T if a is not b else np.eye(len(a)) for b in blocks] for a in blocks])
-    basis = np.concatenate(blocks)
-    seen: NDArray[np.complexfloating] = basis.conj() @ samples
-    if len(blocks) > 1:
-        seen = np.linalg.lstsq(gram, seen, rcond=1e-12)[0]
-    return np.asarray(samples - seen @ basis, np.complex128)
+    time = np.arange(pulses) - (pulses - 1) / 2
+    turns = [np.exp(2j * np.pi * centre * time) for centre, _ in bands]
+    bases = [slepian(pulses, float(half)) for _, half in bands]
+    seen = [basis @ (samples * turn.conj()) for basis, turn in zip(bases, turns, strict=True)]
+    if len(bands) > 1:
+        # jointly: taken out one after the other, each band would keep what the first took of the second's strong line
+        factor = np.concatenate([np.where(_odd(basis), 1j, 1) for basis in bases])
+        together = factor * (_gram_inverse(pulses, bands) @ (factor.conj() * np.concatenate(seen)))
+        seen = np.split(together, np.cumsum([len(basis) for basis in bases])[:-1])
+    out = samples
+    for amplitudes, basis, turn in zip(seen, bases, turns, strict=True):
+        out = out - turn * (amplitudes @ basis)
+    return np.asarray(out, np.complex128)
+
+
+def _odd(basis: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """True for the sequences that change sign in the middle."""
+    return np.asarray((basis * basis[:, ::-1]).sum(axis=1) < 0)
+
+
+@lru_cache(maxsize=4)
+def _held(pulses: int, half_bins: float) -> NDArray[np.float32]:
+    """Unit lines, and those times time, seen by the sequences, even and odd ones both real.
+
+    Shape (2, sequences, steps); steps of 1 / (`_HELD_STEPS` x pulses) cycles a sample from -1/2 to 1/2 and some over.
+    """
+    size = _HELD_STEPS * pulses
+    place = np.arange(-(size // 2) - 4, size // 2 + 4)
+    basis = slepian(pulses, half_bins)
+    time = np.arange(pulses) - (pulses - 1) / 2
+    turn = (np.exp(1j * np.pi * (pulses - 1) / size * place) / np.sqrt(pulses)).astype(np.complex64)
+    plain, timed = (fft.fft(v.astype(np.complex64), size)[:, place % size] * turn for v in (basis, basis * time))
+    odd = _odd(basis)[:, None]
+    out = np.stack([np.where(odd, -plain.imag, plain.real), np.where(odd, timed.real, timed.imag)])
+    out.setflags(write=False)
+    return out
+
+
+def without_bands(
+    products: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    frequency: NDArray[np.floating],
+    pulses: int,
+    bands: tuple[tuple[float, float], ...],
+) -> None:
+    """Take from the products of unit lines, in place, what `remove_bands` takes from the lines.
+
+    A line some bins off a band loses a little of its middle. The fit of lines to what is left must know it, or it takes
+    the loss for a change of frequency.
+
+    Parameters
+    ----------
+    products : tuple of ndarray, shape (lines, lines) each
+        From `lines.line_products`.
+    frequency : ndarray, shape (lines,)
+        [cycles a sample].
+    pulses : int
+        Pulses of the record.
+    bands : tuple of (float, float)
+        Centre [cycles a sample] and half width [bins] of each band.
+    """
+    plains, timeds = [], []
+    nodes = np.arange(-2, 4)
+    for centre, half in bands:
+        table = _held(pulses, float(half))
+        away = frequency - centre
+        turns = np.rint(away)
+        place = (away - turns) * (pulses * _HELD_STEPS) + table.shape[-1] // 2
+        first = np.floor(place).astype(np.intp)
+        # the polynomial through six points; time counts from the middle, half a sample off where the pulses are even
+        sign = 1 - 2 * (turns % 2) * (pulses % 2 == 0)
+        gaps = (place - first)[:, None] - nodes
+        weights = [
+            np.prod(np.delete(gaps, i, 1), axis=1) / np.prod(n - np.delete(nodes, i)) for i, n in enumerate(nodes)
+        ]
+        plain, timed = sum(table[..., first + n] * (w * sign) for n, w in zip(nodes, weights, strict=True))
+        plains.append(plain)
+        timeds.append(timed)
+    if not plains:
+        return
+    plain, timed = np.concatenate(plains), np.concatenate(timeds)
+    if len(plains) > 1:
+        inverse = _gram_inverse(pulses, bands)
+        left, also = plain.T @ inverse, timed.T @ inverse
+    else:
+        left, also = plain.T, timed.T
+    for product, part in zip(products, (left @ plain, left @ timed, also @ timed), strict=True):
+        product -= part
+
+
+@lru_cache(maxsize=4)
+def _gram_inverse(pulses: int, bands: tuple[tuple[float, float], ...]) -> NDArray[np.float64]:
+    """Inverse of the products between the sequences of all bands, odd ones times j, which makes them real."""
+    time = np.arange(pulses) - (pulses - 1) / 2
+    bases = [slepian(pulses, half) for _, half in bands]
+    odds = [_odd(basis) for basis in bases]
+    rows = []
+    for (one, _), first, odd in zip(bands, bases, odds, strict=True):
+        row = []
+        for (two, _), second, other in zip(bands, bases, odds, strict=True):
+            turn = np.exp(2j * np.pi * (two - one) * time)
+            product = (first * turn.real) @ second.T + 1j * ((first * turn.imag) @ second.T)
+            row.append((np.where(odd, -1j, 1)[:, None] * product * np.where(other, 1j, 1)).real)
+        rows.append(row)
+    return np.asarray(np.linalg.pinv(np.block(rows), rcond=1e-9, hermitian=True), np.float64)

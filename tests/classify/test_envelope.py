@@ -66,7 +66,7 @@ def test_inside_exactly_where_every_rule_holds(carrier_hz, prf_hz, pulses):
         pulses / 64,
         65536 / pulses,
         pulses / prf_hz / 5e-3,
-        2 * prf_hz / pulses,
+        5 * prf_hz / pulses,
         unambiguous_mps / 10,
     )
     reason = ENVELOPE.reason(carrier_hz, prf_hz, pulses)

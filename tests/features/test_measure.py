@@ -2,9 +2,12 @@ import numpy as np
 import pytest
 from bladewing.features import measure
 from bladewing.features.comb import find_comb, strong_multiple
+from bladewing.features.comb_fit import fit_combs
+from bladewing.features.flashes import flash_nats
+from bladewing.features.lines import LineSpace, line_products, sum_of_lines
 from bladewing.features.periodogram import prepare
 from bladewing.features.rotor_band import expected_power, fit_edge
-from bladewing.features.slow_lines import remove_bands, slepian
+from bladewing.features.slow_lines import remove_bands, slepian, without_bands
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
 
@@ -167,3 +170,114 @@ def test_evidence_needs_more_than_chance():
     noise = white(np.random.default_rng(8), 30, 1500)
     combs = [find_comb(prepare(iq.astype(np.complex64), **RADAR))[0] for iq in noise]
     assert sum(comb is not None for comb in combs) <= 2
+
+
+def test_lines_read_and_written_at_any_frequency_agree_with_the_plain_sums():
+    rng = np.random.default_rng(0)
+    for pulses in (301, 64):
+        samples, frequency = white(rng, pulses), rng.uniform(-0.5, 0.5, 12)
+        time = np.arange(pulses) - (pulses - 1) / 2
+        lines = np.exp(2j * np.pi * np.outer(frequency, time))
+        seen, moment = LineSpace(samples).at(frequency)
+        np.testing.assert_allclose(seen, lines.conj() @ samples / pulses, atol=1e-7)
+        np.testing.assert_allclose(moment, lines.conj() @ (time * samples) / pulses, atol=1e-6 * pulses)
+        np.testing.assert_allclose(sum_of_lines(pulses, frequency, seen), seen @ lines, atol=1e-5)
+        plain, timed, squared = line_products(frequency, pulses)
+        np.testing.assert_allclose(plain, lines.conj() @ lines.T / pulses, atol=1e-10)
+        np.testing.assert_allclose(-1j * timed, lines.conj() @ (time * lines).T / pulses, atol=1e-9)
+        np.testing.assert_allclose(squared, lines.conj() @ (time**2 * lines).T / pulses, atol=1e-7)
+
+
+@pytest.mark.parametrize("bands", [((0.1, 3.0),), ((0.1, 3.0), (-0.21, 4.0)), ((0.1, 3.0), (0.115, 3.0))])
+def test_the_products_of_lines_know_what_the_notch_takes(bands):
+    pulses = 600
+    time = np.arange(pulses) - (pulses - 1) / 2
+    frequency = 0.1 + np.array([4.2, 7.7, -6.1, 12.3, 120.0, -180.0]) / pulses
+    lines = np.exp(2j * np.pi * np.outer(frequency, time))
+    products = line_products(frequency, pulses)
+    without_bands(products, frequency, pulses, bands)
+    left = np.stack([remove_bands(line, bands) for line in lines])
+    timed = np.stack([remove_bands(line * time, bands) for line in lines])
+    np.testing.assert_allclose(products[0], left.conj() @ left.T / pulses, atol=1e-4)
+    np.testing.assert_allclose(-1j * products[1], left.conj() @ timed.T / pulses, atol=1e-4 * pulses)
+    np.testing.assert_allclose(products[2], timed.conj() @ timed.T / pulses, atol=1e-4 * pulses**2)
+
+
+def test_phases_in_step_are_evidence_and_random_ones_are_not():
+    rng = np.random.default_rng(6)
+    noise = flash_nats(white(rng, 4000, 30))
+    # chance exceeds t nats in at most exp(-t); 4000 draws leave that 20 +- 5 at 5.3 nats
+    assert np.count_nonzero(noise > 5.3) < 40
+    step = np.exp(1.3j * np.arange(30))
+    assert flash_nats(2 * step + white(rng, 30)) > 15
+    # the gain and the step do not matter, a line that cannot be seen says nothing
+    assert flash_nats(7 * step + 0) == pytest.approx(flash_nats(step * np.exp(0.4j)), rel=1e-3)
+    assert flash_nats(np.where(np.arange(30) < 4, step, 0)) == 0
+
+
+def test_a_comb_at_16_db_under_the_noise_is_found():
+    rng = np.random.default_rng(11)
+    right = 0
+    for seed in range(16):
+        rate_hz = rng.uniform(45, 110)
+        found = measure(drone([rate_hz], snr_db=-16, seed=seed, velocity_mps=rng.uniform(-25, 25), body=10.0), **RADAR)
+        right += abs(float(found.chopping_hz) / (2 * rate_hz) - 1) < 0.02
+    # of 16 draws right in 95 %, fewer than 12 are in under 0.1 %
+    assert right >= 12
+
+
+def test_the_errors_stay_true_beside_a_strong_background():
+    rng = np.random.default_rng(9)
+    time = np.arange(PULSES)
+    background = 100 * (1 + 0.3 * np.sin(2 * np.pi * 1.2 * time / PULSES))
+    errors = []
+    for seed in range(16):
+        rate_hz = rng.uniform(45, 110)
+        iq = drone([rate_hz], snr_db=5, seed=seed, velocity_mps=rng.uniform(-25, 25), body=50.0) + background
+        found = measure(iq, **RADAR)
+        errors.append((found.chopping_hz - 2 * rate_hz) / found.chopping_hz_std)
+    # chi-squared of 16 degrees of freedom over 16 stays under 2.4 in 99.9 %
+    assert np.mean(np.square(errors)) < 2.4
+
+
+def test_several_combs_fitted_together_leave_noise():
+    rates_hz = np.array([3395.0, 3431.0, 3464.0, 3500.0]) / 60
+    data = prepare(drone(rates_hz, snr_db=10, velocity_mps=5.0, body=10.0).astype(np.complex64), **RADAR)
+    centre = -2 * 5.0 / WAVELENGTH_M / PRF_HZ
+    fits, rest = fit_combs(data, centre, list(2.0002 * rates_hz / PRF_HZ), [(-33, 33)] * 4, 20)
+    np.testing.assert_allclose([fit.spacing * PRF_HZ for fit in fits], 2 * rates_hz, rtol=1e-4)
+    assert np.mean(np.abs(rest) ** 2) < 1.1
+    assert fit_combs(data, 0.0, [0.2], [(0, 2)]) is None or len(fits) == 4
+
+
+def test_unresolved_rotors_carry_their_spread():
+    found = measure(drone(np.array([3440.0, 3447.0]) / 60, snr_db=10, velocity_mps=5.0, body=10.0), **RADAR)
+    assert not found.rotors_resolved or found.rotor_count == 2
+    assert 4 < 30 * found.rotor_spread_hz < 14  # [rpm]
+    apart = measure(drone(np.array([3440.0, 3475.0]) / 60, snr_db=10, velocity_mps=5.0, body=10.0), **RADAR)
+    assert apart.rotors_resolved
+    assert 30 * apart.rotor_spread_hz == pytest.approx(35, abs=1)
+    assert measure(drone([58.0]), **RADAR).rotor_spread_hz == 0
+
+
+def test_clicks_of_a_supply_are_no_rotor():
+    noise = white(np.random.default_rng(2), PULSES)
+    clicks = np.where(np.arange(PULSES) % 350 == 17, 5.0, 0.0)  # 100 times a second
+    assert np.isnan(measure(noise + clicks + 20, **RADAR).chopping_hz)  # beside a static background
+
+
+def test_a_hovering_body_is_not_taken_for_the_background():
+    rng = np.random.default_rng(4)
+    hovering = prepare(drone([57.3], snr_db=-10, body=10.0).astype(np.complex64), **RADAR)
+    assert hovering.rest_half == 0
+    slow = np.cumsum(white(rng, PULSES)) * np.hanning(PULSES)  # a skirt that falls with the frequency
+    ground = prepare((drone([57.3], snr_db=-3, velocity_mps=9.0, body=10.0) + 100 + slow).astype(np.complex64), **RADAR)
+    assert ground.rest_half > 0
+
+
+def test_the_blade_of_several_rotors_follows_from_the_fastest():
+    rates_hz = np.array([3395.0, 3430.0, 3465.0, 3500.0]) / 60
+    found = measure(drone(rates_hz, snr_db=5), **RADAR, blades=2, beta_rad=0.0)
+    assert found.rotor_count == 4
+    assert found.body_velocity_mps == pytest.approx(0, abs=0.05)
+    assert found.blade_length_m == pytest.approx(0.15, rel=0.03)

@@ -1,0 +1,114 @@
+"""Unit lines of any frequency against a record: inner products both ways through one short transform."""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+#: Bins of the twice padded spectrum that a line is interpolated from, and the kernel's shape for them: errors of 1e-6.
+#: The kernel is exp(shape x sqrt(1 - x^2)) (Barnett, Magland and af Klinteberg, SIAM J. Sci. Comput. 41, 2019).
+_TAPS = 8
+_SHAPE = 2.3 * _TAPS
+
+
+def _bell(away: NDArray[np.floating]) -> NDArray[np.float64]:
+    """The kernel, -1 <= away <= 1."""
+    return np.asarray(np.exp(_SHAPE * (np.sqrt(np.maximum(1 - away**2, 0)) - 1)), np.float64)
+
+
+@lru_cache(maxsize=16)
+def _kernel(pulses: int) -> tuple[int, NDArray[np.float64]]:
+    """Transform length, and one over the kernel's own transform at each pulse."""
+    size = fft.next_fast_len(2 * pulses)
+    time = np.arange(pulses) - (pulses - 1) / 2
+    node, weight = np.polynomial.legendre.leggauss(64)
+    out = 2 / _TAPS / (np.cos(np.pi * _TAPS / size * np.outer(time, node)) @ (weight * _bell(node)))
+    out.setflags(write=False)
+    return size, out
+
+
+def _taps(frequency: NDArray[np.floating], pulses: int) -> tuple[NDArray[np.intp], NDArray[np.complex128]]:
+    """Bins about each frequency and their weights, shape (lines, taps); time counts from the middle of the record."""
+    size, _ = _kernel(pulses)
+    place = frequency * size
+    bins = np.floor(place).astype(np.intp)[:, None] + np.arange(1 - _TAPS // 2, 1 + _TAPS // 2)
+    away = 2 * (place[:, None] - bins) / _TAPS
+    weight = _bell(away)
+    turn = np.exp(1j * np.pi * (pulses - 1) / size * (bins % (2 * size)))
+    return bins % size, weight * turn
+
+
+@dataclass(frozen=True)
+class LineSpace:
+    """One record, ready to be read at any frequency.
+
+    Parameters
+    ----------
+    samples : ndarray of complex128, shape (pulses,)
+        The record.
+    """
+
+    samples: NDArray[np.complex128]
+
+    @cached_property
+    def _spectra(self) -> NDArray[np.complex128]:
+        """Spectra of the samples and of the samples times their time, shape (2, bins)."""
+        pulses = len(self.samples)
+        size, shape = _kernel(pulses)
+        time = np.arange(pulses) - (pulses - 1) / 2
+        flat = self.samples * shape
+        return np.asarray(fft.fft(np.stack([flat, flat * time]), size), np.complex128)
+
+    def at(self, frequency: NDArray[np.floating]) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+        """Mean of the samples, and of the samples times time, against unit lines.
+
+        Parameters
+        ----------
+        frequency : ndarray, shape (lines,)
+            [cycles a sample].
+
+        Returns
+        -------
+        amplitude, moment : ndarray of complex128, shape (lines,)
+            Time counts from the middle of the record, in samples.
+        """
+        bins, weight = _taps(frequency, len(self.samples))
+        seen = (self._spectra[:, bins] * weight).sum(axis=-1) / len(self.samples)
+        return seen[0], seen[1]
+
+
+def sum_of_lines(
+    pulses: int, frequency: NDArray[np.floating], amplitudes: NDArray[np.complexfloating]
+) -> NDArray[np.complex128]:
+    """Samples of a sum of lines, shape (pulses,): the way back from `LineSpace.at`."""
+    size, shape = _kernel(pulses)
+    bins, weight = _taps(frequency, pulses)
+    part = (weight.conj() * amplitudes[:, None]).ravel()
+    place = bins.ravel()
+    grid = np.bincount(place, part.real, size) + 1j * np.bincount(place, part.imag, size)
+    return np.asarray(fft.ifft(grid)[:pulses] * (size * shape), np.complex128)
+
+
+def line_products(
+    frequency: NDArray[np.floating], pulses: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Mean products of unit lines: plain, with time, with time squared, each of shape (lines, lines).
+
+    With D the Dirichlet kernel of the frequencies' difference: D, D' / 2 pi and -D'' / 4 pi^2. The second is the mean
+    of conj(line k) x time x line l without its factor -j; it is antisymmetric.
+    """
+    turns = np.pi * frequency
+    outer, inner = np.exp(1j * pulses * turns), np.exp(1j * turns)
+    top = np.outer(outer.conj(), outer)  # angle pi N (f_l - f_k)
+    low = np.outer(inner.conj(), inner)
+    sine, cosine = top.imag, top.real
+    below, beside = low.imag, low.real
+    near = np.abs(below) < 1e-5 / pulses
+    safe = np.where(near, 1.0, below)
+    plain = np.where(near, 1.0, sine / (pulses * safe))
+    ratio = np.where(near, 0.0, beside / safe)
+    first = np.where(near, 0.0, cosine / safe - plain * ratio)  # D' / pi
+    second = np.where(near, -(pulses**2 - 1) / 3, (1 - pulses**2) * plain - 2 * ratio * first)  # D'' / pi^2
+    return plain, first / 2, -second / 4
