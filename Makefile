@@ -10,15 +10,22 @@ OUT    ?= out
 NS     := build/ns
 SOURCES := simulate features models classify tests
 
-.PHONY: train test lint bench fuzz clean
+.PHONY: train test browser lint bench fuzz clean
 .DELETE_ON_ERROR:
 
 train: $(STAMP)
 	$(BIN)/bladewing train --out $(OUT)
 	$(BIN)/bladewing report --quick --models $(OUT) --out $(OUT)
 
-test: $(STAMP) lint
+test: $(STAMP) lint browser
 	$(BIN)/python -m pytest
+
+# The report's page is tried in a real browser. Where there is none, Debian's is installed if this user may.
+browser:
+	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || command -v google-chrome >/dev/null \
+	|| { command -v apt-get >/dev/null && apt-get update -qq \
+	     && apt-get install -y -qq --no-install-recommends chromium fonts-dejavu-core; } >/dev/null 2>&1 \
+	|| echo "No chromium, and it cannot be installed here: the report's browser tests will be skipped."
 
 # Types are checked through a link, because a type checker sees nothing of an editable install.
 lint: $(STAMP)

@@ -236,12 +236,17 @@ def report(
     models: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of .onnx files.", show_default="the shipped models")
     ] = None,
-    seed: Annotated[int, typer.Option(metavar="S", min=0, help="Root seed of the test records.")] = 0,
+    seed: Annotated[
+        int | None, typer.Option(metavar="S", min=0, help="Root seed of the test records.", show_default="0")
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option(metavar="FILE.toml", help="Settings; the options given here come first.")
+    ] = None,
 ) -> None:
     """Measure models on fresh synthetic records: what each choice of input and model costs and gives."""
     from .report import run_report
 
-    run_report(out, models=models, quick=quick, seed=seed, progress=True)
+    run_report(out, models=models, quick=quick, seed=seed, config=config, progress=True)
 
 
 @app.command()

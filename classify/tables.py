@@ -237,7 +237,7 @@ def run_tables(out: Path, seed: int = 0) -> dict[str, list[Row]]:
     BadInput
         The folder cannot be written to.
     """
-    tables = {title: [_without_nan(row) for row in rows(seed)] for title, rows in TABLES.items()}
+    tables = make_tables(seed)
     notes = {title: NOTES[title] for title in tables if title in NOTES}
     text = json.dumps({"seed": seed, "notes": notes, "tables": tables}, indent=2, allow_nan=False) + "\n"
     try:
@@ -246,6 +246,11 @@ def run_tables(out: Path, seed: int = 0) -> dict[str, list[Row]]:
     except OSError as error:
         raise BadInput(f"{out}: cannot be written: {error.strerror or error}: give a folder") from None
     return tables
+
+
+def make_tables(seed: int = 0) -> dict[str, list[Row]]:
+    """Rows of each table; None where nothing was found."""
+    return {title: [_without_nan(row) for row in rows(seed)] for title, rows in TABLES.items()}
 
 
 def _without_nan(row: Row) -> Row:

@@ -1,15 +1,13 @@
 """The settings of a training: one validated table, from defaults, a TOML file and the command line."""
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
-from .bounds import MOST_TEXT_BYTES
 from .errors import BadInput
-from .files import read_bounded
+from .settings_file import build_settings, given_settings
 
 #: What `--quick` changes: enough to see every step work, not a model to use.
 QUICK = {"records": 3000, "epochs": 3, "iterations": 20}
@@ -81,33 +79,13 @@ def training_config(
     """
     from bladewing.models import LADDER
 
-    values: dict[str, Any] = {} if file is None else _read(file)
-    values |= {name: value for name, value in (("records", records), ("seed", seed)) if value is not None}
+    values = given_settings(file, records=records, seed=seed)
     where = str(file) if file is not None else "training settings"
     for name, held in (stored or {}).items():
         if values.setdefault(name, held) != held:
             raise BadInput(f"{where}: {name} is {values[name]!r}, but the data set has {held}: leave it out")
-    values = (QUICK if quick else {}) | values
-    try:
-        config = TrainingConfig(**values)
-    except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"])
-        if first["type"] == "extra_forbidden":
-            known = ", ".join(TrainingConfig.model_fields)
-            raise BadInput(f"{where}: unknown field {field!r}: the fields are {known}") from None
-        rule = first["msg"].removeprefix("Input ")
-        raise BadInput(f"{where}: {field} is {first['input']!r}: it {rule}") from None
+    config = build_settings(TrainingConfig, (QUICK if quick else {}) | values, where=where)
     for name in config.models:
         if name not in LADDER:
             raise BadInput(f"{where}: models holds {name!r}: it may hold {', '.join(LADDER)}")
     return config
-
-
-def _read(file: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(read_bounded(file, MOST_TEXT_BYTES).decode())
-    except OSError as error:
-        raise BadInput(f"{file}: cannot be read: {error.strerror}: give the path of a TOML file") from None
-    except (ValueError, RecursionError) as error:  # too large, not UTF-8, not TOML, or nested beyond reason
-        raise BadInput(f"{file}: not TOML: {error}") from None

@@ -3,7 +3,7 @@
 Everything heavy is imported when a report is made. ``report.json`` holds every number of the page:
 
 ==================== ==============================================================================================
-``schema_version``   "1"; a page is drawn from this version alone
+``schema_version``   "2"; a page is drawn from this version alone
 ``made``             date, command, quick, seed, seconds
 ``machine``          cpu, cores, system, python, packages (name to version), load
 ``classes``          the order of every table
@@ -13,9 +13,15 @@ Everything heavy is imported when a report is made. ``report.json`` holds every 
 ``reference``        the radar of the records that are timed, weighed and shown
 ``cost``             threads, and one entry a batch size: see `cost.time_chain`
 ``trade``            accuracy against cost, the front and the budgets: see `trade.weigh_up`
+``front``            every choice of picture, model and dwell: see `front.measure_front`
 ``fft_against_stft`` one a record length: see `stft.time_fft_against_stft`
+``time_law``         time against operations: see `stft.time_law`
 ``storage``          one a form of a record: see `storage.weigh`
 ``examples``         one a class: see `examples.show_examples`
+``stft_pictures``    the paper's four STFTs: see `examples.show_stfts`
+``tables``           the paper's tables made again: title to rows, see `classify.tables`
+``training``         how the models were trained, None where no train.json lies beside them
+``config``           the settings of the run: see `settings.ReportConfig`
 ==================== ==============================================================================================
 """
 
@@ -27,8 +33,16 @@ from typing import Any
 __all__ = ["run_report"]
 
 
-def run_report(out: Path, *, models: Path | None, quick: bool, seed: int = 0, progress: bool = True) -> dict[str, Any]:
+def run_report(
+    out: Path,
+    *,
+    models: Path | None,
+    quick: bool,
+    seed: int | None = None,
+    config: Path | None = None,
+    progress: bool = True,
+) -> dict[str, Any]:
     """Measure models and write ``report.json`` and ``report.html``; see `bladewing.classify.report.run.run_report`."""
     from .run import run_report as run
 
-    return run(out, models=models, quick=quick, seed=seed, progress=progress)
+    return run(out, models=models, quick=quick, seed=seed, config=config, progress=progress)

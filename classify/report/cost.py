@@ -13,7 +13,7 @@ from bladewing.features.inputs import model_inputs
 from numpy.typing import NDArray
 
 from ..inference import Classifier
-from .timing import Work, quote, time_in_turns
+from .timing import Work, quote, ratio, time_in_turns
 
 BATCHES = (1, 64)
 
@@ -49,8 +49,8 @@ def time_chain(
     -------
     list of dict
         One a batch size: ``batch`` and ``stages``, a list of ``{"stage", "name", "median_us", "p99_us", "passed_us",
-        "rounds", "ratio_to_fft"}``; stage is "fft", "input" (name: the input), "model" or "chain" (name: the model).
-        Times are a record (see `timing.quote`).
+        "rounds", "ratio_to_fft", "ratio_low", "ratio_high"}`` (see `timing.quote` and `timing.ratio`); stage is "fft",
+        "input" (name: the input), "model" or "chain" (name: the model). Times are a record (see `timing.quote`).
     """
     results = []
     for place, batch in enumerate(BATCHES):
@@ -61,11 +61,10 @@ def time_chain(
                 on_share((place + done) / len(BATCHES))
 
         taken = time_in_turns(works, seconds=seconds, least_rounds=least_rounds, most_rounds=5000, on_share=share)
-        quoted = {key: quote(durations, per=batch) for key, durations in taken.items()}
-        bare_us = quoted["fft", "fft"]["median_us"]
+        bare = taken["fft", "fft"]
         stages = [
-            {"stage": stage, "name": name, **numbers, "ratio_to_fft": numbers["median_us"] / bare_us}
-            for (stage, name), numbers in quoted.items()
+            {"stage": stage, "name": name, **quote(laps, per=batch), **ratio(laps, bare)}
+            for (stage, name), laps in taken.items()
         ]
         results.append({"batch": batch, "stages": stages})
     return results
@@ -81,14 +80,14 @@ def _works(
     ready = [model_inputs(some, carrier_hz=carrier_hz, prf_hz=prf_hz, names=wanted) for some in batches]
 
     make = partial(model_inputs, carrier_hz=carrier_hz, prf_hz=prf_hz)
-    works: dict[tuple[str, str], Work] = {("fft", "fft"): _in_turn([partial(scipy.fft.fft, some) for some in batches])}
+    works: dict[tuple[str, str], Work] = {("fft", "fft"): in_turn([partial(scipy.fft.fft, some) for some in batches])}
     for name in wanted:
-        works["input", name] = _in_turn([partial(make, some, names=(name,)) for some in batches])
+        works["input", name] = in_turn([partial(make, some, names=(name,)) for some in batches])
     for name, classifier in classifiers.items():
         works["model", name] = _network(models[name], classifier.inputs, ready)
     for name, classifier in classifiers.items():
         answer = partial(classifier.predict, carrier_hz=carrier_hz, prf_hz=prf_hz)
-        works["chain", name] = _in_turn([partial(answer, some) for some in batches])
+        works["chain", name] = in_turn([partial(answer, some) for some in batches])
     return works
 
 
@@ -100,10 +99,10 @@ def _network(content: bytes, inputs: tuple[str, ...], ready: list[dict[str, NDAr
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     feeds = [{name: one[name] for name in inputs} for one in ready]
-    return _in_turn([partial(session.run, ["probabilities"], feed) for feed in feeds])
+    return in_turn([partial(session.run, ["probabilities"], feed) for feed in feeds])
 
 
-def _in_turn(works: list[Work]) -> Work:
+def in_turn(works: list[Work]) -> Work:
     """Make one piece of work of several: each call does the next."""
     turns = itertools.cycle(works)
     return lambda: next(turns)()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, PercentFormatter
 
@@ -134,6 +135,29 @@ def fft_against_stft(report: Mapping[str, Any]) -> list[Panel]:
                 f"STFT time over FFT time at {count(part['pulses'])} samples: {words}; the paper: {low:g} to {high:g}."
             )
             panels.append(panel(figure, name=f"stft-{part['pulses']}", title=title, alt=alt))
+    return panels
+
+
+def time_law(report: Mapping[str, Any]) -> list[Panel]:
+    """Time against operations, with the fitted law, for one FFT and for the STFT."""
+    panels = []
+    for name, title in (("fft", "One FFT"), ("stft", "STFT")):
+        law = report["time_law"][name]
+        with drawing(height_in=2.7) as (figure, axes):
+            x = [point["operations"] for point in law["points"]]
+            axes.plot(x, [point["time_us"] for point in law["points"]], color=_BLUE, marker="o", linestyle="none")
+            along = np.geomspace(min(x), max(x), 40)
+            axes.plot(along, law["call_us"] + law["ns_each"] * along / 1e3, color=SERIES[1])
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            axes.set_xlabel("operations, 5 N log₂ N a transform")
+            axes.set_ylabel("time [µs]")
+            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
+            axes.yaxis.set_minor_formatter(NullFormatter())
+            axes.xaxis.set_minor_formatter(NullFormatter())
+            said = f"{micros(law['call_us'])} and {number(law['ns_each'])} ns an operation"
+            alt = f"{title}: {said}; the farthest point lies {number(law['worst_factor'])} times off this law."
+            panels.append(panel(figure, name=f"law-{name}", title=f"{title}: {said}", alt=alt))
     return panels
 
 

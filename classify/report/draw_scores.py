@@ -73,6 +73,33 @@ def _share_axis(axes: Axes, label: str) -> None:
     axes.set_ylabel(label)
 
 
+def accuracy_by_beta(report: Mapping[str, Any]) -> list[Panel]:
+    """UAVs answered right and found, against the angle their rotors are seen at."""
+    panels = []
+    names = [model["name"] for model in report["models"]]
+    for key, title in (("answered", "UAVs answered right"), ("found", "UAVs found at the false-alarm rate")):
+        with drawing(height_in=2.7) as (figure, axes):
+            words = []
+            for name, look in looks(names).items():
+                slices = [one for one in report["scores"][name]["by_beta"] if one[key]["count"] >= LEAST_RECORDS]
+                if not slices:
+                    continue
+                x = [(one["from"] + one["to"]) / 2 for one in slices]
+                rates = [one[key] for one in slices]
+                axes.fill_between(
+                    x, [r["low"] for r in rates], [r["high"] for r in rates], color=look.colour, alpha=0.1, linewidth=0
+                )
+                axes.plot(x, [r["value"] for r in rates], color=look.colour, marker=look.marker)
+                words.append(f"{name}: {percent(rates[0]['value'])} from the side, {percent(rates[-1]['value'])} last.")
+            axes.set_xlim(0, 90)
+            axes.set_xticks(range(0, 91, 15))
+            axes.set_xlabel("β, line of sight to rotor plane [°]")
+            _share_axis(axes, "share of UAVs")
+            alt = f"{title} against the angle beta. {' '.join(words)}"
+            panels.append(panel(figure, name=f"beta-{key}", title=title, alt=alt))
+    return panels
+
+
 def reliability(report: Mapping[str, Any]) -> list[Panel]:
     """Reliability diagrams, one panel a model: points on the diagonal mean what they say."""
     names = [model["name"] for model in report["models"]]

@@ -40,7 +40,9 @@ def ask(
     answers : dict of str to Answers
     """
     index = {name: number for number, name in enumerate(CLASSES)}
-    drawn: dict[str, list[np.ndarray]] = {name: [] for name in ("label", "kind", "snr_db", "dwell_s", "radar")}
+    drawn: dict[str, list[np.ndarray]] = {
+        name: [] for name in ("label", "kind", "snr_db", "dwell_s", "radar", "beta_rad")
+    }
     said: dict[str, tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]] = {
         name: ([], [], []) for name in classifiers
     }
@@ -50,6 +52,7 @@ def ask(
         drawn["label"].append(np.array([index[str(label)] for label in some.labels]))
         drawn["kind"].append(np.asarray(some.truth["kind"]).astype(str))
         drawn["snr_db"].append(np.asarray(some.truth["snr_db"], np.float64))
+        drawn["beta_rad"].append(np.asarray(some.truth["beta_rad"], np.float64))
         drawn["dwell_s"].append(np.full(count, radar.dwell_s))
         drawn["radar"].append(np.full(count, number))
         for name, classifier in classifiers.items():

@@ -6,16 +6,21 @@ from typing import Any
 
 import numpy as np
 import scipy.fft
+from bladewing.features import measure
+from bladewing.features.notch import NOTCH_MPS
 from bladewing.features.spectrum import doppler_spectrum
 from bladewing.simulate import Radar, Records
 from numpy.typing import NDArray
 
-from .stft import STFT_BINS, stft
+from .pictures import STFT_SETTINGS
+from .stft import STFT_BINS, frames, stft
 
 # The paper's middle window [samples] and its largest overlap.
 WINDOW, OVERLAP = 80, 0.9
 # Strong enough to see, weak enough to be honest [dB].
 SNR_SHOWN_DB = (5.0, 20.0)
+# ... and with a line this far over the noise, if any has one [dB].
+CLEAR_DB = 20.0
 # Shown resolution: neighbouring values are pooled by their maximum, so that no line is lost.
 POINTS, ROWS, COLUMNS = 400, 128, 90
 # The velocities shown reach past the fastest line this strong [dB over the noise], and at least so far [m/s].
@@ -35,9 +40,11 @@ def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, 
     -------
     list of dict
         One a class present: ``class``, ``kind``, ``snr_db`` (or None), ``dwell_s``, ``spectrum`` (``velocity_mps``,
-        ``level_db`` above the noise floor) and ``picture`` (``velocity_mps`` [first, last], ``time_s`` [first, last],
-        ``level_db`` rows of whole numbers, one a velocity, above the median
-        over all velocities). Velocities are cut where nothing is left to see.
+        ``level_db`` above the noise floor), ``measured`` (``reason`` why there is no comb, else ""; ``body_mps``,
+        ``chopping_hz``, ``chopping_mps``, ``orders``, ``band_hz``, ``band_mps`` [slowest, fastest], ``tip_mps``; None
+        where there is no value; ``notches_mps``: pairs) and ``picture`` (``velocity_mps`` [first, last], ``time_s``
+        [first, last], ``level_db`` rows of whole numbers, one a velocity, above the median over all velocities).
+        Velocities are cut where nothing is left to see.
     """
     radar, shown = records.radar, []
     for name in classes:
@@ -47,7 +54,8 @@ def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, 
         snr_db = np.asarray(records.truth["snr_db"], np.float64)
         low, high = SNR_SHOWN_DB
         fitting = where[(snr_db[where] >= low) & (snr_db[where] <= high)]
-        index = int(fitting[0] if fitting.size else where[0])
+        seen = [row for row in fitting if _spectrum(radar, records.iq[row])[1].max() > CLEAR_DB]
+        index = int([*seen, *fitting, *where][0])
         known = float(snr_db[index]) if np.isfinite(snr_db[index]) else None
         velocity, level = _spectrum(radar, records.iq[index])
         span = _span_mps(radar, velocity, level)
@@ -59,10 +67,64 @@ def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, 
                 "snr_db": known,
                 "dwell_s": radar.dwell_s,
                 "spectrum": _curve(velocity[inside], level[inside]),
-                "picture": _picture(radar, records.iq[index], span),
+                "measured": _measured(radar, records.iq[index]),
+                "picture": _picture(radar, records.iq[index], span, window=WINDOW, overlap=OVERLAP),
             }
         )
     return shown
+
+
+def show_stfts(seed: int) -> dict[str, Any]:
+    """The four STFTs of the paper's quadcopter, and the one spectrum of the same record.
+
+    Parameters
+    ----------
+    seed : int
+        Of the scene's noise.
+
+    Returns
+    -------
+    dict
+        ``scene``; ``pictures``, one a setting: ``window``, ``overlap``, ``frames`` and a picture as in `show_examples`;
+        ``spectrum`` as there; ``fft_bytes`` and in each picture ``bytes``: complex64, kept whole.
+    """
+    from bladewing.simulate import Scene
+
+    scene = Scene.load("quadcopter")
+    iq, radar = scene.render(seed).iq, scene.sight
+    velocity, level = _spectrum(radar, iq)
+    span = _span_mps(radar, velocity, level)
+    inside = np.abs(velocity) <= span
+    pictures = []
+    for window, overlap in STFT_SETTINGS:
+        count = len(frames(iq, window=window, overlap=overlap))
+        about = {"window": window, "overlap": overlap, "frames": count, "bytes": 8 * count * STFT_BINS}
+        pictures.append({**about, **_picture(radar, iq, span, window=window, overlap=overlap)})
+    curve = _curve(velocity[inside], level[inside])
+    return {"scene": "quadcopter", "spectrum": curve, "fft_bytes": 8 * radar.pulses, "pictures": pictures}
+
+
+def _measured(radar: Radar, iq: NDArray[np.complex64]) -> dict[str, Any]:
+    """What `measure` finds in a record, as velocities too."""
+    found = measure(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
+
+    def known(value: Any, scale: float = 1.0) -> float | None:
+        return float(value) * scale if np.isfinite(value) else None
+
+    half = radar.wavelength_m / 2
+    body, band = known(found.body_velocity_mps), known(found.bandwidth_hz, half)
+    middles = [0.0] if body is None else [0.0, body]
+    return {
+        "reason": str(found.reason),
+        "body_mps": body,
+        "chopping_hz": known(found.chopping_hz),
+        "chopping_mps": known(found.chopping_hz, half),
+        "orders": None if known(found.comb_order) is None else int(found.comb_order),
+        "band_hz": known(found.bandwidth_hz),
+        "band_mps": None if band is None or body is None else [body - band / 2, body + band / 2],
+        "tip_mps": known(found.tip_speed_mps),
+        "notches_mps": [[middle - NOTCH_MPS, middle + NOTCH_MPS] for middle in middles],
+    }
 
 
 def _spectrum(radar: Radar, iq: NDArray[np.complex64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -84,16 +146,18 @@ def _curve(velocity: NDArray[np.float64], level: NDArray[np.float64]) -> dict[st
     return {"velocity_mps": np.round(middle, 3).tolist(), "level_db": np.round(highest, 1).tolist()}
 
 
-def _picture(radar: Radar, iq: NDArray[np.complex64], span_mps: float) -> dict[str, Any]:
+def _picture(
+    radar: Radar, iq: NDArray[np.complex64], span_mps: float, *, window: int, overlap: float
+) -> dict[str, Any]:
     """STFT power [dB] with velocity down the rows, rising, and time across."""
-    power = np.abs(scipy.fft.fftshift(stft(iq, window=WINDOW, overlap=OVERLAP), axes=-1)) ** 2
+    power = np.abs(scipy.fft.fftshift(stft(iq, window=window, overlap=overlap), axes=-1)) ** 2
     level_db = 10.0 * np.log10(power + power.max() * 1e-12)
     # Doppler is -2 v / wavelength: rising velocity is falling frequency.
     rising = level_db.T[::-1]
     step = 2.0 * radar.unambiguous_mps / STFT_BINS
     velocity = -step * (np.arange(STFT_BINS) - STFT_BINS // 2)[::-1]
     inside = np.abs(velocity) <= span_mps
-    time_s = (WINDOW / 2.0 + round(WINDOW * (1.0 - OVERLAP)) * np.arange(rising.shape[1])) / radar.prf_hz
+    time_s = (window / 2.0 + round(window * (1.0 - overlap)) * np.arange(rising.shape[1])) / radar.prf_hz
     rows = _pools(rising[inside], ROWS).max(axis=1)
     pooled = _pools(rows.T, COLUMNS).max(axis=1).T
     return {

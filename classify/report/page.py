@@ -10,10 +10,10 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from ..errors import BadInput
-from . import draw_cost, draw_examples, draw_scores, summary, words
-from .series import looks
+from . import draw_cost, draw_examples, draw_front, draw_scores, summary, words
+from .series import Look, choice_looks, looks
 
-SCHEMA_VERSION = "1"
+SCHEMA_VERSION = "2"
 
 # Marker outlines on a 14 x 14 field, in the order of `svg.MARKERS`.
 _OUTLINES = (
@@ -58,14 +58,23 @@ def draw_page(report: Mapping[str, Any]) -> str:
         "size": words.size,
         "spoken": words.spoken,
         "batch_words": words.batch_words,
+        "millis": words.millis,
+        "large": words.large,
     }
+    rows = report["front"]["choices"]
+    drawn = choice_looks(rows)
     names = [model["name"] for model in report["models"]]
     template = environment.from_string(_read("page.html.j2"))
     return template.render(
         report=report,
         css=Markup(_read("page.css")),
         js=Markup(_read("page.js")),
-        legend=[(name, look.number, Markup(_OUTLINES[look.number])) for name, look in looks(names).items()],
+        legend=_legend(looks(names)),
+        choice_legend=_legend(
+            {row["name"] if row["kind"] == "model" else row["words"]: drawn[row["name"], row["kind"]] for row in rows}
+        ),
+        best_points=[draw_front.best_points(report, place) for place in range(len(report["cost"]["batches"]))],
+        front_budgets=summary.front_budgets(report),
         headline=summary.headline_model(report),
         sentences=summary.sentences(report),
         budget_sentence=summary.budget_sentence,
@@ -75,6 +84,13 @@ def draw_page(report: Mapping[str, Any]) -> str:
             "dwell": draw_scores.accuracy_by_dwell(report),
             "reliability": draw_scores.reliability(report),
             "kinds": draw_scores.called_uav(report),
+            "choices": draw_front.time_front(report),
+            "dwells": draw_front.by_dwell(report),
+            "bound": draw_front.by_snr(report),
+            "stored": draw_front.stored(report),
+            "beta": draw_scores.accuracy_by_beta(report),
+            "law": draw_cost.time_law(report),
+            "stfts": draw_examples.stft_pictures(report),
             "front": draw_cost.front(report),
             "stages": draw_cost.stages(report),
             "stft": draw_cost.fft_against_stft(report),
@@ -82,6 +98,11 @@ def draw_page(report: Mapping[str, Any]) -> str:
             "examples": draw_examples.examples(report),
         },
     )
+
+
+def _legend(named: Mapping[str, Look]) -> list[tuple[str, int, Markup]]:
+    """Name, number of the colour and outline of the marker."""
+    return [(name, look.number, Markup(_OUTLINES[look.outline])) for name, look in named.items()]
 
 
 def _read(name: str) -> str:

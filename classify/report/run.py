@@ -7,16 +7,16 @@ import json
 import re
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib import resources
+from importlib import metadata, resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from bladewing.features.inputs import model_inputs
-from bladewing.features.schema import INPUT_SHAPES
-from bladewing.simulate import Radar, draw_records
+from bladewing.features.schema import INPUT_SHAPES, schema_hash
+from bladewing.simulate import Radar, Records, draw_records
+from numpy.typing import NDArray
 
 from ..bounds import MOST_MODEL_BYTES
 from ..errors import BadInput
@@ -25,11 +25,16 @@ from ..inference import Classifier
 from ..labels import CLASSES
 from ..progress import Progress
 from ..stability.run import worst_of_each
+from ..train import ACCOUNT
 from . import cost, evaluate, scores, stft, storage, trade
-from .examples import OVERLAP, WINDOW, show_examples
+from .card import model_card
+from .examples import OVERLAP, WINDOW, show_examples, show_stfts
+from .front import Given, measure_front
 from .machine import describe_machine
 from .page import SCHEMA_VERSION, draw_page
+from .parts import Parts
 from .series import LADDER
+from .settings import ReportConfig, report_config
 
 # The paper's measured radar: X band, PRF 20 to 30 kHz, 80 ms.
 REFERENCE = Radar(carrier_hz=9.85e9, prf_hz=25e3, pulses=2000)
@@ -37,46 +42,26 @@ REFERENCE = Radar(carrier_hz=9.85e9, prf_hz=25e3, pulses=2000)
 REFERENCE_PURPOSE = "bench"
 
 
-@dataclass(frozen=True)
-class Effort:
-    """How much is measured.
-
-    Attributes
-    ----------
-    records : int
-        Test records.
-    reference_records : int
-        Records that are timed and weighed, >= 64.
-    chain_s : float
-        Time to spend on the timings, for each batch size [s], > 0.
-    stft_s : float
-        Time to spend on FFT against STFT, for each record length [s], > 0.
-    least_rounds : int
-        Rounds of every timing, however long they take.
-    """
-
-    records: int
-    reference_records: int
-    chain_s: float
-    stft_s: float
-    least_rounds: int
-
-
-QUICK = Effort(records=3000, reference_records=128, chain_s=8.0, stft_s=2.0, least_rounds=100)
-FULL = Effort(records=30_000, reference_records=512, chain_s=60.0, stft_s=15.0, least_rounds=400)
-
-
-def measure(models: Mapping[str, bytes], effort: Effort, *, seed: int, progress: Progress) -> dict[str, Any]:
-    """Score, time and weigh models.
+def measure(
+    models: Mapping[str, bytes],
+    config: ReportConfig,
+    *,
+    parts: Parts,
+    progress: Progress,
+    account: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Score, time and weigh models, and everything they could read instead.
 
     Parameters
     ----------
     models : mapping of str to bytes
         Name to sealed ONNX model, at least one.
-    effort : Effort
-    seed : int
-        Root seed of the records.
+    config : ReportConfig
+    parts : Parts
+        What was measured before an interruption.
     progress : Progress
+    account : mapping, optional
+        What `train.json` beside the models says.
 
     Returns
     -------
@@ -88,43 +73,89 @@ def measure(models: Mapping[str, bytes], effort: Effort, *, seed: int, progress:
     BadInput
         If a model cannot be used.
     """
-    machine = describe_machine()
     classifiers = {name: Classifier(content, source=name) for name, content in models.items()}
-    with progress.phase("Scoring records", effort.records) as done:
-        truth, answers = evaluate.ask(classifiers, records=effort.records, seed=seed, on_records=done)
-    scored = {name: scores.score(truth, given) for name, given in answers.items()}
-    reference = draw_records(REFERENCE, effort.reference_records, seed, purpose=REFERENCE_PURPOSE)
-    carrier_hz, prf_hz = REFERENCE.carrier_hz, REFERENCE.prf_hz
-    with progress.phase("Timing every step", 1.0) as done:
-        chain = cost.time_chain(
-            models,
-            reference.iq,
-            carrier_hz=carrier_hz,
-            prf_hz=prf_hz,
-            seconds=effort.chain_s,
-            least_rounds=effort.least_rounds,
-            on_share=done,
-        )
-    with progress.phase("Timing FFT against STFT", 1.0) as done:
-        against = stft.time_fft_against_stft(
-            seed=seed, seconds=effort.stft_s, least_rounds=effort.least_rounds, on_share=done
-        )
-    forms = {"raw IQ": reference.iq} | model_inputs(
-        reference.iq, carrier_hz=carrier_hz, prf_hz=prf_hz, names=tuple(INPUT_SHAPES)
-    )
-    forms["STFT, complex"] = np.stack([stft.stft(one, window=WINDOW, overlap=OVERLAP) for one in reference.iq[:16]])
+    trained = (account or {}).get("models", {})
+
+    def scored() -> dict[str, Any]:
+        with progress.phase("Scoring records", config.records) as done:
+            truth, answers = evaluate.ask(classifiers, records=config.records, seed=config.seed, on_records=done)
+        found = {name: scores.score(truth, given) for name, given in answers.items()}
+        return {"records": scores.describe_records(truth), "scores": found}
+
+    def timed() -> list[dict[str, Any]]:
+        with progress.phase("Timing every step", 1.0) as done:
+            return cost.time_chain(
+                models,
+                reference.iq,
+                carrier_hz=REFERENCE.carrier_hz,
+                prf_hz=REFERENCE.prf_hz,
+                seconds=config.chain_s,
+                least_rounds=config.least_rounds,
+                on_share=done,
+            )
+
+    def transforms() -> dict[str, Any]:
+        effort: dict[str, Any] = {"seed": config.seed, "seconds": config.stft_s, "least_rounds": config.repeats}
+        with progress.phase("Timing FFT against STFT", 1.0) as done:
+            against = stft.time_fft_against_stft(**effort, on_share=lambda share: done(0.8 * share))
+            law = stft.time_law(against, **effort, on_share=lambda share: done(0.8 + 0.2 * share))
+        return {"against": against, "law": law}
+
+    def tables() -> dict[str, Any]:
+        from ..tables import make_tables
+
+        with progress.phase("Making the paper's tables", 1.0):
+            return make_tables(config.seed)
+
+    machine = parts.take("machine", describe_machine)
+    seen = parts.take("scores", scored)
+    reference = draw_records(REFERENCE, config.reference_records, config.seed, purpose=REFERENCE_PURPOSE)
+    chain = parts.take("cost", timed)
+    against = parts.take("transforms", transforms)
+    given = {
+        name: Given(content, classifiers[name].inputs, trained.get(name, {}).get("seconds"))
+        for name, content in models.items()
+    }
+    compared = measure_front(given, config, REFERENCE, parts=parts, phase=progress.phase)
     return {
+        "config": config.model_dump(mode="json"),
         "machine": machine,
         "classes": list(CLASSES),
-        "records": scores.describe_records(truth),
+        "records": seen["records"],
         "models": [_describe(name, content, classifiers[name]) for name, content in models.items()],
-        "scores": scored,
-        "reference": {"carrier_hz": carrier_hz, "prf_hz": prf_hz, "pulses": REFERENCE.pulses},
+        "scores": seen["scores"],
+        "reference": {"carrier_hz": REFERENCE.carrier_hz, "prf_hz": REFERENCE.prf_hz, "pulses": REFERENCE.pulses},
         "cost": {"threads": 1, "batches": chain},
-        "trade": trade.weigh_up(scored, chain),
-        "fft_against_stft": against,
-        "storage": storage.weigh(forms),
+        "trade": trade.weigh_up(seen["scores"], chain),
+        "front": compared,
+        "fft_against_stft": against["against"],
+        "time_law": against["law"],
+        "storage": storage.weigh(_forms(reference)),
         "examples": show_examples(reference, CLASSES),
+        "stft_pictures": show_stfts(config.seed),
+        "tables": parts.take("tables", tables),
+        "training": _training(account),
+    }
+
+
+def _forms(reference: Records) -> dict[str, NDArray[np.generic]]:
+    """The reference records in each form they can be kept in."""
+    carrier_hz, prf_hz = REFERENCE.carrier_hz, REFERENCE.prf_hz
+    forms: dict[str, NDArray[np.generic]] = {"raw IQ": reference.iq}
+    forms |= model_inputs(reference.iq, carrier_hz=carrier_hz, prf_hz=prf_hz, names=tuple(INPUT_SHAPES))
+    forms["STFT, complex"] = np.stack([stft.stft(one, window=WINDOW, overlap=OVERLAP) for one in reference.iq[:16]])
+    return forms
+
+
+def _training(account: Mapping[str, Any] | None) -> dict[str, Any] | None:
+    """What the page and the model card tell of the training, None where there is no account of it."""
+    if account is None:
+        return None
+    return {
+        "settings": account["settings"],
+        "records": account["records"],
+        "seconds": account["seconds"]["all"],
+        "versions": account["versions"],
     }
 
 
@@ -174,6 +205,19 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
     return {name: found[name] for name in sorted(found, key=lambda name: (order.get(name, len(order)), name))}
 
 
+def training_account(folder: Path | None) -> dict[str, Any] | None:
+    """Read what `train.json` beside the models says of their training; None where there is none."""
+    place = folder if folder is not None else resources.files("bladewing.models.pretrained")
+    file = place.joinpath(ACCOUNT)
+    try:
+        found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (ValueError, RecursionError) as error:
+        raise BadInput(f"{file}: not JSON: {error}: remove it or train again") from None
+    return found
+
+
 def _content(path: Path) -> bytes:
     try:
         return read_bounded(path, MOST_MODEL_BYTES)
@@ -181,11 +225,19 @@ def _content(path: Path) -> bytes:
         raise BadInput(f"{path}: the model cannot be read: {getattr(error, 'strerror', None) or error}") from None
 
 
-def run_report(out: Path, *, models: Path | None, quick: bool, seed: int = 0, progress: bool = True) -> dict[str, Any]:
-    """Measure the models on fresh synthetic records and write ``report.json`` and ``report.html``.
+def run_report(
+    out: Path,
+    *,
+    models: Path | None,
+    quick: bool,
+    seed: int | None = None,
+    config: Path | None = None,
+    progress: bool = True,
+) -> dict[str, Any]:
+    """Measure the models on fresh synthetic records and write ``report.json``, ``report.html`` and ``model-card.md``.
 
-    Both files change together after everything is measured and drawn: interrupted at any moment, the old ones or the
-    new ones stand whole.
+    The files change together after everything is measured and drawn: interrupted at any moment, the old ones or the
+    new ones stand whole, and the next run of the same report goes on where this one stopped.
 
     Parameters
     ----------
@@ -195,8 +247,10 @@ def run_report(out: Path, *, models: Path | None, quick: bool, seed: int = 0, pr
         Folder of .onnx files; None: the shipped ones.
     quick : bool
         A tenth of the records and shorter timings.
-    seed : int
+    seed : int, optional
         Root seed of the test records, >= 0.
+    config : Path, optional
+        TOML file with fields of `settings.ReportConfig`.
     progress : bool
         Show progress, with the time to go, on stderr.
 
@@ -208,31 +262,46 @@ def run_report(out: Path, *, models: Path | None, quick: bool, seed: int = 0, pr
     Raises
     ------
     BadInput
-        If there are no models, one of them cannot be used, or the seed is negative.
+        If there are no models, one of them cannot be used, or a setting is wrong.
     """
-    if seed < 0:
-        raise BadInput(f"seed={seed}: must be 0 or more")
-    found = load_models(models)
+    settings = report_config(config, seed=seed, quick=quick)
+    found, account = load_models(models), training_account(models)
+    for name, content in found.items():
+        Classifier(content, source=name)  # what cannot be used is told before anything is measured
     out = result_folder(out)
     stability = worst_of_each(out)
+    parts = Parts(out, _of(settings, found))
     started, clock = datetime.now(UTC), time.perf_counter()
     with Progress(visible=progress) as bars:
-        body = measure(found, QUICK if quick else FULL, seed=seed, progress=bars)
+        body = measure(found, settings, parts=parts, progress=bars, account=account)
         made = {
             "date": started.isoformat(timespec="seconds"),
-            "command": _command(out, models, quick=quick, seed=seed),
+            "command": _command(out, models, quick=quick, seed=seed, config=config),
             "quick": quick,
-            "seed": seed,
+            "seed": settings.seed,
             "seconds": round(time.perf_counter() - clock, 1),
         }
         extremes = {} if stability is None else {"stability": stability}
         text = _json({"schema_version": SCHEMA_VERSION, "made": made, **body, **extremes})
         # The page is drawn from the very text that is stored, so that whoever has the file can draw it again.
         report: dict[str, Any] = json.loads(text)
-        page = draw_page(report)
-        write_together(out, {"report.json": text, "report.html": page})
-    bars.say(f"Wrote {out / 'report.html'} and {out / 'report.json'}")
+        write_together(
+            out, {"report.json": text, "report.html": draw_page(report), "model-card.md": model_card(report)}
+        )
+        parts.forget()
+    bars.say(f"Wrote {out / 'report.html'}, {out / 'report.json'} and {out / 'model-card.md'}")
     return report
+
+
+def _of(settings: ReportConfig, models: Mapping[str, bytes]) -> dict[str, Any]:
+    """All that the results depend on."""
+    return {
+        "schema": SCHEMA_VERSION,
+        "version": metadata.version("bladewing"),
+        "features": schema_hash(),
+        "settings": settings.model_dump(mode="json"),
+        "models": {name: hashlib.sha256(content).hexdigest() for name, content in models.items()},
+    }
 
 
 def _json(report: Mapping[str, Any]) -> str:
@@ -241,12 +310,13 @@ def _json(report: Mapping[str, Any]) -> str:
     return re.sub(r"\[\s+([-+.\deE,\s]+?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", text) + "\n"
 
 
-def _command(out: Path, models: Path | None, *, quick: bool, seed: int) -> str:
+def _command(out: Path, models: Path | None, *, quick: bool, seed: int | None, config: Path | None) -> str:
     """The command line that does the same again."""
     import shlex
 
     words = ["bladewing", "report", "--out", str(out)]
     words += ["--models", str(models)] if models is not None else []
     words += ["--quick"] if quick else []
+    words += ["--config", str(config)] if config is not None else []
     words += ["--seed", str(seed)] if seed else []
     return shlex.join(words)

@@ -16,6 +16,9 @@ from . import metrics
 UNKNOWN = -1
 FALSE_ALARM_RATE = 1e-2
 SNR_STEP_DB = 5.0
+BETA_STEP_DEG = 10.0
+#: The dwell rate that false UAVs are quoted at: one range cell looked at without a pause, 80 ms at a time [1/h].
+DWELLS_PER_HOUR = 3600 / 0.08
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,8 @@ class Truth:
         Length of the record [s].
     radar : (n,) int
         Number of the radar the record was made for.
+    beta_rad : (n,) float
+        Angle between the line of sight and the rotors' plane [rad]; NaN where there is no rotor.
     """
 
     classes: tuple[str, ...]
@@ -44,6 +49,7 @@ class Truth:
     snr_db: NDArray[np.float64]
     dwell_s: NDArray[np.float64]
     radar: NDArray[np.intp]
+    beta_rad: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -106,7 +112,8 @@ def score(truth: Truth, answers: Answers) -> dict[str, Any]:
         and ``balanced_accuracy`` (rates); ``design_effect``; ``confusion`` (counts, true class down; "accepted" has
         "unknown" as its last column); ``uav_at_pfa`` (see `metrics.detection_at`); ``false_uav`` (rates over the
         records that are no UAV: by the most probable class, and after acceptance); ``reliability``; ``by_snr`` [dB]
-        and ``by_dwell`` [s] (slices [from, to) with the rate of "all" and of each class); ``by_kind``;
+        and ``by_dwell`` [s] (slices [from, to) with the rate of "all" and of each class); ``by_beta`` [degree] (of
+        UAVs: the rate of "answered" right and of "found" at the false-alarm rate); ``false_per_hour``; ``by_kind``;
         ``acceptance`` (coverage, accuracy of what is accepted, precision and share declined by class).
     """
     seen = answers.answered
@@ -114,6 +121,11 @@ def score(truth: Truth, answers: Answers) -> dict[str, Any]:
     best, accepted = np.argmax(probabilities, axis=-1), answers.label[seen]
     right, uav = best == label, truth.classes.index("uav")
     recalls = {name: metrics.rate(right[label == i]) for i, name in enumerate(truth.classes)}
+    at_pfa = metrics.detection_at(probabilities[:, uav], label == uav, false_alarm_rate=FALSE_ALARM_RATE)
+    false_uav = {
+        "best": metrics.rate(best[label != uav] == uav),
+        "accepted": metrics.rate(accepted[label != uav] == uav),
+    }
     return {
         "refused": int(np.count_nonzero(~seen)),
         "accuracy": metrics.rate(right),
@@ -121,14 +133,18 @@ def score(truth: Truth, answers: Answers) -> dict[str, Any]:
         "balanced_accuracy": metrics.mean_of_rates(list(recalls.values())),
         "recall": recalls,
         "confusion": _confusion(label, best, accepted, len(truth.classes)),
-        "uav_at_pfa": metrics.detection_at(probabilities[:, uav], label == uav, false_alarm_rate=FALSE_ALARM_RATE),
-        "false_uav": {
-            "best": metrics.rate(best[label != uav] == uav),
-            "accepted": metrics.rate(accepted[label != uav] == uav),
-        },
+        "uav_at_pfa": at_pfa,
+        "false_uav": false_uav,
+        "false_per_hour": {name: _per_hour(one) for name, one in false_uav.items()},
         "reliability": metrics.reliability(probabilities.max(axis=-1, initial=0.0), right),
         "by_snr": _sliced(truth, seen, right, truth.snr_db[seen], _snr_edges(truth.snr_db)),
         "by_dwell": _sliced(truth, seen, right, truth.dwell_s[seen], _one_two_five(truth.dwell_s)),
+        "by_beta": _by_beta(
+            truth.beta_rad[seen & (truth.label == uav)],
+            right[label == uav],
+            probabilities[label == uav, uav],
+            at_pfa["threshold"],
+        ),
         "by_kind": _by_kind(truth, seen, best, accepted),
         "acceptance": _acceptance(truth, seen, accepted),
     }
@@ -159,6 +175,29 @@ def _sliced(
         inside = (values >= low) & (values < high)
         rates = {name: metrics.rate(right[inside & (label == i)]) for i, name in enumerate(truth.classes)}
         slices.append({"from": float(low), "to": float(high), "all": metrics.rate(right[inside]), **rates})
+    return slices
+
+
+def _per_hour(share: metrics.Rate) -> dict[str, float | None]:
+    """So many an hour, at `DWELLS_PER_HOUR`, where each dwell stands for itself."""
+    return {key: None if share[key] is None else share[key] * DWELLS_PER_HOUR for key in ("value", "low", "high")}
+
+
+def _by_beta(
+    beta_rad: NDArray[np.float64],
+    right: NDArray[np.bool_],
+    probability: NDArray[np.float64],
+    threshold: float | None,
+) -> list[dict[str, Any]]:
+    """Slices of the UAVs by the angle at which their rotors are seen."""
+    if threshold is None or not np.isfinite(beta_rad).any():
+        return []
+    slices = []
+    beta_deg = np.rad2deg(beta_rad)
+    for low, high in pairwise(np.arange(0.0, np.nanmax(beta_deg) + BETA_STEP_DEG, BETA_STEP_DEG)):
+        inside = (beta_deg >= low) & (beta_deg < high)
+        rates = {"answered": metrics.rate(right[inside]), "found": metrics.rate(probability[inside] > threshold)}
+        slices.append({"from": float(low), "to": float(high), **rates})
     return slices
 
 

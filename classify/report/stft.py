@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
-from .timing import Work, quote, time_in_turns
+from .timing import Work, quote, ratio, time_in_turns
 
 # The paper's claim: how many times faster one FFT is than the STFT, by number of samples.
 PAPER_RATIOS = {2000: (19.0, 46.0), 10_000: (22.0, 77.0)}
@@ -18,6 +19,8 @@ PAPER_RATIOS = {2000: (19.0, 46.0), 10_000: (22.0, 77.0)}
 STFT_WINDOWS = (20, 80, 200)
 STFT_OVERLAPS = (0.5, 0.9)
 STFT_BINS = 512
+# Lengths that the law of one FFT is fitted over.
+LAW_LENGTHS = (256, 512, 1024, 2000, 4096, 8192, 10_000, 16_384)
 
 
 def stft(iq: NDArray[np.complex64], *, window: int, overlap: float) -> NDArray[np.complex64]:
@@ -36,9 +39,18 @@ def stft(iq: NDArray[np.complex64], *, window: int, overlap: float) -> NDArray[n
     (frames, 512) complex64
         FFT order along the frequencies.
     """
+    return transformed(frames(iq, window=window, overlap=overlap))
+
+
+def frames(iq: NDArray[np.complex64], *, window: int, overlap: float) -> NDArray[np.complex64]:
+    """Frames of a record as a view, shape (frames, window)."""
     hop = max(1, round(window * (1.0 - overlap)))
-    frames = np.lib.stride_tricks.sliding_window_view(iq, window)[::hop]
-    return scipy.fft.fft(frames * np.hanning(window).astype(np.float32), n=STFT_BINS, axis=-1)
+    return np.lib.stride_tricks.sliding_window_view(iq, window)[::hop]
+
+
+def transformed(some: NDArray[np.complex64]) -> NDArray[np.complex64]:
+    """Spectra of frames (frames, window), shape (frames, 512)."""
+    return scipy.fft.fft(some * np.hanning(some.shape[-1]).astype(np.float32), n=STFT_BINS, axis=-1)
 
 
 def time_fft_against_stft(
@@ -80,9 +92,80 @@ def time_fft_against_stft(
         bare = quote(taken["fft"])
         rows = []
         for window, overlap in grid:
-            timed = quote(taken[f"{window} {overlap}"])
-            frames = stft(iq, window=window, overlap=overlap).shape[0]
-            about = {"window": window, "overlap": overlap, "frames": frames, "bins": STFT_BINS}
-            rows.append({**about, **timed, "ratio_to_fft": timed["median_us"] / bare["median_us"]})
+            laps = taken[f"{window} {overlap}"]
+            made = len(frames(iq, window=window, overlap=overlap))
+            about = {"window": window, "overlap": overlap, "frames": made, "bins": STFT_BINS}
+            rows.append({**about, **quote(laps), **ratio(laps, taken["fft"])})
         results.append({"pulses": pulses, "paper_ratio": list(claim), "fft": bare, "stft": rows})
     return results
+
+
+def time_law(
+    stfts: Sequence[Mapping[str, Any]],
+    *,
+    seed: int,
+    seconds: float,
+    least_rounds: int,
+    on_share: Callable[[float], None] | None = None,
+) -> dict[str, Any]:
+    """Hold the time of transforms against their number of operations, 5 N log2 N for one of length N.
+
+    Parameters
+    ----------
+    stfts : sequence of dict
+        As made by `time_fft_against_stft`: frames times 5 N log2 N, N = 512, each.
+    seed, seconds, least_rounds, on_share
+        As there.
+
+    Returns
+    -------
+    dict
+        ``fft`` and ``stft``, each with ``points`` (``{"pulses", "window", "overlap", "operations", "time_us"}``) and
+        the fit of time = ``call_us`` + ``ns_each`` * operations over them, with ``worst_factor``: how far the farthest
+        point lies from the fit.
+    """
+    rng = np.random.default_rng(seed)
+    works: dict[int, Work] = {}
+    for length in LAW_LENGTHS:
+        iq = rng.standard_normal(2 * length, dtype=np.float32).view(np.complex64)
+        works[length] = partial(scipy.fft.fft, iq)
+    taken = time_in_turns(works, seconds=seconds, least_rounds=least_rounds, most_rounds=1000, on_share=on_share)
+    single = [
+        {
+            "pulses": length,
+            "window": None,
+            "overlap": None,
+            "operations": _operations(length),
+            "time_us": quote(laps)["median_us"],
+        }
+        for length, laps in taken.items()
+    ]
+    several = [
+        {
+            "pulses": part["pulses"],
+            "window": row["window"],
+            "overlap": row["overlap"],
+            "operations": row["frames"] * _operations(row["bins"]),
+            "time_us": row["median_us"],
+        }
+        for part in stfts
+        for row in part["stft"]
+    ]
+    return {"fft": _fitted(single), "stft": _fitted(several)}
+
+
+def _operations(length: int) -> float:
+    return float(5 * length * np.log2(length))
+
+
+def _fitted(points: list[dict[str, Any]]) -> dict[str, Any]:
+    """Least squares of the relative errors, neither term below zero."""
+    operations = np.array([point["operations"] for point in points])
+    times_us = np.array([point["time_us"] for point in points])
+    terms = np.stack([np.ones(len(points)), operations], axis=1) / times_us[:, None]
+    # in the columns' own sizes: one is a million times the other
+    sizes = np.linalg.norm(terms, axis=0)
+    (call_us, each_us), _ = nnls(terms / sizes, np.ones(len(points)))
+    call_us, each_us = float(call_us / sizes[0]), float(each_us / sizes[1])
+    worst = float(np.exp(np.abs(np.log((call_us + each_us * operations) / times_us)).max()))
+    return {"points": points, "call_us": call_us, "ns_each": 1e3 * each_us, "worst_factor": worst}

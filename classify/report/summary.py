@@ -7,7 +7,7 @@ from typing import Any
 
 from bladewing.models import DEFAULT_MODEL
 
-from .words import MINUS, batch_words, count, micros, number, percent, size, spoken
+from .words import MINUS, batch_words, count, micros, millis, number, percent, size, spoken
 
 # Fewer records than this are no ground for a sentence.
 LEAST_RECORDS = 20
@@ -102,8 +102,10 @@ def _merits(report: Mapping[str, Any], name: str, found: Mapping[str, Any]) -> I
 
 
 def _costs(report: Mapping[str, Any]) -> Iterator[str]:
+    yield from front_budgets(report, batch=report["cost"]["batches"][-1]["batch"])
     for part in report["trade"]:
-        yield f"On one thread, {batch_words(part['batch'])}: {budget_sentence(part['budgets'])}"
+        bought = budget_sentence(part["budgets"])
+        yield f"Any radar of the envelope, on one thread, {batch_words(part['batch'])}: {bought}"
     for part in report["fft_against_stft"]:
         ratios = [row["ratio_to_fft"] for row in part["stft"]]
         low, high = part["paper_ratio"]
@@ -116,6 +118,25 @@ def _costs(report: Mapping[str, Any]) -> Iterator[str]:
     weights = {row["form"]: row["bytes"] for row in report["storage"]}
     words = ", ".join(f"{spoken(form)} {size(weight)}" for form, weight in weights.items())
     yield f"A record of {count(report['reference']['pulses'])} pulses weighs: {words}."
+
+
+def front_budgets(report: Mapping[str, Any], *, batch: int | None = None) -> list[str]:
+    """One sentence a batch size (or of one) and budget: what is the most accurate choice within it."""
+    lines = []
+    for one in report["front"]["budgets"]:
+        if batch not in (None, one["batch"]):
+            continue
+        head = f"Under {micros(one['budget_us'])} a record, {batch_words(one['batch'])}"
+        if one["choice"] is None:
+            lines.append(f"{head}: nothing.")
+            continue
+        what = one["choice"] if one["kind"] == "model" else f"{one['words']} (trained here)"
+        lines.append(
+            f"{head}: {what}, dwells of {millis(one['dwell_s'])}, balanced accuracy "
+            f"{_with_interval(one['balanced_accuracy'])} for {micros(one['cost_us'])}; at one false alarm in 100 it "
+            f"finds {_with_interval(one['uav_found'])} of the UAVs."
+        )
+    return lines
 
 
 def budget_sentence(budgets: Sequence[Mapping[str, Any]]) -> str:

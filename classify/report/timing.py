@@ -124,3 +124,24 @@ def quote(laps: Laps, *, per: int = 1) -> dict[str, Any]:
         "passed_us": float(np.median(passed_us)),
         "rounds": len(laps.worked_s),
     }
+
+
+def ratio(laps: Laps, base: Laps) -> dict[str, float]:
+    """How many times longer one piece of work takes than another of the same rounds.
+
+    Parameters
+    ----------
+    laps, base : Laps
+        From one call of `time_in_turns`.
+
+    Returns
+    -------
+    dict
+        ``ratio_to_fft`` (of the medians), ``ratio_low`` and ``ratio_high``: the ratios of the single rounds from which
+        a tenth lies below and a tenth above.
+    """
+    worked, bare = np.asarray(laps.worked_s), np.asarray(base.worked_s)
+    low, high = np.quantile(worked / bare, (0.1, 0.9))
+    middle = float(np.median(worked) / np.median(bare))
+    # one round is no spread, and the ratio of medians may leave a narrow one
+    return {"ratio_to_fft": middle, "ratio_low": min(float(low), middle), "ratio_high": max(float(high), middle)}

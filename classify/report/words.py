@@ -45,3 +45,17 @@ def spoken(name: str) -> str:
 def batch_words(batch: int) -> str:
     """Name a batch size."""
     return "one record at a time" if batch == 1 else f"batches of {batch}"
+
+
+def millis(value_s: float) -> str:
+    """Write a dwell [s] in milliseconds."""
+    return f"{number(1e3 * value_s)}{NBSP}ms"
+
+
+def large(value: float) -> str:
+    """Write a large count with the prefix of its thousands."""
+    for prefix in ("", "k", "M"):
+        if value < 1000:
+            return number(value) + (f"{NBSP}{prefix}" if prefix else "")
+        value /= 1000
+    return f"{number(value)}{NBSP}G"

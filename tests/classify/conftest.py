@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,20 @@ from bladewing.features.schema import INPUT_SHAPES, schema_hash
 from bladewing.models.seal import PLACEHOLDER, SEAL_KEY, seal
 
 CARRIER_HZ, PRF_HZ = 10e9, 20e3
+
+#: The least a report can measure.
+TINY_REPORT = """
+records = 120
+reference_records = 64
+chain_s = 1e-3
+stft_s = 1e-3
+least_rounds = 2
+repeats = 2
+front_train = 210
+front_test = 6
+front_epochs = 1
+front_s = 1e-3
+"""
 
 
 def model_bytes(
@@ -78,6 +93,71 @@ def mixed_model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("models") / "mixed.onnx"
     path.write_bytes(model_bytes(slope=0.05))
     return path
+
+
+@pytest.fixture(scope="session")
+def tiny_models(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of two models that cost nothing, under a known name and a strange one."""
+    folder = tmp_path_factory.mktemp("models")
+    (folder / "spectrum-cnn.onnx").write_bytes(model_bytes(slope=0.05))
+    (folder / "always-uav.onnx").write_bytes(model_bytes(bias=np.log([0.8, 0.15, 0.05])))
+    return folder
+
+
+def linear_bytes(net: Any) -> bytes:
+    """A model with a network's inputs that takes no time to make: a report only times it."""
+    from onnx import TensorProto, helper, numpy_helper
+
+    signal, evidence = net.input_shapes
+    weights = numpy_helper.from_array(np.eye(4, 3, dtype=np.float32), "weights")
+    nodes = [
+        helper.make_node("Shape", [signal], ["unused"]),
+        helper.make_node("MatMul", [evidence, "weights"], ["scores"]),
+        helper.make_node("Softmax", ["scores"], ["probabilities"], axis=-1),
+    ]
+    inputs = [
+        helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *shape])
+        for name, shape in net.input_shapes.items()
+    ]
+    out = helper.make_tensor_value_info("probabilities", TensorProto.FLOAT, ["batch", 3])
+    graph = helper.make_graph(nodes, "linear", inputs, [out], [weights])
+    made = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
+    content: bytes = made.SerializeToString()
+    return content
+
+
+def few_choices(patch: pytest.MonkeyPatch) -> None:
+    """Let a report compare little: two pictures, three dwells, two numbers of bins; no process of its own."""
+    from bladewing.classify.report import choices, front, pictures
+
+    few = {name: pictures.PICTURES[name] for name in ("spectrum", "stft-80-90")}
+    dwells_s, bins = (0.005, 0.02, 0.08), (64, 1024)
+    for module in (front, choices):
+        patch.setattr(module, "PICTURES", few)
+        patch.setattr(module, "DWELLS_S", dwells_s)
+        patch.setattr(module, "STORED_BINS", bins)
+    patch.setattr(choices, "network_bytes", linear_bytes)
+    patch.setattr(front, "peak_bytes", lambda *_: 1_000_000)
+
+
+@pytest.fixture(scope="session")
+def tiny_settings(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A settings file of the least report."""
+    file = tmp_path_factory.mktemp("settings") / "tiny.toml"
+    file.write_text(TINY_REPORT)
+    return file
+
+
+@pytest.fixture(scope="session")
+def report_folder(tmp_path_factory: pytest.TempPathFactory, tiny_models: Path, tiny_settings: Path) -> Path:
+    """A whole report on few records: report.json and report.html."""
+    from bladewing.classify.report import run_report
+
+    folder = tmp_path_factory.mktemp("report") / "new"
+    with pytest.MonkeyPatch.context() as patch:
+        few_choices(patch)
+        run_report(folder, models=tiny_models, quick=True, config=tiny_settings, progress=False)
+    return folder
 
 
 @pytest.fixture

@@ -43,10 +43,10 @@ def test_train_hands_its_options_on(calls):
 
 def test_report_hands_its_options_on(calls):
     assert main(["report"]) == 0
-    assert main(["report", "--out", "r", "--models", "m", "--seed", "3", "--quick"]) == 0
+    assert main(["report", "--out", "r", "--models", "m", "--seed", "3", "--quick", "--config", "c.toml"]) == 0
     assert calls == [
-        (Path("out"), {"models": None, "quick": False, "seed": 0, "progress": True}),
-        (Path("r"), {"models": Path("m"), "quick": True, "seed": 3, "progress": True}),
+        (Path("out"), {"models": None, "quick": False, "seed": None, "config": None, "progress": True}),
+        (Path("r"), {"models": Path("m"), "quick": True, "seed": 3, "config": Path("c.toml"), "progress": True}),
     ]
 
 

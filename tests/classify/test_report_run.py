@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -20,45 +19,29 @@ from bladewing.classify.report.page import draw_page
 from bladewing.classify.stability.cell import Cell
 from bladewing.features.schema import INPUT_SHAPES
 
-TINY = run.Effort(records=120, reference_records=64, chain_s=1e-3, stft_s=1e-3, least_rounds=2)
-
 
 @pytest.fixture(scope="module")
-def models(tmp_path_factory: pytest.TempPathFactory, make_model: Callable[..., bytes]) -> Path:
-    folder = tmp_path_factory.mktemp("models")
-    (folder / "spectrum-cnn.onnx").write_bytes(make_model(slope=0.05))
-    (folder / "always-uav.onnx").write_bytes(make_model(bias=np.log([0.8, 0.15, 0.05])))
-    return folder
-
-
-@pytest.fixture(scope="module")
-def out(tmp_path_factory: pytest.TempPathFactory, models: Path) -> Path:
-    folder = tmp_path_factory.mktemp("report") / "new"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run, "QUICK", TINY)
-        run_report(folder, models=models, quick=True, progress=False)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def report(out: Path) -> dict[str, Any]:
+def report(report_folder: Path) -> dict[str, Any]:
     def refuse(name: str) -> None:
         raise AssertionError(f"{name} is not JSON")
 
-    found: dict[str, Any] = json.loads((out / "report.json").read_text(encoding="utf-8"), parse_constant=refuse)
+    found: dict[str, Any] = json.loads(
+        (report_folder / "report.json").read_text(encoding="utf-8"), parse_constant=refuse
+    )
     return found
 
 
 def test_report_holds_the_data_of_every_figure(report: dict[str, Any]) -> None:
     assert set(report) == {
         *("schema_version", "made", "machine", "classes", "records", "models", "scores", "reference", "cost"),
-        *("trade", "fft_against_stft", "storage", "examples"),
+        *("trade", "front", "fft_against_stft", "time_law", "storage", "examples", "stft_pictures", "tables"),
+        *("training", "config"),
     }
     assert [model["name"] for model in report["models"]] == ["spectrum-cnn", "always-uav"]
     for found in report["scores"].values():
         assert set(found) == {
             *("refused", "accuracy", "design_effect", "balanced_accuracy", "recall", "confusion", "uav_at_pfa"),
-            *("false_uav", "reliability", "by_snr", "by_dwell", "by_kind", "acceptance"),
+            *("false_uav", "false_per_hour", "reliability", "by_snr", "by_dwell", "by_beta", "by_kind", "acceptance"),
         }
     for part in report["cost"]["batches"]:
         assert {(row["stage"], row["name"]) for row in part["stages"]} == {
@@ -91,7 +74,7 @@ def test_a_model_that_always_says_uav_is_scored_as_such(report: dict[str, Any]) 
     assert found["acceptance"]["coverage"]["value"] == 1.0
 
 
-def test_page_is_drawn_from_the_stored_json_alone_to_the_same_bytes(out: Path) -> None:
+def test_page_is_drawn_from_the_stored_json_alone_to_the_same_bytes(report_folder: Path) -> None:
     redraw = (
         "import json, sys; from bladewing.classify.report.page import draw_page; "
         "sys.stdout.buffer.write(draw_page(json.load(open(sys.argv[1], encoding='utf-8'))).encode())"
@@ -99,9 +82,12 @@ def test_page_is_drawn_from_the_stored_json_alone_to_the_same_bytes(out: Path) -
     for hash_seed in ("1", "2"):
         environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
         drawn = subprocess.run(
-            [sys.executable, "-c", redraw, str(out / "report.json")], env=environment, capture_output=True, check=True
+            [sys.executable, "-c", redraw, str(report_folder / "report.json")],
+            env=environment,
+            capture_output=True,
+            check=True,
         )
-        assert drawn.stdout == (out / "report.html").read_bytes()
+        assert drawn.stdout == (report_folder / "report.html").read_bytes()
 
 
 class Reader(HTMLParser):
@@ -144,8 +130,8 @@ def read(page: str) -> Reader:
     return reader
 
 
-def test_page_is_whole_asks_for_nothing_and_names_its_pictures(out: Path) -> None:
-    page = (out / "report.html").read_text(encoding="utf-8")
+def test_page_is_whole_asks_for_nothing_and_names_its_pictures(report_folder: Path) -> None:
+    page = (report_folder / "report.html").read_text(encoding="utf-8")
     reader = read(page)
     assert all(link.startswith(("#", "data:")) for link in reader.links)
     assert "@import" not in page
@@ -170,6 +156,7 @@ def test_page_copes_with_one_model_without_answers(report: dict[str, Any]) -> No
         snr_db=np.full(120, np.nan),
         dwell_s=np.full(120, 0.08),
         radar=np.zeros(120, int),
+        beta_rad=np.full(120, np.nan),
     )
     refused = scores.Answers(np.full((120, 3), 1 / 3), np.full(120, scores.UNKNOWN), np.zeros(120, bool))
     lean["scores"] = {name: scores.score(truth, refused)}
@@ -193,21 +180,53 @@ def test_page_of_another_schema_is_refused(report: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("where", ["scores.score", "draw_page", "write_together"])
 def test_interrupted_run_leaves_the_old_files_whole(
-    where: str, out: Path, models: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    where: str,
+    report_folder: Path,
+    tiny_models: Path,
+    tiny_settings: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    old = {name: (out / name).read_bytes() for name in ("report.json", "report.html")}
+    old = {name: (report_folder / name).read_bytes() for name in ("report.json", "report.html", "model-card.md")}
     for name, content in old.items():
         (tmp_path / name).write_bytes(content)
-    monkeypatch.setattr(
-        run, "QUICK", run.Effort(records=12, reference_records=64, chain_s=1e-3, stft_s=1e-3, least_rounds=1)
-    )
+    body = json.loads(old["report.json"])
+    if where != "scores.score":
+        monkeypatch.setattr(run, "measure", lambda *_, **__: body)
     monkeypatch.setattr(f"bladewing.classify.report.run.{where}", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        run_report(tmp_path, models=models, quick=True, seed=1, progress=False)
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == old
+        run_report(tmp_path, models=tiny_models, quick=True, seed=1, config=tiny_settings, progress=False)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == old
+
+
+def test_an_interrupted_run_goes_on_where_it_stopped(
+    report: dict[str, Any],
+    tiny_models: Path,
+    tiny_settings: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    def again(*_: object, **__: object) -> None:
+        raise AssertionError("what was measured is measured again")
+
+    call = {"models": tiny_models, "quick": True, "config": tiny_settings, "progress": False}
+    with monkeypatch.context() as patch:
+        patch.setattr("bladewing.classify.report.run.cost.time_chain", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            run_report(tmp_path, **call)
+    monkeypatch.setattr("bladewing.classify.report.run.evaluate.ask", again)
+    # of what comes after, only that it is reached
+    monkeypatch.setattr("bladewing.classify.report.run.cost.time_chain", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        run_report(tmp_path, **call)
+    (kept,) = (tmp_path / "report-parts").glob("*/scores.json")
+    assert json.loads(kept.read_text())["scores"] == report["scores"]
 
 
 def test_no_models_is_one_clear_line(tmp_path: Path) -> None:
@@ -215,7 +234,7 @@ def test_no_models_is_one_clear_line(tmp_path: Path) -> None:
         run_report(tmp_path, models=tmp_path, quick=True, progress=False)
     with pytest.raises(BadInput, match="not a folder"):
         run_report(tmp_path, models=tmp_path / "missing", quick=True, progress=False)
-    with pytest.raises(BadInput, match="seed=-1"):
+    with pytest.raises(BadInput, match="seed is -1"):
         run_report(tmp_path, models=None, quick=True, seed=-1, progress=False)
 
 

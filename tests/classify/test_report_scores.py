@@ -20,6 +20,7 @@ def drawn(count: int = 300, seed: int = 0) -> tuple[Truth, Answers]:
         snr_db=np.where(rng.random(count) < 0.1, np.nan, rng.uniform(-20, 30, count)),
         dwell_s=10 ** rng.uniform(-2.3, -0.5, count),
         radar=np.arange(count) // 24,
+        beta_rad=np.where(label == 0, rng.uniform(0, np.pi / 2, count), np.nan),
     )
     logits = rng.standard_normal((count, 3))
     logits[np.arange(count), label] += 1.2

@@ -1,0 +1,158 @@
+"""The model card and the README's figures, in Markdown, from the content of ``report.json`` alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from .summary import front_budgets, headline_model, sentences
+from .words import MINUS, count, micros, number, percent, size, spoken
+
+
+def model_card(report: Mapping[str, Any]) -> str:
+    """Write the card of the models in a report.
+
+    Parameters
+    ----------
+    report : mapping
+        The content of ``report.json``, as read.
+
+    Returns
+    -------
+    str
+        Markdown; the same for the same content.
+    """
+    name = headline_model(report)
+    model = next(one for one in report["models"] if one["name"] == name)
+    found = report["scores"][name]
+    parts = [
+        "# Model card",
+        "",
+        f"The models of bladewing; where one is meant, it is `{name}`, the one that is used where none is named. "
+        f"Figures: `{report['made']['command']}`, {report['made']['date'][:10]}, "
+        f"{count(report['records']['total'])} synthetic test records of {count(report['records']['radars'])} radars.",
+        "",
+        *_section("Where it fails", [line for head, lines in sentences(report) if "fails" in head for line in lines]),
+        *_section("What it can do", [line for head, lines in sentences(report) if "can do" in head for line in lines]),
+        "## Models",
+        "",
+        *_table(report),
+        "",
+        "95 % intervals in brackets. Every one reads IQ of one range cell through features of this package, and "
+        "answers UAV, bird or clutter with calibrated probabilities, or “unknown”.",
+        "",
+        "## Intended use",
+        "",
+        "To name what moves in one range cell of a pulse-Doppler or CW radar, dwell by dwell, beside a signal "
+        "processor, and to compare what inputs and models cost. Not meant for fire control or any decision without a "
+        "person; not for imaging, and not to tell makes of UAV apart.",
+        "",
+        "## Envelope",
+        "",
+        *[f"- {spoken(key)}: {_bounds(value)}" for key, value in model["envelope"].items()],
+        "",
+        "Outside of it the answer is “unknown”, with the reason.",
+        "",
+        "## Training data",
+        "",
+        _training(report),
+        "",
+        "## Kinds, and what they are called",
+        "",
+        "| kind | class | records | called UAV | declined |",
+        "|---|---|---:|---:|---:|",
+        *[
+            f"| {spoken(row['kind'])} | {row['class']} | {count(row['called']['uav']['count'])} "
+            f"| {_rate(row['called']['uav'])} | {percent(row['unknown']['value'])} |"
+            for row in found["by_kind"]
+        ],
+        "",
+        *_section("Cost", front_budgets(report)),
+    ]
+    return "\n".join(parts).rstrip() + "\n"
+
+
+def expectations(report: Mapping[str, Any]) -> str:
+    """Write what the README says may be expected, the failures first."""
+    name = headline_model(report)
+    found, scores = report["scores"][name], report["scores"]
+    others = ", ".join(
+        f"`{other}` {percent(scores[other]['balanced_accuracy']['value'])}" for other in scores if other != name
+    )
+    accepted, at_pfa = found["acceptance"], found["uav_at_pfa"]
+    low, high = report["records"]["snr_db"] or (float("nan"), float("nan"))
+    shortest = 1e3 * report["records"]["dwell_s"][0]
+    lines = [
+        f"Frankly, what fails first (shipped `{name}`; figures from `docs/report.json`: "
+        f"{count(report['records']['total'])} synthetic test records of {count(report['records']['radars'])} radars "
+        f"over the whole envelope, many of which hold nothing to see: SNR {number(low)} to {number(high)} dB, "
+        f"dwells from {number(shortest)} ms, blades seen along their axis; 95 % intervals in brackets):",
+        "",
+        f"- balanced accuracy over the three classes {_rate(found['balanced_accuracy'])}"
+        + (f" ({others})" if others else "")
+        + ";",
+        f"- {percent(accepted['coverage']['value'])} of the records are named at all, the rest is “unknown”; of the "
+        f"named ones {_rate(accepted['accuracy'])} are right;",
+        f"- {_rate(found['false_uav']['accepted'])} of birds and clutter are named UAV; at "
+        f"{number(100 * at_pfa['allowed'])} % false alarms {_rate(at_pfa['detection'])} of all UAVs are found.",
+    ]
+    return "\n".join(lines).replace("\u00a0", " ")
+
+
+def budgets(report: Mapping[str, Any]) -> str:
+    """Write what three budgets of time buy, in batches."""
+    batch = report["cost"]["batches"][-1]["batch"]
+    return "\n".join(f"- {line}" for line in front_budgets(report, batch=batch)).replace("\u00a0", " ")
+
+
+def _section(title: str, lines: list[str]) -> list[str]:
+    return [f"## {title}", "", *[f"- {line}" for line in lines], ""]
+
+
+def _table(report: Mapping[str, Any]) -> list[str]:
+    batch = report["cost"]["batches"][-1]["stages"]
+    chain = {row["name"]: row["median_us"] for row in batch if row["stage"] == "chain"}
+    first = report["scores"][report["models"][0]["name"]]
+    allowed = percent(first["uav_at_pfa"]["allowed"])
+    size_of = report["cost"]["batches"][-1]["batch"]
+    return [
+        f"| model | balanced accuracy | UAVs found at {allowed} false alarms | false UAVs, may decline "
+        f"| a record, batch of {size_of} | file |",
+        "|---|---:|---:|---:|---:|---:|",
+    ] + [
+        f"| {model['name']} | {_rate(found['balanced_accuracy'])} | {_rate(found['uav_at_pfa']['detection'])} "
+        f"| {_rate(found['false_uav']['accepted'])} | {micros(chain[model['name']])} | {size(model['bytes'])} |"
+        for model in report["models"]
+        for found in [report["scores"][model["name"]]]
+    ]
+
+
+def _rate(rate: Mapping[str, Any]) -> str:
+    if rate["value"] is None:
+        return "–"
+    return f"{percent(rate['value'])} [{100 * rate['low']:.1f}, {100 * rate['high']:.1f}]"
+
+
+def _bounds(value: Any) -> str:
+    if isinstance(value, list):
+        return " to ".join(f"{one:g}" for one in value)
+    return f"{value:g}".replace("-", MINUS) if isinstance(value, int | float) else str(value)
+
+
+def _training(report: Mapping[str, Any]) -> str:
+    given = report["training"]
+    rows = report["scores"][headline_model(report)]["by_kind"]
+    kinds = "; ".join(
+        f"{name}: {', '.join(spoken(row['kind']) for row in rows if row['class'] == name)}"
+        for name in report["classes"]
+    )
+    drawn = (
+        "Only synthetic records, drawn from the laws in `simulate/laws.py` over the whole envelope, through imperfect "
+        f"receivers. No measured record was trained on. Kinds: {kinds}."
+    )
+    if given is None:
+        return f"{drawn} There is no account of how these models were trained."
+    return (
+        f"{drawn} {count(given['records']['train'])} records, seed {given['settings']['seed']}, and "
+        f"{count(given['records']['calibrate'])} others to calibrate; {number(given['seconds'])} s."
+    )

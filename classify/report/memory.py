@@ -1,0 +1,55 @@
+"""Peak memory of an answer, read off a process of its own."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+_STATUS, _CLEAR = Path("/proc/self/status"), Path("/proc/self/clear_refs")
+
+
+def peak_bytes(work: Callable[..., Callable[[], object]], *arguments: Any) -> int | None:
+    """How far a process's memory rises over what its libraries take.
+
+    Parameters
+    ----------
+    work : callable
+        Importable; called with the arguments in a fresh process, it prepares (opens the model) and returns what
+        answers, which is called once.
+    *arguments
+        Passed on.
+
+    Returns
+    -------
+    int or None
+        Rise of the resident memory at its peak [byte]; None where the system does not tell (not Linux).
+    """
+    if not (sys.platform == "linux" and _CLEAR.exists()):
+        return None
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        return pool.submit(_measure, work, arguments).result()
+
+
+def _measure(work: Callable[..., Callable[[], object]], arguments: tuple[Any, ...]) -> int | None:
+    """The rise, in this process."""
+    import onnxruntime  # noqa: F401
+    import scipy.fft  # noqa: F401
+
+    before = _resident("VmRSS")
+    try:
+        _CLEAR.write_text("5")  # forget the peak so far
+    except OSError:
+        return None
+    work(*arguments)()
+    return max(0, _resident("VmHWM") - before)
+
+
+def _resident(field: str) -> int:
+    for line in _STATUS.read_text().splitlines():
+        if line.startswith(field + ":"):
+            return 1024 * int(line.split()[1])
+    raise OSError(f"{_STATUS} has no {field}")

@@ -1,0 +1,233 @@
+"""The pictures of a dwell that the front compares, all on one velocity axis and of one small size.
+
+A picture is what a small network reads: levels in decibels, channels first. Whatever its transform costs and however
+large the transform is, it ends on the axis that all radars share, so that networks of one anatomy can be set against
+one another. To put another representation on the front, add a line to `PICTURES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache, partial
+
+import numpy as np
+from bladewing.features import doppler_spectrum
+from bladewing.features import stft as joint
+from bladewing.features.axis import pooling
+from bladewing.features.vector import radar_columns
+from bladewing.simulate import Radar
+from numpy.typing import NDArray
+
+from .stft import STFT_BINS, frames, transformed
+
+#: Velocity bins of the spectrum; velocity bins and frames of a picture with time in it.
+SPECTRUM_BINS = 256
+IMAGE_BINS, IMAGE_FRAMES = 64, 32
+
+#: The four STFTs of the paper that are pictured and weighed: window [samples], overlap.
+STFT_SETTINGS = ((80, 0.9), (200, 0.9), (20, 0.9), (80, 0.5))
+
+#: Window of the cadence-velocity diagram [s], the paper's middle one.
+CADENCE_WINDOW_S = 4e-3
+
+#: Samples worked on at a time: a short window's STFT is hundreds of times larger than the record.
+_BLOCK_SAMPLES = 1 << 16
+
+#: Frames of an STFT that are worked on at a time.
+_CACHED_FRAMES = 256
+
+Maker = Callable[[NDArray[np.complex64], Radar], NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One way to show a dwell to a network.
+
+    Attributes
+    ----------
+    words : str
+        What people call it.
+    shape : tuple of int
+        Of one record: channels and velocity bins, or channels, velocity bins and frames.
+    make : callable
+        From samples (n, pulses) and their radar to float32 (n, *shape) [dB].
+    """
+
+    words: str
+    shape: tuple[int, ...]
+    make: Maker
+
+
+def spectrum_picture(iq: NDArray[np.complex64], radar: Radar, *, bins: int = SPECTRUM_BINS) -> NDArray[np.float32]:
+    """One FFT over the whole dwell: mean and peak level of each velocity bin.
+
+    Parameters
+    ----------
+    iq : (n, pulses) complex64
+    radar : Radar
+        Theirs.
+    bins : int
+        Velocity bins.
+
+    Returns
+    -------
+    (n, 2, bins) float32
+        Over the noise floor [dB].
+    """
+    spectrum = doppler_spectrum(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
+    pool = pooling(spectrum.bins, radar.carrier_hz, radar.prf_hz, bins)
+    return np.stack([pool.mean_db(spectrum.relative_power), pool.peak_db(spectrum.relative_power)], axis=-2)
+
+
+def stft_picture(iq: NDArray[np.complex64], radar: Radar, *, window: int, overlap: float) -> NDArray[np.float32]:
+    """One of the paper's STFTs, pooled to velocity bins and frames.
+
+    Parameters
+    ----------
+    iq : (n, pulses) complex64
+    radar : Radar
+        Theirs.
+    window : int
+        Window [samples]; a shorter dwell is one window.
+    overlap : float
+        Share of a window that the next one covers.
+
+    Returns
+    -------
+    (n, 1, velocity bins, frames) float32
+        Over the median of the picture [dB].
+    """
+    pool = pooling(STFT_BINS, radar.carrier_hz, radar.prf_hz, IMAGE_BINS)
+    out = np.empty((len(iq), 1, IMAGE_BINS, IMAGE_FRAMES), np.float32)
+    for row, record in enumerate(iq):
+        power = np.fft.fftshift(_pooled_power(frames(record, window=min(window, radar.pulses), overlap=overlap)), -1)
+        level = np.median(power)
+        out[row, 0] = pool.mean_db(power / (level if level > 0 else np.float32(1))).T
+    return out
+
+
+def _pooled_power(some: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """Mean power spectra of neighbouring frames, `IMAGE_FRAMES` in all; too few frames are shown several times."""
+    count = len(some)
+    starts = np.arange(IMAGE_FRAMES) * count // IMAGE_FRAMES
+    if count < IMAGE_FRAMES:
+        return _squares(transformed(some))[starts]
+    ends = np.append(starts[1:], count)
+    pooled = np.empty((IMAGE_FRAMES, STFT_BINS), np.float32)
+    # A few pools at a time: a whole STFT of a short window leaves every cache.
+    step = max(1, IMAGE_FRAMES * _CACHED_FRAMES // count)
+    for first in range(0, IMAGE_FRAMES, step):
+        part = slice(first, first + step)
+        begin, end = starts[part][0], ends[part][-1]
+        pooled[part] = np.add.reduceat(_squares(transformed(some[begin:end])), starts[part] - begin, axis=0)
+    pooled /= (ends - starts)[:, None].astype(np.float32)
+    return pooled
+
+
+def cadence_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
+    """Cadence-velocity diagram: how fast each velocity's level swings, (n, 1, velocity bins, cadences) [dB]."""
+    swings, _ = joint.cadence_velocity(_frames_of(iq, radar, CADENCE_WINDOW_S))
+    few = _grouped(swings**2, IMAGE_FRAMES)
+    level = np.median(few, axis=(1, 2), keepdims=True)
+    few /= np.where(level > 0, level, np.float32(1))
+    pool = pooling(few.shape[-1], radar.carrier_hz, radar.prf_hz, IMAGE_BINS)
+    return np.swapaxes(pool.mean_db(few), -1, -2)[:, None]
+
+
+def cepstral_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
+    """Cepstrogram: periods of the comb, evenly spaced in their logarithm, (n, 1, periods, frames) [dB]."""
+    heights, _ = joint.cepstrogram(_frames_of(iq, radar, joint.HERM_WINDOW_S))
+    few = _grouped(heights, IMAGE_FRAMES)
+    edges = np.geomspace(1, few.shape[-1], IMAGE_BINS + 1)[:-1].astype(int)
+    # a comb's peak is narrow: the highest of a group of periods speaks for it
+    return np.swapaxes(np.maximum.reduceat(few, edges, axis=-1), -1, -2)[:, None]
+
+
+def herm_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
+    """HERM lines: what stays in each velocity bin from long frame to long frame, (n, 1, velocity bins) [dB]."""
+    lines = 10 ** (joint.herm_lines_db(_frames_of(iq, radar, joint.HERM_WINDOW_S)) / 10)
+    pool = pooling(lines.shape[-1], radar.carrier_hz, radar.prf_hz, SPECTRUM_BINS)
+    return pool.mean_db(lines.astype(np.float32, copy=False))[:, None]
+
+
+def _frames_of(iq: NDArray[np.complex64], radar: Radar, window_s: float) -> joint.Stft:
+    """Short-time spectra; a dwell shorter than the window is one frame."""
+    window_s = min(window_s, radar.dwell_s)
+    return joint.stft(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz, window_s=window_s, overlap=0.9)
+
+
+def _grouped(rows: NDArray[np.float32], groups: int) -> NDArray[np.float32]:
+    """Mean of neighbouring rows (axis 1), so many in all; too few rows are shown several times."""
+    count = rows.shape[1]
+    starts = np.arange(groups) * count // groups
+    if count < groups:
+        return rows[:, starts]
+    sizes = np.diff(starts, append=count).astype(np.float32)
+    means: NDArray[np.float32] = np.add.reduceat(rows, starts, axis=1) / sizes[:, None]
+    return means
+
+
+def _squares(lines: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """Power of each line; the lines are written over."""
+    parts = lines.view(np.float32)
+    np.multiply(parts, parts, out=parts)
+    squares: NDArray[np.float32] = parts[..., ::2] + parts[..., 1::2]
+    return squares
+
+
+def radar_numbers(radar: Radar, count: int) -> NDArray[np.float32]:
+    """What the radar allows to be seen, the same for each of so many records, shape (count, 4)."""
+    return np.tile(_radar_row(radar), (count, 1))
+
+
+@lru_cache(maxsize=64)
+def _radar_row(radar: Radar) -> NDArray[np.float32]:
+    blank = np.ones((1, radar.pulses), np.complex64)
+    spectrum = doppler_spectrum(blank, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
+    return np.array(list(radar_columns(spectrum).values()), np.float32)
+
+
+def in_blocks(make: Maker, iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
+    """Make pictures of many records, some at a time, so that scratch memory stays small."""
+    step = max(1, _BLOCK_SAMPLES // radar.pulses)
+    return np.concatenate([make(iq[at : at + step], radar) for at in range(0, len(iq), step)])
+
+
+def quantised(picture: NDArray[np.floating], bits: int) -> NDArray[np.floating]:
+    """What is left of levels that were kept in so many bits.
+
+    Parameters
+    ----------
+    picture : ndarray of float32
+        Levels [dB].
+    bits : int
+        32: as they are, float32; 16: float16; fewer: equal steps from -20 to 80 dB, levels beyond held at the ends.
+
+    Returns
+    -------
+    ndarray of float32, same shape
+    """
+    if bits == 32:
+        return picture
+    if bits == 16:
+        return picture.astype(np.float16).astype(np.float32)
+    low, high = np.float32(-20.0), np.float32(80.0)
+    step = (high - low) / np.float32(2**bits - 1)
+    return np.rint((np.clip(picture, low, high) - low) / step) * step + low
+
+
+def _stft_line(window: int, overlap: float) -> tuple[str, Picture]:
+    words = f"STFT, window {window}, overlap {overlap:.0%}".replace("%", " %")
+    make = partial(stft_picture, window=window, overlap=overlap)
+    return f"stft-{window}-{100 * overlap:.0f}", Picture(words, (1, IMAGE_BINS, IMAGE_FRAMES), make)
+
+
+#: Name to picture, the cheapest transform first.
+PICTURES: dict[str, Picture] = {
+    "spectrum": Picture("Doppler spectrum", (2, SPECTRUM_BINS), spectrum_picture),
+    "herm": Picture("HERM lines", (1, SPECTRUM_BINS), herm_picture),
+    **dict(_stft_line(*setting) for setting in STFT_SETTINGS),
+    "cadence": Picture("cadence-velocity diagram", (1, IMAGE_BINS, IMAGE_FRAMES), cadence_picture),
+    "cepstrogram": Picture("cepstrogram", (1, IMAGE_BINS, IMAGE_FRAMES), cepstral_picture),
+}

@@ -1,0 +1,56 @@
+"""The README's figures and the model card are those of the committed report."""
+
+import importlib.util
+import json
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+from bladewing.classify.report.card import model_card
+
+ROOT = Path(__file__).parents[2]
+CURE = "run: python docs/figures.py"
+
+
+@pytest.fixture(scope="module")
+def figures() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("figures", ROOT / "docs" / "figures.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def report(figures: ModuleType) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(figures.REPORT.read_text(encoding="utf-8"))
+    return found
+
+
+def test_readme_says_what_the_committed_report_says(figures: ModuleType, report: dict[str, Any]) -> None:
+    text = figures.README.read_text(encoding="utf-8")
+    for name in figures.BLOCKS:
+        assert text.count(f"<!-- report: {name} -->") == 1
+    assert figures.filled(text, report) == text, CURE
+
+
+def test_model_card_is_that_of_the_committed_report(figures: ModuleType, report: dict[str, Any]) -> None:
+    assert figures.CARD.read_text(encoding="utf-8") == model_card(report), CURE
+
+
+def test_a_changed_figure_is_a_changed_text(figures: ModuleType, report: dict[str, Any]) -> None:
+    text = figures.README.read_text(encoding="utf-8")
+    other = json.loads(json.dumps(report))
+    other["scores"]["spectrum-cnn"]["balanced_accuracy"]["value"] += 0.01
+    assert figures.filled(text, other) != text
+    assert model_card(other) != model_card(report)
+
+
+def test_committed_report_is_of_the_shipped_models(report: dict[str, Any]) -> None:
+    import hashlib
+
+    shipped = {path.stem: path.read_bytes() for path in (ROOT / "models" / "pretrained").glob("*.onnx")}
+    said = {model["name"]: model["sha256"] for model in report["models"]}
+    assert said == {name: hashlib.sha256(content).hexdigest() for name, content in shipped.items()}

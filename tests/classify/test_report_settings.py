@@ -1,0 +1,58 @@
+from pathlib import Path
+
+import pytest
+from bladewing.classify import BadInput
+from bladewing.classify.report.parts import PARTS, Parts
+from bladewing.classify.report.settings import QUICK, report_config
+
+
+def test_options_come_before_the_file_and_the_file_before_quick(tmp_path: Path) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text("records = 5000\nseed = 7\n")
+    found = report_config(file, seed=3, quick=True)
+    assert (found.records, found.seed, found.front_epochs) == (5000, 3, QUICK["front_epochs"])
+    assert report_config().records == 30_000
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("recrods = 5", "unknown field 'recrods': the fields are seed, records"),
+        ("front_s = 0", "front_s is 0: it should be greater than 0"),
+        ("records = 'many'", "records is 'many'"),
+        ("records", "not TOML"),
+    ],
+)
+def test_a_wrong_settings_file_is_one_clear_line(tmp_path: Path, text: str, said: str) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text(text)
+    with pytest.raises(BadInput, match=r"own\.toml") as error:
+        report_config(file)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_parts_are_measured_once_and_only_for_the_same_report(tmp_path: Path) -> None:
+    made: list[int] = []
+
+    def measure() -> list[int]:
+        made.append(len(made))
+        return [len(made)]
+
+    parts = Parts(tmp_path, {"seed": 0})
+    assert not parts.have("one")
+    assert parts.take("one", measure) == [1]
+    assert Parts(tmp_path, {"seed": 0}).take("one", measure) == [1]
+    assert Parts(tmp_path, {"seed": 1}).take("one", measure) == [2]
+    parts.forget()
+    assert not (tmp_path / PARTS).exists()
+
+
+def test_an_interrupted_part_is_not_taken_for_a_finished_one(tmp_path: Path) -> None:
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    parts = Parts(tmp_path, {})
+    with pytest.raises(KeyboardInterrupt):
+        parts.take("one", interrupt)
+    assert not parts.have("one")
