@@ -251,11 +251,11 @@ def _network(
 
     signal, evidence = LADDER[name]
     shapes = {key: INPUT_SHAPES[key] for key in (signal, evidence)}
-    net: EvidenceNet
-    if signal == "image":
-        net = ImageNet(shapes[signal], shapes[evidence][0], seed=settings.seed)
-    else:
-        net = SpectrumNet(shapes[signal], shapes[evidence][0], seed=settings.seed, widen=1 + name.endswith("wide"))
+    networks: dict[str, Callable[..., EvidenceNet]] = {
+        "spectrum": partial(SpectrumNet, widen=1 + name.endswith("wide")),
+        "image": ImageNet,
+    }
+    net = networks[signal](shapes[signal], shapes[evidence][0], seed=settings.seed)
 
     def inputs(part: Gathered) -> dict[str, NDArray]:
         return {key: part.inputs[key] for key in shapes}
