@@ -37,7 +37,7 @@ class Measurements:
     body_velocity_mps, body_velocity_mps_std : ndarray
         Radial velocity of the body [m/s], positive when the range grows.
     chopping_hz, chopping_hz_std : ndarray
-        Chopping frequency, blades x rotation rate [Hz].
+        Chopping frequency, blades x rotation rate [Hz]; of several rotors, that of their mean rate.
     comb_order : ndarray
         Outermost order of chopping lines that speaks for the comb [1].
     comb_snr_db : ndarray
@@ -237,7 +237,12 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         out["gear_ratio"], out["gear_ratio_std"] = gear.ratio, gear.ratio_std
     count = len(rotors.rates)
     if count > 1:
+        # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
+        out["chopping_hz"] = float(rotors.rates.mean()) * prf_hz
+        out["chopping_hz_std"] = float(np.sqrt((rotors.stds**2).sum())) / count * prf_hz
         edge, edge_std = _edge(data, rotors.fits, rotors.rest, 1, blades or 2)
+    if not rotors.resolved:  # the mean lies anywhere within what the unresolved rates span
+        out["chopping_hz_std"] = float(np.hypot(out["chopping_hz_std"], rotors.spread * prf_hz / np.sqrt(12)))
     for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):
         padded = np.full(MAX_ROTORS, np.nan)
         padded[:count] = values * prf_hz

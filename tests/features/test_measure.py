@@ -250,6 +250,12 @@ def test_several_combs_fitted_together_leave_noise():
     assert fit_combs(data, 0.0, [0.2], [(0, 2)]) is None or len(fits) == 4
 
 
+def test_the_chopping_of_several_rotors_is_that_of_their_mean():
+    rates_hz = [56.6, 57.2, 57.7, 58.3]
+    found = measure(drone(rates_hz, snr_db=10), **RADAR)
+    assert abs(found.chopping_hz - 2 * np.mean(rates_hz)) < 4 * found.chopping_hz_std < 0.2
+
+
 def test_unresolved_rotors_carry_their_spread():
     found = measure(drone(np.array([3440.0, 3447.0]) / 60, snr_db=10, velocity_mps=5.0, body=10.0), **RADAR)
     assert not found.rotors_resolved or found.rotor_count == 2
