@@ -244,10 +244,12 @@ class Classifier:
             live = np.flatnonzero(largest >= LEAST_PART)
             probabilities[live] = self._probabilities(records, live, carrier_hz, prf_hz)
             labels[live], why = decide(probabilities[live], self.accept)
-            texts = np.full(len(records), "no signal: every sample is 0", dtype=object)
-            texts[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
-            texts[live] = why
-            reasons = texts.astype(np.str_)
+            if len(live) < len(records):
+                texts = np.full(len(records), "no signal: every sample is 0", dtype=object)
+                texts[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
+                texts[live] = why
+                why = texts.tolist()
+            reasons = np.array(why, dtype=np.str_)
         return Prediction(
             labels.reshape(leading), probabilities.reshape(*leading, len(CLASSES)), reasons.reshape(leading)
         )
@@ -259,7 +261,10 @@ class Classifier:
         step = max(1, min(_STEP_RECORDS, _STEP_SAMPLES // records.shape[-1]))
         out = np.empty((len(rows), len(CLASSES)), dtype=np.float32)
         for start in range(0, len(rows), step):
-            chunk = records[rows[start : start + step]]
+            chosen = rows[start : start + step]
+            # most often every record is: a slice spares the copy
+            whole = len(chosen) == chosen[-1] - chosen[0] + 1
+            chunk = records[chosen[0] : chosen[-1] + 1] if whole else records[chosen]
             feed = model_inputs(chunk, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs)
             (out[start : start + step],) = self._session.run(["probabilities"], feed)
         return out

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 CLASSES = ("uav", "bird", "clutter")
 UNKNOWN = "unknown"
 
+_ANSWERS = np.array([*CLASSES, UNKNOWN])
+
 
 def decide(probabilities: NDArray[np.floating], accept: Sequence[float]) -> tuple[NDArray[np.str_], list[str]]:
     """Name the most probable class, or say "unknown" where it is not probable enough.
@@ -26,15 +28,14 @@ def decide(probabilities: NDArray[np.floating], accept: Sequence[float]) -> tupl
     reasons
         Why a record is "unknown"; "" where it is named.
     """
-    best = np.argmax(probabilities, axis=-1)
-    top = np.take_along_axis(probabilities, best[:, None], axis=-1)[:, 0].astype(np.float64)
+    best = probabilities.argmax(axis=-1)
+    top = probabilities[np.arange(len(best)), best].astype(np.float64)
     needed = np.asarray(accept, dtype=np.float64)[best]
     named = top >= needed
-    labels = np.where(named, np.asarray(CLASSES)[best], UNKNOWN)
-    reasons = [
-        "" if ok else f"not sure: best {CLASSES[index]} {_below(value, limit)}"
-        for ok, index, value, limit in zip(named, best, top, needed, strict=True)
-    ]
+    labels = _ANSWERS[np.where(named, best, len(CLASSES))]
+    reasons = [""] * len(best)
+    for row in np.flatnonzero(~named).tolist():
+        reasons[row] = f"not sure: best {CLASSES[best[row]]} {_below(top[row], needed[row])}"
     return labels, reasons
 
 

@@ -32,8 +32,8 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
         raise BadInput(f"{name}: samples of type {given.dtype}: IQ must be complex, I + jQ (complex64)")
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is found below, with its index
         iq = given.astype(np.complex64, copy=False)
-    finite = np.isfinite(iq)
-    if not finite.all():
+    if not np.isfinite(np.ascontiguousarray(iq).view(np.float32)).all():  # real numbers: a quarter of the time
+        finite = np.isfinite(iq)
         first = np.unravel_index(int(np.argmin(finite)), iq.shape)
         where = int(first[0]) if iq.ndim == 1 else tuple(int(i) for i in first)
         with np.errstate(invalid="ignore"):  # a signalling NaN is cast to be shown

@@ -15,6 +15,11 @@ KNEE_MPS = 4.0
 #: Outer edge of the axis [m/s], beyond the fastest tips (below Mach 0.6).
 LIMIT_MPS = 200.0
 
+#: Spectra of up to so many bins to one of the axis are averaged by matrices; longer sums are faster one by one.
+COARSE = 4
+
+_RUN = 32
+
 #: Level of a bin outside the radar's unambiguous span [dB]: lower than any noise, so "not seen" differs from "empty".
 UNSEEN_DB = LOWEST_DB / 2
 
@@ -55,17 +60,70 @@ class Pooling:
     seen: slice
     bins: int
 
-    def mean_db(self, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Mean level of each axis bin [dB], shape (..., bins)."""
-        total = self._pooled(np.add, relative_power)
-        total /= self.counts
-        return self._place(to_db(total))
+    def mean_db(
+        self, power: NDArray[np.float32], per_unit: NDArray[np.float32] | None = None, *, from_floor: bool = False
+    ) -> NDArray[np.float32]:
+        """Mean level of each axis bin.
+
+        Parameters
+        ----------
+        power : ndarray of float32, shape (..., spectrum bins)
+            Power spectra.
+        per_unit : ndarray of float32, shape (..., 1), optional
+            What brings them into units of the noise floor, if they are not.
+        from_floor : bool
+            Count nothing below the floor: 0 dB there, and where nothing is seen.
+
+        Returns
+        -------
+        ndarray of float32, shape (..., bins)
+            [dB]
+        """
+        lowest_db = 0.0 if from_floor else LOWEST_DB
+        out = np.empty((*power.shape[:-1], self.bins), np.float32)
+        if len(self.starts) < self.bins:
+            out[..., : self.seen.start] = out[..., self.seen.stop :] = max(UNSEEN_DB, lowest_db)
+        seen = out[..., self.seen]
+        if power.shape[-1] <= COARSE * self.bins:
+            for bins, axis_bins, shares in self._matrices:
+                np.matmul(power[..., bins], shares, out=seen[..., axis_bins])
+        else:
+            np.multiply(self._pooled(np.add, power)[..., ::-1], self._shares, out=seen)
+        if per_unit is not None:
+            seen *= per_unit
+        to_db(seen, lowest_db, out=seen)
+        return out
 
     def peak_db(self, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
         """Largest level of each axis bin over that of noise in as many bins [dB], shape (..., bins)."""
         peak = self._pooled(np.maximum, relative_power)
         peak /= self.expected_peak
-        return self._place(to_db(peak))
+        out = np.full((*peak.shape[:-1], self.bins), UNSEEN_DB, np.float32)
+        to_db(peak[..., ::-1], out=out[..., self.seen])
+        return out
+
+    @cached_property
+    def _shares(self) -> NDArray[np.float32]:
+        """One over the number of spectrum bins in each, in rising velocity, which is falling frequency."""
+        return np.ascontiguousarray(1 / self.counts[::-1])
+
+    @cached_property
+    def _matrices(self) -> list[tuple[slice, slice, NDArray[np.float32]]]:
+        """The pooling as matrices: which spectrum bins each takes, which seen axis bins it gives, and the shares.
+
+        A run of `_RUN` axis bins needs few spectrum bins, so the zeros that are multiplied too do not matter.
+        """
+        stops = self.starts + self.counts.astype(np.intp)
+        out = []
+        for first in range(0, len(self.starts), _RUN):
+            starts, ends = self.starts[first : first + _RUN], stops[first : first + _RUN]
+            low, high = int(starts[0]), int(ends.max())
+            position = np.arange(low, high)[:, None]
+            inside = (position >= starts) & (position < ends)
+            shares = np.ascontiguousarray((inside / (ends - starts))[:, ::-1], np.float32)
+            stop = len(self.starts) - first
+            out.append((slice(low, high), slice(stop - len(starts), stop), shares))
+        return out
 
     @cached_property
     def expected_peak(self) -> NDArray[np.float32]:
@@ -98,12 +156,6 @@ class Pooling:
             operation.reduceat(
                 relative_power[..., : self.stop], starts[single.stop :], axis=-1, out=out[..., single.stop :]
             )
-        return out
-
-    def _place(self, levels_db: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Lay the seen bins into the whole axis; frequency rises where velocity falls."""
-        out = np.full((*levels_db.shape[:-1], self.bins), UNSEEN_DB, np.float32)
-        out[..., self.seen] = levels_db[..., ::-1]
         return out
 
 

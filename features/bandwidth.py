@@ -1,15 +1,19 @@
 """Doppler bandwidth: where the spectrum ends on either side (the paper's eq. 26)."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
-from .spectrum import Spectrum
+from .spectrum import Spectrum, ones, sums
 
 #: Share of the residual energy left out on each side of the energy band.
 TAIL_SHARE = 0.025
 
 #: Bins summed together before the energy is followed bin by bin, where it matters.
 _BLOCK = 32
+
+_TAILS = np.array([[TAIL_SHARE], [1 - TAIL_SHARE]])
 
 
 def noise_threshold_db(bins: int, false_alarm: float = 1e-2) -> float:
@@ -42,15 +46,11 @@ def threshold_band_hz(
     over = spectrum.relative_power > np.float32(10 ** (threshold_db / 10))
     if mask is not None:
         over &= mask
-    any_over = over.any(axis=-1)
-    frequency = spectrum.frequency_hz
+    some = np.logical_or.reduce(over, axis=-1)
+    frequency = spectrum.frequency_hz_float32
     low = frequency[over.argmax(axis=-1)]
     high = frequency[spectrum.bins - 1 - over[..., ::-1].argmax(axis=-1)]
-    zero = np.float32(0)
-    return (
-        np.where(any_over, low, zero).astype(np.float32),
-        np.where(any_over, high, zero).astype(np.float32),
-    )
+    return low * some, high * some
 
 
 def energy_band_mps(
@@ -74,22 +74,41 @@ def energy_band_mps(
     """
     bins = spectrum.bins
     flat = energy.reshape(-1, bins)
-    starts = np.arange(0, bins, _BLOCK)
-    total = np.cumsum(np.add.reduceat(flat, starts, axis=-1), axis=-1, dtype=np.float64)
-    sums = total[:, -1]
-    first, last = _crossings(flat, total, np.array([[TAIL_SHARE], [1 - TAIL_SHARE]]) * sums)
-    position = np.arange(bins, dtype=np.int32)
-    within = (position >= first[:, None].astype(np.int32)) & (position <= last[:, None].astype(np.int32))
+    total = _upto(_block_sums(flat))
+    edges = _crossings(flat, total, _TAILS * total[:, -1])
+    first, last = edges.astype(np.uint32)
+    width = last - first
+    # as unsigned numbers, bins below the first are far above the width
+    within = (_positions(bins) - first[:, None]) <= width[:, None]
     within &= flat > 0
+    some = total[:, -1] > 0
+    slow, fast = (spectrum.velocity_mps[edges] * some).astype(np.float32)
+    share = sums(within.astype(np.float32)) / (width + np.float32(1)) * some
     lead = energy.shape[:-1]
-    inside, some = np.count_nonzero(within, axis=-1).reshape(lead), (sums > 0).reshape(lead)
-    first, last = first.reshape(lead), last.reshape(lead)
-    velocity, zero = spectrum.velocity_mps, np.float32(0)
-    return (
-        np.where(some, velocity[last], zero).astype(np.float32),
-        np.where(some, velocity[first], zero).astype(np.float32),
-        np.where(some, inside / (last - first + 1), zero).astype(np.float32),
-    )
+    return fast.reshape(lead), slow.reshape(lead), share.astype(np.float32).reshape(lead)
+
+
+@lru_cache(maxsize=64)
+def _positions(bins: int) -> NDArray[np.uint32]:
+    """Numbers of the bins."""
+    return np.arange(bins, dtype=np.uint32)
+
+
+def _block_sums(energy: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Energy of each block of `_BLOCK` bins, shape (records, blocks); the last one may be shorter."""
+    records, bins = energy.shape
+    whole = bins - bins % _BLOCK
+    out = np.empty((records, -(-bins // _BLOCK)), np.float32)
+    blocks = energy[:, :whole].reshape(records, -1, _BLOCK)
+    np.matmul(blocks, ones(_BLOCK), out=out[:, : whole // _BLOCK])
+    if whole < bins:
+        out[:, -1] = sums(energy[:, whole:])
+    return out
+
+
+def _upto(values: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Sums up to and with each value."""
+    return np.add.accumulate(values, axis=-1, dtype=np.float64)
 
 
 def _crossings(
@@ -110,9 +129,13 @@ def _crossings(
     -------
     ndarray of int, shape (levels, records)
     """
-    rows, bins = np.arange(len(energy)), energy.shape[1]
-    block = np.minimum(np.count_nonzero(total < levels[..., None], axis=-1), total.shape[1] - 1)
-    inside = np.minimum(block[..., None] * _BLOCK + np.arange(_BLOCK), bins - 1)
-    upto = np.cumsum(energy[rows[:, None], inside], axis=-1, dtype=np.float64)
-    upto += np.where(block > 0, total[rows, block - 1], 0.0)[..., None]
-    return np.minimum(block * _BLOCK + np.count_nonzero(upto < levels[..., None], axis=-1), bins - 1)
+    rows, (records, bins) = np.arange(len(energy)), energy.shape
+    before = np.zeros((records, total.shape[1] + 1))
+    before[:, 1:] = total
+    block = np.minimum((total >= levels[..., None]).argmax(axis=-1), total.shape[1] - 1)
+    inside = np.minimum(block[..., None] * _BLOCK + _positions(_BLOCK), bins - 1)
+    upto = _upto(energy[rows[:, None], inside])
+    upto += before[rows, block][..., None]
+    # rounding alone may leave the whole block short of its level
+    upto[..., -1] = np.inf
+    return np.minimum(inside[..., 0] + (upto >= levels[..., None]).argmax(axis=-1), bins - 1)

@@ -1,32 +1,15 @@
 """How the spectrum changes within the dwell: short spectra of its parts, in units of the whole dwell's floor."""
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .axis import pooling
-from .spectrum import Spectrum, centred_power, scaled
+from .spectrum import Spectrum, centred_power, per_floor, scaled, sums
 
 #: Parts of a dwell, half overlapping, each a quarter of it long.
 PARTS = 7
-
-
-@dataclass(frozen=True)
-class Parts:
-    """Short spectra of the parts of each dwell.
-
-    Parameters
-    ----------
-    relative_power : ndarray of float32, shape (..., PARTS, bins)
-        Power over the dwell's noise floor, centred.
-    axis_db : ndarray of float32, shape (..., PARTS, axis bins)
-        Mean level on the shared velocity axis, not below the floor [dB].
-    """
-
-    relative_power: NDArray[np.float32]
-    axis_db: NDArray[np.float32]
 
 
 def part_length(pulses: int) -> int:
@@ -63,13 +46,20 @@ def _frame_starts(pulses: int, length: int, count: int) -> tuple[NDArray[np.intp
 
 def frame_power(iq: NDArray[np.complex64], spectrum: Spectrum, length: int, count: int) -> NDArray[np.float32]:
     """Power spectra of frames in units of the dwell's noise floor, shape (..., count, bins)."""
-    parts = frames(scaled(iq, spectrum.scale), length, count)
-    floor = (spectrum.floor * spectrum.scale[..., 0].astype(np.float64) ** 2).astype(np.float32)
-    power = centred_power(parts)
-    return np.divide(power, np.where(floor > 0, floor, np.float32(1))[..., None, None], out=power)
+    power, per_unit = _frame_power(iq, spectrum, length, count)
+    return np.multiply(power, per_unit, out=power)
 
 
-def parts_of(iq: NDArray[np.complex64], spectrum: Spectrum, axis_bins: int) -> Parts:
+def _frame_power(
+    iq: NDArray[np.complex64], spectrum: Spectrum, length: int, count: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Power spectra of frames, shape (..., count, bins), and what brings them into units of the floor, (..., 1, 1)."""
+    floor = spectrum.floor * np.square(spectrum.scale[..., 0], dtype=np.float64)
+    per_unit = per_floor(floor.astype(np.float32))[..., None, None]
+    return centred_power(frames(scaled(iq, spectrum.scale), length, count)), per_unit
+
+
+def parts_db(iq: NDArray[np.complex64], spectrum: Spectrum, axis_bins: int) -> NDArray[np.float32]:
     """Split dwells into parts and take their spectra.
 
     Parameters
@@ -83,32 +73,39 @@ def parts_of(iq: NDArray[np.complex64], spectrum: Spectrum, axis_bins: int) -> P
 
     Returns
     -------
-    Parts
+    ndarray of float32, shape (..., PARTS, axis_bins)
+        Mean level on the shared velocity axis, not below the floor [dB].
     """
-    power = frame_power(iq, spectrum, part_length(spectrum.pulses), PARTS)
+    power, per_unit = _frame_power(iq, spectrum, part_length(spectrum.pulses), PARTS)
     pool = pooling(power.shape[-1], spectrum.carrier_hz, spectrum.prf_hz, axis_bins)
-    return Parts(power, np.maximum(pool.mean_db(power), 0))
+    return pool.mean_db(power, per_unit, from_floor=True)
 
 
-def change_db(parts: Parts) -> NDArray[np.float32]:
+def change_db(parts: NDArray[np.float32]) -> NDArray[np.float32]:
     """Standard deviation of the level over the parts, on the shared axis [dB], shape (..., axis bins)."""
-    count = np.float32(PARTS)
-    mean = np.add.reduce(parts.axis_db, axis=-2) / count
-    away = (
-        parts.axis_db - mean[..., None, :]
-    )  # not the difference of squares: that is mostly rounding where it is small
+    share = np.float32(1 / PARTS)
+    # not the difference of squares: that is mostly rounding where it is small
+    away = parts - np.add.reduce(parts, axis=-2, keepdims=True) * share
     away *= away
-    return np.sqrt(np.add.reduce(away, axis=-2) / count)
+    out = np.add.reduce(away, axis=-2)
+    out *= share
+    return np.sqrt(out, out=out)
 
 
-def centroid_mps(parts: Parts, axis_mps: NDArray[np.float64]) -> NDArray[np.float32]:
+def centroid_mps(parts: NDArray[np.float32], axis_mps: NDArray[np.float32]) -> NDArray[np.float32]:
     """Centroid of the level over the velocity in each part [m/s], shape (..., PARTS); 0 where nothing is seen."""
-    weight = np.maximum(parts.axis_db - np.float32(6), np.float32(0))
-    total = np.add.reduce(weight, axis=-1)
-    sums = weight @ axis_mps.astype(np.float32)
-    return np.where(total > 0, sums / np.where(total > 0, total, 1), np.float32(0))
+    weight = parts - np.float32(6)
+    np.maximum(weight, np.float32(0), out=weight)
+    return np.vecdot(weight, axis_mps) / np.maximum(sums(weight), np.float32(1e-6))
 
 
-def busy_db(parts: Parts) -> NDArray[np.float32]:
+def busy_db(parts: NDArray[np.float32]) -> NDArray[np.float32]:
     """Mean level over the axis in each part [dB], shape (..., PARTS): flashes and wing strokes lift single parts."""
-    return parts.axis_db.mean(axis=-1)
+    return sums(parts) * np.float32(1 / parts.shape[-1])
+
+
+def swing(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Standard deviation over the parts, shape (...), of values of shape (..., PARTS)."""
+    share = np.float32(1 / values.shape[-1])
+    away = values - np.add.reduce(values, axis=-1, keepdims=True) * share
+    return np.sqrt(np.vecdot(away, away) * share)

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .notch import Mask, weights
-from .spectrum import KAISER_BETA, Spectrum
+from .notch import Mask, parabola_offset, weights
+from .spectrum import KAISER_BETA, Spectrum, sums
 
 #: Range in which a chopping frequency is sought [Hz]: a slow main rotor to a small propeller of four blades.
 CHOPPING_RANGE_HZ = (18.0, 1600.0)
@@ -27,6 +27,8 @@ REPEAT_SHARE, LENGTH_POWER = 0.5, 0.15
 #: Lines stand out of the spectrum by no more than this [dB], so that one strong line does not become the cepstrum.
 CLIP_DB = 30.0
 
+
+_LEAST = np.float32(1e-30)  # divides in the stead of 0
 
 _NEIGHBOURS = np.array([[-1], [0], [1]])
 _DIVISORS = np.array([[2], [3], [4]])
@@ -91,20 +93,19 @@ def cepstrum(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     ndarray of float32
         Any scale, the same for all periods.
     """
-    level = np.maximum(spectrum.level_db, np.float32(0))
-    np.minimum(level, np.float32(CLIP_DB), out=level)
+    level = np.clip(spectrum.level_db, np.float32(0), np.float32(CLIP_DB))
     kept = weights(mask)
+    level -= (np.vecdot(level, kept) / np.maximum(sums(kept), np.float32(1)))[..., None]
     level *= kept
-    count = np.maximum(np.add.reduce(kept, axis=-1, keepdims=True), np.float32(1))
-    mean = np.add.reduce(level, axis=-1, keepdims=True) / count
-    level -= kept * mean
-    # the root of the squares takes a fraction of the time of `abs`, which guards against an overflow that cannot be
-    parts = fft.rfft(level, axis=-1, overwrite_x=True).view(np.float32)
-    np.multiply(parts, parts, out=parts)
-    magnitude = parts[..., ::2] + parts[..., 1::2]
-    np.sqrt(magnitude, out=magnitude)
-    magnitude /= noise_shape(spectrum.pulses, spectrum.bins)
+    magnitude = np.abs(fft.rfft(level, axis=-1, overwrite_x=True))
+    magnitude *= _per_noise(spectrum.pulses, spectrum.bins)
     return magnitude
+
+
+@lru_cache(maxsize=64)
+def _per_noise(pulses: int, bins: int) -> NDArray[np.float32]:
+    """One over `noise_shape`."""
+    return np.reciprocal(noise_shape(pulses, bins))
 
 
 def prominence(heights: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -122,15 +123,16 @@ def prominence(heights: NDArray[np.float32]) -> NDArray[np.float32]:
         noise keeps its level; 0 at periods too short to have surroundings.
     """
     count = heights.shape[-1]
-    edges, widths = _surroundings(count)
-    total = np.zeros((*heights.shape[:-1], count + 1), np.float32)
-    np.cumsum(heights, axis=-1, out=total[..., 1:])
-    at = np.take(total, edges, axis=-1, mode="clip")  # all are in range; "clip" alone spares a copy
-    means = at[..., 1, :, :] - at[..., 0, :, :]
-    means /= widths
-    around = np.maximum(means[..., 0, :], means[..., 1, :])
-    out = heights - around
-    out += np.add.reduce(heights, axis=-1, keepdims=True) / np.float32(count)
+    edges, shares = _surroundings(count)
+    total = np.empty((*heights.shape[:-1], count + 1), np.float32)
+    total[..., 0] = 0
+    np.add.accumulate(heights, axis=-1, out=total[..., 1:])
+    at = total.take(edges, axis=-1, mode="clip")  # all are in range; "clip" alone spares a copy
+    means = np.subtract(at[..., 1, :, :], at[..., 0, :, :], out=at[..., 1, :, :])
+    means *= shares
+    out = np.maximum(means[..., 0, :], means[..., 1, :], out=means[..., 0, :])
+    out = heights - out
+    out += total[..., -1:] * np.float32(1 / count)
     np.maximum(out, np.float32(0), out=out)
     out[..., :2] = 0
     return out
@@ -138,12 +140,12 @@ def prominence(heights: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=64)
 def _surroundings(count: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
-    """First and last of the periods below and above each, shape (2, 2, count), and how many they are, (2, count)."""
+    """First and last of the periods below and above each, shape (2, 2, count), and 1 / their number, (2, count)."""
     period = np.arange(count)
     low, high = (np.array(shares)[:, None] for shares in ((0.6, 1.15), (0.85, 1.4)))
     start = np.minimum((low * period).astype(np.intp), count - 1)
     stop = np.minimum(np.maximum((high * period).astype(np.intp), start + 1), count)
-    return np.stack([start, stop]), (stop - start).astype(np.float32)
+    return np.stack([start, stop]), (1 / (stop - start)).astype(np.float32)
 
 
 def searched_periods(spectrum: Spectrum) -> tuple[int, int]:
@@ -175,33 +177,30 @@ def cepstral_chopping(spectrum: Spectrum, mask: Mask) -> Chopping:
         nothing = np.zeros(shape, np.float32)
         return Chopping(np.full(shape, np.nan, np.float32), nothing, nothing)
     flat = prominence(heights.reshape(-1, heights.shape[-1]))
-    rows = np.arange(len(flat))
-    window = flat[:, first : last + 1]
+    count = flat.shape[1]
+    begin = np.arange(0, flat.size, count)  # of each record in all of them, one behind the other
+    every = flat.reshape(-1)
     # the median of Rayleigh heights is 0.83 of their rms; a comb's own peaks do not move it
-    rms = _median(heights.reshape(flat.shape)[:, first : last + 1]) / np.float32(0.8326)
-    highest = _evidence(flat, first, last).argmax(axis=-1)
-    top, peak = first + highest, window[rows, highest]
-    least = np.maximum(FUNDAMENTAL_SHARE * peak, FUNDAMENTAL_STRENGTH * rms)
-    near = np.rint(top / _DIVISORS).astype(np.intp)
-    around = flat[rows, near + _NEIGHBOURS[:, None]]  # (neighbours, divisors, records)
-    ok = (near >= first) & (around.max(axis=0) >= least)
-    found = near - 1 + around.argmax(axis=0)
-    best = top
-    for number in range(len(_DIVISORS)):  # the smallest strong one wins, so later divisors overrule
-        best = np.where(ok[number], found[number], best)
-    best = np.minimum(np.maximum(best, 1), flat.shape[1] - 2)
-    left, middle, right = flat[rows, best + _NEIGHBOURS]
-    curve = 2 * middle - left - right
-    offset = np.where(curve > 0, (right - left) / np.where(curve > 0, 2 * curve, 1), 0)
-    period = best + np.minimum(np.maximum(offset, -0.5), 0.5)
-    again = flat[rows, np.minimum(np.rint(_MULTIPLES * period).astype(np.intp), flat.shape[1] - 1)]
-    strength = middle / np.where(rms > 0, rms, 1)
-    repeats = (again[0] + again[1]) / 2 / np.where(middle > 0, middle, 1)
+    rms = _median(heights.reshape(flat.shape)[:, first : last + 1]) * np.float32(1 / 0.8326)
+    best = _evidence(flat, first, last).argmax(axis=-1)
+    best += first
+    least = np.maximum(every[begin + best] * np.float32(FUNDAMENTAL_SHARE), rms * np.float32(FUNDAMENTAL_STRENGTH))
+    near = np.rint(best / _DIVISORS).astype(np.intp)
+    around = every[begin + near + _NEIGHBOURS[:, None]]  # (neighbours, divisors, records)
+    ok = (near >= first) & (np.maximum.reduce(around, axis=0) >= least)
+    if ok.any():
+        found = near - 1 + around.argmax(axis=0)
+        for number in range(len(_DIVISORS)):  # the smallest strong one wins, so later divisors overrule
+            best = np.where(ok[number], found[number], best)
+    np.minimum(best, count - 2, out=best)
+    left, middle, right = every[begin + best + _NEIGHBOURS]
+    period = best + parabola_offset(left, middle, right)
+    again = np.minimum(np.rint(_MULTIPLES * period).astype(np.intp), count - 1)
+    repeats = np.add.reduce(every[begin + again], axis=0) * np.float32(0.5) / np.maximum(middle, _LEAST)
+    strength = middle / np.maximum(rms, _LEAST)
     frequency = (spectrum.prf_hz / period).astype(np.float32)
-    frequency = np.where(rms > 0, frequency, np.float32(np.nan))
-    return Chopping(
-        frequency.reshape(shape), strength.astype(np.float32).reshape(shape), repeats.astype(np.float32).reshape(shape)
-    )
+    frequency[rms <= 0] = np.nan
+    return Chopping(frequency.reshape(shape), strength.reshape(shape), repeats.reshape(shape))
 
 
 def _evidence(peaks: NDArray[np.float32], first: int, last: int) -> NDArray[np.float32]:
@@ -228,7 +227,8 @@ def _median(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Median along the last axis, without NumPy's care for NaN."""
     count = values.shape[-1]
     high = count // 2
-    ordered = np.partition(values, high, axis=-1)
+    ordered = values.copy()
+    ordered.partition(high, axis=-1)
     if count % 2:
         return ordered[..., high]
-    return (ordered[..., :high].max(axis=-1) + ordered[..., high]) / np.float32(2)
+    return (np.maximum.reduce(ordered[..., :high], axis=-1) + ordered[..., high]) * np.float32(0.5)

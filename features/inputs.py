@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .axis import pooling
-from .change import change_db, parts_of
+from .change import change_db, parts_db
 from .joint import joint_vector, stft_image
 from .schema import AXIS_BINS, INPUT_SHAPES
 from .spectrum import doppler_spectrum
@@ -16,7 +16,7 @@ from .vector import feature_vector
 MIN_PULSES = 16
 
 #: Samples worked on at a time: scratch memory stays small whatever the batch.
-BLOCK_SAMPLES = 1 << 16
+BLOCK_SAMPLES = 1 << 17
 
 
 def model_inputs(
@@ -51,14 +51,11 @@ def model_inputs(
     if samples.ndim < 1 or samples.shape[-1] < MIN_PULSES:
         raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least {MIN_PULSES} pulses")
     high = max(1, BLOCK_SAMPLES // samples.shape[-1])
-    if samples.size <= high * samples.shape[-1]:
-        return _inputs(samples, carrier_hz, prf_hz, names)
     flat = samples.reshape(-1, samples.shape[-1])
-    blocks = [_inputs(flat[i : i + high], carrier_hz, prf_hz, names) for i in range(0, len(flat), high)]
-    return {
-        name: np.concatenate([block[name] for block in blocks]).reshape(*samples.shape[:-1], *INPUT_SHAPES[name])
-        for name in blocks[0]
-    }
+    blocks = [_inputs(flat[i : i + high], carrier_hz, prf_hz, names) for i in range(0, max(1, len(flat)), high)]
+    if len(blocks) > 1:
+        blocks = [{name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}]
+    return {name: rows.reshape(*samples.shape[:-1], *INPUT_SHAPES[name]) for name, rows in blocks[0].items()}
 
 
 def _inputs(
@@ -70,7 +67,7 @@ def _inputs(
     if "spectrum" in names or "features" in names:
         pool = pooling(spectrum.bins, spectrum.carrier_hz, spectrum.prf_hz, AXIS_BINS)
         mean = pool.mean_db(spectrum.relative_power)
-        parts = parts_of(samples, spectrum, AXIS_BINS)
+        parts = parts_db(samples, spectrum, AXIS_BINS)
         change = change_db(parts)
         if "spectrum" in names:
             peak = pool.peak_db(spectrum.relative_power)

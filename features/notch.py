@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .spectrum import Spectrum
+from .spectrum import Spectrum, sums
 
 #: Half width of the notch [m/s]. Set in velocity, not in Hz: a wingbeat of 18 Hz is not a Doppler of 18 Hz, and a
 #: bird's body with its heave stays within this of its mean at every carrier.
@@ -58,16 +58,23 @@ def body_line(spectrum: Spectrum) -> Body:
     Body
     """
     power = spectrum.relative_power
-    index = (power >= power.max(axis=-1, keepdims=True) * EQUAL_SHARE).argmax(axis=-1)
+    index = (power >= np.maximum.reduce(power, axis=-1, keepdims=True) * EQUAL_SHARE).argmax(axis=-1)
     bins = spectrum.bins
-    first = np.arange(index.size).reshape(index.shape) * bins  # of each spectrum, one behind the other
+    first = np.arange(0, index.size * bins, bins).reshape(index.shape)  # of each spectrum, one behind the other
     level = spectrum.level_db.reshape(-1)
     left, middle, right = (level[first + (index + shift) % bins] for shift in (-1, 0, 1))
-    curve = 2 * middle - left - right
-    offset = np.where(curve > 0, (right - left) / np.where(curve > 0, 2 * curve, 1), 0)
     step = spectrum.prf_hz / bins * spectrum.wavelength_m / 2
-    velocity = spectrum.velocity_mps[index] - np.minimum(np.maximum(offset, -0.5), 0.5) * step
+    velocity = spectrum.velocity_mps[index] - parabola_offset(left, middle, right) * step
     return Body(index, velocity.astype(np.float32), middle)
+
+
+def parabola_offset(
+    left: NDArray[np.float32], middle: NDArray[np.float32], right: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Where a parabola through three neighbours has its top, -0.5..0.5 from the middle one; 0 where it has none."""
+    curve = 2 * middle - left - right
+    offset = (right - left) * (curve > 0) / np.maximum(2 * curve, np.float32(1e-30))
+    return np.minimum(np.maximum(offset, np.float32(-0.5)), np.float32(0.5))
 
 
 def notch_mask(spectrum: Spectrum, body: Body, notch_mps: float = NOTCH_MPS) -> NDArray[np.bool_]:
@@ -138,5 +145,5 @@ def notch_residual_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
         0 dB for noise alone; micro-Doppler lifts it.
     """
     kept = weights(mask)
-    mean = np.vecdot(spectrum.relative_power, kept) / np.maximum(np.add.reduce(kept, axis=-1), np.float32(1))
+    mean = np.vecdot(spectrum.relative_power, kept) / np.maximum(sums(kept), np.float32(1))
     return np.float32(10) * np.log10(np.maximum(mean, np.float32(1e-2)))

@@ -1,17 +1,21 @@
 """Plain numbers about the shape of a spectrum: level by velocity, entropy, peakedness, symmetry."""
 
+import math
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
+from .axis import axis_velocities_mps
 from .notch import Body, Mask, weights
-from .spectrum import Spectrum
+from .spectrum import Spectrum, sums
 
 #: Edges of the speed bands [m/s]: body and bird speeds below, limbs and wing tips between, blade tips above.
 SPEED_BANDS_MPS = (0.0, 0.8, 2.5, 6.0, 12.0, 22.0, 40.0, 70.0, 110.0, 200.0)
 
 
 def band_levels_db(
-    axis_db: NDArray[np.float32], axis_mps: NDArray[np.float64]
+    axis_db: NDArray[np.float32],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Mean level of each speed band, on the stronger and on the weaker side [dB], shape (..., bands) each.
 
@@ -21,60 +25,75 @@ def band_levels_db(
     ----------
     axis_db : ndarray, shape (..., axis bins)
         Level on the shared velocity axis.
-    axis_mps : ndarray, shape (axis bins,)
-        Its velocities [m/s], rising and symmetric about 0.
 
     Returns
     -------
     stronger, weaker : ndarray of float32, shape (..., bands)
         [dB over the floor]; a band wholly outside the unambiguous span holds the axis's own mark for "unseen".
     """
-    edges = np.searchsorted(axis_mps, SPEED_BANDS_MPS)
-    widths = np.diff(edges).astype(np.float32)
-    one, other = (
-        np.add.reduceat(side[..., : edges[-1]], edges[:-1], axis=-1) / widths for side in (axis_db, axis_db[..., ::-1])
-    )
+    both = (_band_shares(axis_db.shape[-1]) @ axis_db[..., None])[..., 0]
+    count = len(SPEED_BANDS_MPS) - 1
+    one, other = both[..., :count], both[..., count:]
     return np.maximum(one, other), np.minimum(one, other)
+
+
+@lru_cache(maxsize=4)
+def _band_shares(bins: int) -> NDArray[np.float32]:
+    """Share of each bin of the shared axis in the mean of each speed band, first of one side and then of the other."""
+    edges = np.searchsorted(axis_velocities_mps(bins), SPEED_BANDS_MPS)
+    position = np.arange(bins)
+    inside = (position >= edges[:-1, None]) & (position < edges[1:, None])
+    shares = inside / np.diff(edges)[:, None]
+    return np.concatenate([shares, shares[:, ::-1]]).astype(np.float32)
 
 
 def entropy(energy: NDArray[np.float32]) -> NDArray[np.float32]:
     """Entropy of the energy's distribution over the bins, 0 (one bin) to 1 (even), shape (...); 1 without energy."""
-    peak = energy.max(axis=-1, keepdims=True)
-    share = energy / np.where(peak > 0, peak, np.float32(1))
+    peak = np.maximum.reduce(energy, axis=-1, keepdims=True)
+    share = energy * np.reciprocal(np.maximum(peak, np.float32(1e-30)))
     logs = np.maximum(share, np.float32(1e-12))
     np.log(logs, out=logs)
-    total = np.add.reduce(share, axis=-1)
-    safe = np.where(total > 0, total, np.float32(1))
+    total = np.maximum(sums(share), np.float32(1e-30))  # 1 or more, or nothing
     # the mean of -log(share / total)
-    bits = (np.log(safe) - np.vecdot(share, logs) / safe) / np.float32(np.log(energy.shape[-1]))
-    return np.where(total > 0, np.minimum(np.maximum(bits, 0), 1), np.float32(1)).astype(np.float32)
+    bits = (np.log(total) - np.vecdot(share, logs) / total) / np.float32(math.log(energy.shape[-1]))
+    return np.minimum(np.maximum(bits, 0) + (total < 0.5), np.float32(1))
 
 
 def ripple_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     """Standard deviation of the level outside the notches [dB]: 5.6 for noise, more for lines, shape (...)."""
     kept = weights(mask)
-    count = np.maximum(np.add.reduce(kept, axis=-1), np.float32(1))
+    share = 1 / np.maximum(sums(kept), np.float32(1))
     level = spectrum.level_db * kept
-    mean = np.add.reduce(level, axis=-1) / count
-    square = np.vecdot(level, level) / count
-    return np.sqrt(np.maximum(square - mean**2, 0)).astype(np.float32)
+    mean = sums(level) * share
+    return np.sqrt(np.maximum(np.vecdot(level, level) * share - mean * mean, np.float32(0)))
 
 
-def symmetry(spectrum: Spectrum, energy: NDArray[np.float32], body: Body) -> NDArray[np.float32]:
-    """Correlation of the two sides about the body line, -1..1, shape (...): rotors spread to both sides alike."""
-    bins = spectrum.bins
+def symmetry(root: NDArray[np.float32], body: Body) -> NDArray[np.float32]:
+    """Correlation of the two sides about the body line: rotors spread to both sides alike.
+
+    Parameters
+    ----------
+    root : ndarray of float32, shape (..., bins)
+        Root of the significant energy of each bin, >= 0.
+    body : Body
+        The middle.
+
+    Returns
+    -------
+    ndarray of float32, shape (...)
+        -1..1, of the roots of the roots.
+    """
+    bins = root.shape[-1]
     reach = bins // 2 - 1
     twice = np.empty((body.index.size, 2 * bins), np.float32)  # the circle, cut open anywhere
-    root = np.sqrt(energy.reshape(-1, bins), out=twice[:, :bins])
-    np.sqrt(root, out=root)
-    twice[:, bins:] = root
-    windows = np.lib.stride_tricks.as_strided(
-        twice, (len(twice), 2 * bins - reach, reach), (twice.strides[0], *2 * twice.strides[1:]), writeable=False
-    )
-    rows, index = np.arange(len(twice)), body.index.reshape(-1)
-    right, left = windows[rows, index + 1], windows[rows, index + bins - reach][:, ::-1]
-    right -= np.add.reduce(right, axis=-1, keepdims=True) / np.float32(reach)
-    left -= np.add.reduce(left, axis=-1, keepdims=True) / np.float32(reach)
-    norm = np.sqrt(np.vecdot(right, right) * np.vecdot(left, left))
-    product = np.vecdot(right, left) / np.where(norm > 0, norm, np.float32(1))
-    return np.where(norm > 0, product, np.float32(0)).reshape(body.index.shape)
+    np.sqrt(root.reshape(-1, bins), out=twice[:, :bins])
+    twice[:, bins:] = twice[:, :bins]
+    # the sides one behind the other, from the far end of the left one to the far end of the right one
+    both = np.empty((len(twice), 2, reach), np.float32)
+    for row, circle, index in zip(both, twice, body.index.reshape(-1).tolist(), strict=True):
+        row[0] = circle[index + 1 : index + 1 + reach]
+        row[1] = circle[index + bins - 1 : index + bins - 1 - reach : -1]
+    both -= sums(both)[..., None] * np.float32(1 / reach)
+    squares, product = np.vecdot(both, both), np.vecdot(both[:, 0], both[:, 1])
+    norm = np.sqrt(squares[:, 0] * squares[:, 1])
+    return (product / np.maximum(norm, np.float32(1e-30))).reshape(body.index.shape)

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .chopping import Chopping
-from .notch import Body
-from .spectrum import Spectrum
+from .notch import Body, weights
+from .spectrum import Spectrum, sums
 
 #: The index of lines that fill the space between orders evenly: the standard deviation of a uniform order, 1/sqrt(12).
 FULLY_SMEARED = 0.2887
@@ -15,7 +15,11 @@ MAX_ORDER = 24
 
 
 def smearing_index(
-    spectrum: Spectrum, energy: NDArray[np.float32], body: Body, chopping: Chopping
+    spectrum: Spectrum,
+    energy: NDArray[np.float32],
+    body: Body,
+    chopping: Chopping,
+    root: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
     """Relative spread of the rotor rates, from the growth of the line width with the order.
 
@@ -33,30 +37,32 @@ def smearing_index(
         The comb's centre.
     chopping : Chopping
         The comb's spacing.
+    root : ndarray of float32, shape (..., bins), optional
+        Root of the energy if it is at hand.
 
     Returns
     -------
     ndarray of float32, shape (...)
         0 (one rate, narrow lines at all orders) to `FULLY_SMEARED`; NaN where no spacing or no energy is given.
     """
-    spacing = chopping.frequency_hz[..., None]
-    usable = np.isfinite(spacing)
-    centre = -2 * body.velocity_mps[..., None] / np.float32(spectrum.wavelength_m)
-    order = spectrum.frequency_hz.astype(np.float32) - centre
-    order /= np.where(usable, spacing, np.float32(1))
+    spacing = chopping.frequency_hz
+    per_order = np.float32(1) / spacing  # NaN where there is none, and so is all that follows
+    centre = body.velocity_mps * np.float32(-2 / spectrum.wavelength_m)
+    order = spectrum.frequency_hz_float32 - centre[..., None]
+    order *= per_order[..., None]
     nearest = np.rint(order)
     # Roots of the energy: one strong low line must not outvote the many weak high ones.
     order -= nearest
     x, y = np.square(nearest, out=nearest), np.square(order, out=order)
-    weight = np.sqrt(energy)
-    weight *= x <= MAX_ORDER**2
-    weight *= x > 0
-    total = np.add.reduce(weight, axis=-1)
-    safe = np.where(total > 0, total, 1)
-    # Centred first: where few orders hold energy the differences of mean squares are rounding alone.
-    x -= (np.vecdot(weight, x) / safe)[..., None]
+    counts = x <= MAX_ORDER**2
+    counts &= x > 0
+    weight = (np.sqrt(energy) if root is None else root) * weights(counts)
+    total = sums(weight)
+    per_total = 1 / np.maximum(total, np.float32(1e-30))
+    # centred first: where few orders hold energy, a difference of mean squares is rounding alone
+    x -= (np.vecdot(weight, x) * per_total)[..., None]
     weight *= x
-    variance, covariance = np.vecdot(weight, x) / safe, np.vecdot(weight, y) / safe
-    slope = covariance / np.where(variance > 1e-3, variance, np.inf)
-    index = np.sqrt(np.clip(slope, 0, FULLY_SMEARED**2))
-    return np.where((total > 0) & usable[..., 0], index, np.float32(np.nan)).astype(np.float32)
+    variance, covariance = np.vecdot(weight, x) * per_total, np.vecdot(weight, y) * per_total
+    slope = covariance * (variance > 1e-3) / np.maximum(variance, np.float32(1e-3))
+    index = np.sqrt(np.minimum(np.maximum(slope, 0), np.float32(FULLY_SMEARED**2)))
+    return np.where((total > 0) & (spacing > 0), index, np.float32(np.nan))

@@ -1,5 +1,6 @@
 """The Doppler spectrum of a dwell, scaled to its own noise floor."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -22,6 +23,10 @@ LOWEST_DB = -20.0
 #: Without any noise (a synthetic line) the floor is this share of the record's power, not what rounding leaves.
 LEAST_FLOOR = np.float32(1e-9)
 
+_DB_PER_LOG = np.float32(10 / np.log(10))
+
+_LEAST = np.float32(1e-36)  # under any power that is not 0: divides in its stead
+_SAFE_ENERGY = 1e-14, 1e30  # of a record: neither its lines, at most that strong, nor its floor leave float32
 _FLOOR_QUANTILE = 0.25
 _FLOOR_QUANTILE_NORMAL = -0.6744897501960817  # standard normal quantile of 0.25
 _FLOOR_BLOCKS = 64  # a side of the spectrum
@@ -69,10 +74,15 @@ class Spectrum:
         """Doppler frequency of each bin [Hz], rising, shape (bins,), not to be written to."""
         return _frequencies_hz(self.bins, self.prf_hz)
 
-    @cached_property
+    @property
+    def frequency_hz_float32(self) -> NDArray[np.float32]:
+        """The same in float32."""
+        return _frequencies_hz_float32(self.bins, self.prf_hz)
+
+    @property
     def velocity_mps(self) -> NDArray[np.float64]:
-        """Radial velocity of each bin [m/s], falling: Doppler = -2 v / wavelength, shape (bins,)."""
-        return -self.frequency_hz * self.wavelength_m / 2
+        """Radial velocity of each bin [m/s], falling: Doppler = -2 v / wavelength, shape (bins,), read-only."""
+        return _velocities_mps(self.bins, self.prf_hz, self.wavelength_m)
 
     @cached_property
     def level_db(self) -> NDArray[np.float32]:
@@ -80,9 +90,26 @@ class Spectrum:
         return to_db(self.relative_power)
 
 
-def to_db(relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
-    """10 log10 of a power ratio [dB], held at `LOWEST_DB` from below."""
-    return np.float32(10 / np.log(10)) * np.log(np.maximum(relative_power, np.float32(10 ** (LOWEST_DB / 10))))
+def to_db(
+    relative_power: NDArray[np.float32], lowest_db: float = LOWEST_DB, out: NDArray[np.float32] | None = None
+) -> NDArray[np.float32]:
+    """10 log10 of a power ratio [dB], held at `lowest_db` from below."""
+    out = np.maximum(relative_power, np.float32(10 ** (lowest_db / 10)), out=out)
+    np.log(out, out=out)
+    return np.multiply(out, _DB_PER_LOG, out=out)
+
+
+@lru_cache(maxsize=64)
+def ones(count: int) -> NDArray[np.float32]:
+    """So many ones, not to be written to."""
+    out = np.ones(count, np.float32)
+    out.flags.writeable = False
+    return out
+
+
+def sums(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Sums along the last axis: a dot product takes a third of the time of a reduction."""
+    return np.vecdot(values, ones(values.shape[-1]))
 
 
 @lru_cache(maxsize=64)
@@ -91,6 +118,22 @@ def _frequencies_hz(bins: int, prf_hz: float) -> NDArray[np.float64]:
     frequencies = fft.fftshift(fft.fftfreq(bins, 1 / prf_hz))
     frequencies.flags.writeable = False
     return frequencies
+
+
+@lru_cache(maxsize=64)
+def _frequencies_hz_float32(bins: int, prf_hz: float) -> NDArray[np.float32]:
+    """Centred frequencies of a transform [Hz], shape (bins,), in float32."""
+    frequencies = _frequencies_hz(bins, prf_hz).astype(np.float32)
+    frequencies.flags.writeable = False
+    return frequencies
+
+
+@lru_cache(maxsize=64)
+def _velocities_mps(bins: int, prf_hz: float, wavelength_m: float) -> NDArray[np.float64]:
+    """Velocities of those frequencies [m/s], shape (bins,)."""
+    velocities = -_frequencies_hz(bins, prf_hz) * wavelength_m / 2
+    velocities.flags.writeable = False
+    return velocities
 
 
 @lru_cache(maxsize=64)
@@ -108,6 +151,8 @@ def _window(pulses: int, centred_by_sign: bool) -> NDArray[np.float32]:
 
 def scaled(iq: NDArray[np.complex64], scale: NDArray[np.float32]) -> NDArray[np.complex64]:
     """Samples times a real factor a record: part by part, for half the price of a complex product."""
+    if (scale == 1).all():
+        return np.ascontiguousarray(iq)
     return (np.ascontiguousarray(iq).view(np.float32) * scale).view(np.complex64)
 
 
@@ -130,9 +175,8 @@ def centred_power(iq: NDArray[np.complex64], bins: int | None = None) -> NDArray
     even = bins % 2 == 0
     parts = iq.astype(np.complex64, copy=False).view(np.float32)
     tapered = (parts * _window(pulses, even)).view(np.complex64)
-    squares = fft.fft(tapered, n=bins, axis=-1, overwrite_x=True).view(np.float32)
-    np.multiply(squares, squares, out=squares)
-    power = squares[..., ::2] + squares[..., 1::2]
+    power = np.abs(fft.fft(tapered, n=bins, axis=-1, overwrite_x=True))
+    np.multiply(power, power, out=power)
     return power if even else fft.fftshift(power, axes=-1)
 
 
@@ -143,7 +187,7 @@ LEAST_PART = 2.0**-140
 def largest_part(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
     """Largest real or imaginary part of each record, by magnitude, shape (...)."""
     parts = np.ascontiguousarray(iq).view(np.float32)
-    return np.maximum(parts.max(axis=-1), -parts.min(axis=-1))
+    return np.maximum(np.maximum.reduce(parts, axis=-1), -np.minimum.reduce(parts, axis=-1))
 
 
 def unit_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
@@ -152,8 +196,23 @@ def unit_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
     A power of two changes no digit, so results do not depend on the gain; the square of the scaled samples can neither
     overflow nor vanish.
     """
-    _, exponent = np.frexp(largest_part(iq))
-    return np.ldexp(np.float32(1), -np.clip(exponent, -126, 126))[..., None].astype(np.float32)
+    _, exponent = np.frexp(largest_part(iq)[..., None])
+    return np.ldexp(np.float32(1), -np.minimum(np.maximum(exponent, -126), 126))
+
+
+def per_floor(floor: NDArray[np.float32]) -> NDArray[np.float32]:
+    """What a power is multiplied by to be in units of its floor; finite where there is none, and no power either."""
+    return np.reciprocal(np.maximum(floor, _LEAST))
+
+
+def safe_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """`unit_scale`, or 1 for all records where none needs it: it changes no digit, and to scale is a pass more."""
+    parts = np.ascontiguousarray(iq).view(np.float32)
+    with np.errstate(over="ignore", under="ignore"):
+        energy = np.vecdot(parts, parts)[..., None]
+    if ((energy > _SAFE_ENERGY[0]) & (energy < _SAFE_ENERGY[1])).all():
+        return np.ones_like(energy)
+    return unit_scale(iq)
 
 
 def noise_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -181,17 +240,16 @@ def noise_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
     means = np.empty((*power.shape[:-1], 2, blocks), power.dtype)
     for number, side in enumerate((power[..., : blocks * size], power[..., -blocks * size :])):
         shaped = side.reshape(*power.shape[:-1], blocks, size)
-        np.add.reduce(shaped, axis=-1, out=means[..., number, :])
-    means /= size
+        np.matmul(shaped, ones(size), out=means[..., number, :])
     rank = round(_FLOOR_QUANTILE * (blocks - 1))
     means.partition(rank, axis=-1)
-    sides = means[..., 0, rank], means[..., 1, rank]
-    least, most = np.minimum(*sides), np.maximum(*sides)
+    one, other = means[..., 0, rank], means[..., 1, rank]
+    least, most = np.minimum(one, other), np.maximum(one, other)
     level = np.where(most > _EMPTY_RATIO * least, most, (least + most) / 2)
     # Wilson and Hilferty's normal approximation to the quantile of a gamma of that many degrees of freedom
     shape_k = max(1.0, size / NOISE_BANDWIDTH_BINS)
-    bias = (1 - 1 / (9 * shape_k) + _FLOOR_QUANTILE_NORMAL / (3 * np.sqrt(shape_k))) ** 3
-    return (level / bias).astype(np.float32)
+    bias = (1 - 1 / (9 * shape_k) + _FLOOR_QUANTILE_NORMAL / (3 * math.sqrt(shape_k))) ** 3
+    return np.divide(level, np.float32(size * bias))
 
 
 def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spectrum:
@@ -218,13 +276,12 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spec
     if samples.ndim < 1 or samples.shape[-1] < 2:
         raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least 2 pulses")
     for name, value in (("carrier_hz", carrier_hz), ("prf_hz", prf_hz)):
-        if not (np.isfinite(value) and value > 0):
+        if not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
-    scale = unit_scale(samples)
+    scale = safe_scale(samples)
     power = centred_power(scaled(samples, scale))
     floor = noise_floor(power)
-    floor = np.maximum(floor, power.mean(axis=-1) * LEAST_FLOOR)
-    safe = np.where(floor > 0, floor, np.float32(1))
-    natural = floor / scale[..., 0].astype(np.float64) ** 2
-    relative = np.divide(power, safe[..., None], out=power)
+    floor = np.maximum(floor, sums(power) * (LEAST_FLOOR / np.float32(power.shape[-1])))
+    natural = floor / np.square(scale[..., 0], dtype=np.float64)
+    relative = np.multiply(power, per_floor(floor)[..., None], out=power)
     return Spectrum(relative, natural, float(carrier_hz), float(prf_hz), samples.shape[-1], scale)

@@ -4,7 +4,6 @@ A number of a record has the shape (n, 1), a spectrum (n, bins).
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -128,28 +127,13 @@ def symmetry(radar: Spectrum, energy: Value, body: Body) -> Value:
 
 def band_levels_db(axis_db: Value, bins: int) -> tuple[Value, Value]:
     """As `shape.band_levels_db`, shape (n, bands) each."""
-    edges = np.searchsorted(axis_velocities_mps(bins), shape.SPEED_BANDS_MPS)
-    one, other = (
-        axis_db.graph.matmul(axis_db, side) for side in (_averages(edges, bins), _averages(edges, bins)[::-1])
-    )
+    one, other = (axis_db.graph.matmul(axis_db, side.T) for side in np.split(shape._band_shares(bins), 2))
     return one.at_least(other), one.at_most(other)
-
-
-def _averages(edges: np.ndarray, bins: int) -> np.ndarray:
-    """Matrix that averages the bins between neighbouring edges; like `reduceat`, an empty part is its first bin."""
-    out = np.zeros((bins, len(edges) - 1), np.float32)
-    for column, (start, stop) in enumerate(pairwise(edges)):
-        out[start : max(stop, start + 1), column] = 1 / (stop - start)
-    return out
 
 
 def change_levels_db(change: Value, bins: int) -> Value:
     """Mean change at slow, middle and fast speeds as in `vector.feature_vector`, shape (n, 3)."""
-    _, starts, widths = vector._axis_plan(bins)
-    part = np.repeat(np.arange(len(starts)), np.diff(starts, append=bins))
-    speed = np.abs(part - part.max() // 2)  # the innermost of fast, middle, slow, middle, fast
-    matrix = np.stack([(speed == number) / width for number, width in enumerate(widths)], axis=-1)
-    return change.graph.matmul(change, matrix)
+    return change.graph.matmul(change, vector._axis_plan(bins)[1].T)
 
 
 def centroid_mps(parts_db: Value, bins: int) -> Value:
@@ -218,9 +202,9 @@ def _evidence(peaks: Value, first: int, last: int, periods: int) -> Value:
 
 def _prominence(heights: Value, periods: int) -> Value:
     """As `chopping.prominence`."""
-    (starts, stops), widths = chopping._surroundings(periods)
+    (starts, stops), shares = chopping._surroundings(periods)
     upto = heights.cumsum().pad(1, 0)
-    below, above = ((upto.take(stops[side]) - upto.take(starts[side])) / widths[side] for side in (0, 1))
+    below, above = ((upto.take(stops[side]) - upto.take(starts[side])) * shares[side] for side in (0, 1))
     out = heights - below.at_least(above).to(np.float32) + heights.mean()
     return (out * (np.arange(periods) >= 2).astype(np.float32)).at_least(0.0)
 

@@ -1,9 +1,11 @@
-"""What model inputs cost, in units of what no spectrum can do without: one FFT of the dwell, complex64."""
+"""What model inputs and whole answers cost, in units of what no spectrum can do without: one FFT of the dwell."""
 
 from collections.abc import Callable
 from functools import partial
 
 import pytest
+from bladewing.classify import Classifier
+from bladewing.classify.inference import model_names
 from bladewing.features import model_inputs
 from bladewing.simulate import Radar, draw_records
 from scipy import fft
@@ -11,18 +13,21 @@ from scipy import fft
 from .ratios import cpu_seconds, table
 
 RADAR = Radar(9.85e9, 25e3, 2048)
+AXES = {"carrier_hz": RADAR.carrier_hz, "prf_hz": RADAR.prf_hz}
 INPUTS = {
     "features and spectrum": ("features", "spectrum"),
     "features": ("features",),
     "spectrum": ("spectrum",),
-    "joint features and image": ("joint_features", "image"),
+    "joint features": ("joint_features",),
+    "image": ("image",),
 }
+#: Most that an answer of the cheapest model may cost [FFTs].
+GOALS = {1: 20, 64: 15}
 
 
-@pytest.mark.parametrize("records", [1, 64])
-def test_model_inputs_against_one_fft(records):
-    iq = draw_records(RADAR, records, 0, purpose="bench").iq
-    axes = {"carrier_hz": RADAR.carrier_hz, "prf_hz": RADAR.prf_hz}
+def costs(iq, candidates: dict[str, Callable[[], object]], title: str) -> None:
+    """Write a table of the candidates' cost a record beside one complex64 FFT of it."""
+    records = len(iq)
     repeats = 200 // records + 1
 
     def again(call: Callable[[], object], times: int) -> Callable[[], None]:
@@ -32,11 +37,24 @@ def test_model_inputs_against_one_fft(records):
 
         return calls
 
-    candidates = {"one FFT": again(lambda: fft.fft(iq), 10 * repeats)}
-    for title, names in INPUTS.items():
-        candidates[title] = again(partial(model_inputs, iq, **axes, names=names), repeats)
-    spent = cpu_seconds(candidates)
+    timed = {name: again(call, repeats) for name, call in candidates.items()}
+    spent = cpu_seconds({"one FFT": again(lambda: fft.fft(iq), 10 * repeats), **timed})
     each = {name: seconds / repeats / records for name, seconds in spent.items()}
     each["one FFT"] /= 10
     rows = [(name, f"{cost / each['one FFT']:.1f}", f"{cost * 1e6:.0f}") for name, cost in each.items()]
-    table(f"Features of {records}: batches of {records} x 2048 pulses", ("", "x FFT", "us a record"), rows)
+    table(title, ("", "x FFT", "us a record"), rows)
+
+
+@pytest.mark.parametrize("records", [1, 64])
+def test_model_inputs_against_one_fft(records):
+    iq = draw_records(RADAR, records, 0, purpose="bench").iq
+    candidates = {title: partial(model_inputs, iq, **AXES, names=names) for title, names in INPUTS.items()}
+    costs(iq, candidates, f"Features of {records}: batches of {records} x 2048 pulses")
+
+
+@pytest.mark.parametrize("records", [1, 64])
+def test_answers_against_one_fft(records):
+    iq = draw_records(RADAR, records, 0, purpose="bench").iq
+    candidates = {name: partial(Classifier.load(name).predict, iq, **AXES) for name in model_names()}
+    goal = f"IQ to probabilities, goal of the cheapest {GOALS[records]} x"
+    costs(iq, candidates, f"Answers of {records}: batches of {records} x 2048 pulses, {goal}")

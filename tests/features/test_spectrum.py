@@ -114,3 +114,13 @@ def test_batch_equals_loop():
 def test_impossible_input_is_refused(iq, radar, match):
     with pytest.raises(ValueError, match=match):
         doppler_spectrum(iq, **radar)
+
+
+@pytest.mark.parametrize("gain", [1e-30, 1e-9, 1.0, 1e9, 1e25])
+def test_a_record_is_the_same_whatever_stands_beside_it(gain):
+    """Faint or loud neighbours make a batch that is scaled first: a power of two, so no digit changes."""
+    iq = white(np.random.default_rng(4), 2, 500).astype(np.complex64)
+    alone = doppler_spectrum(iq[0], **RADAR)
+    beside = doppler_spectrum(np.stack([iq[0], iq[1] * np.float32(gain)]), **RADAR)
+    np.testing.assert_array_equal(beside.relative_power[0], alone.relative_power)
+    np.testing.assert_array_equal(beside.floor[0], alone.floor)
