@@ -15,8 +15,10 @@ from .vector import feature_vector
 #: Fewest pulses that leave anything to measure outside the notches.
 MIN_PULSES = 16
 
-#: Samples worked on at a time: scratch memory stays small whatever the batch.
+#: Samples worked on at a time: scratch memory stays small whatever the batch. The overlapping frames of an image hold
+#: each sample several times, so fewer records of it fill a processor's cache.
 BLOCK_SAMPLES = 1 << 17
+IMAGE_SHARE = 2
 
 
 def model_inputs(
@@ -50,7 +52,8 @@ def model_inputs(
     samples = np.asarray(iq, np.complex64)
     if samples.ndim < 1 or samples.shape[-1] < MIN_PULSES:
         raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least {MIN_PULSES} pulses")
-    high = max(1, BLOCK_SAMPLES // samples.shape[-1])
+    framed = "image" in names or "joint_features" in names
+    high = max(1, BLOCK_SAMPLES // (IMAGE_SHARE if framed else 1) // samples.shape[-1])
     flat = samples.reshape(-1, samples.shape[-1])
     blocks = [_inputs(flat[i : i + high], carrier_hz, prf_hz, names) for i in range(0, max(1, len(flat)), high)]
     if len(blocks) > 1:
