@@ -19,6 +19,9 @@ LOBE_BINS = 5
 #: Of bins within this share of the strongest the first one counts: rounding must not choose in a flat spectrum.
 EQUAL_SHARE = np.float32(1 - 1e-5)
 
+#: A top that curves less than this, relative to its height, is flat.
+LEAST_CURVE = np.float32(1e-5)
+
 #: True, or 1, where a spectrum counts.
 Mask = NDArray[np.bool_] | NDArray[np.float32]
 
@@ -73,7 +76,8 @@ def parabola_offset(
 ) -> NDArray[np.float32]:
     """Where a parabola through three neighbours has its top, -0.5..0.5 from the middle one; 0 where it has none."""
     curve = 2 * middle - left - right
-    offset = (right - left) * (curve > 0) / np.maximum(2 * curve, np.float32(1e-30))
+    # of equal neighbours the curve is rounding alone
+    offset = (right - left) * (curve > LEAST_CURVE * np.abs(middle)) / np.maximum(2 * curve, np.float32(1e-30))
     return np.minimum(np.maximum(offset, np.float32(-0.5)), np.float32(0.5))
 
 

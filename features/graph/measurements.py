@@ -39,7 +39,8 @@ def _vertex(left: Value, middle: Value, right: Value) -> Value:
     """Where a parabola through three neighbours peaks, -0.5 to 0.5 from the middle one."""
     curve = 2.0 * middle - left - right
     where = middle.graph.where
-    offset = where(curve > 0.0, (right - left) / where(curve > 0.0, 2.0 * curve, 1.0), 0.0)
+    curved = (curve > 0.0) & (curve > middle.apply("Abs") * float(notch.LEAST_CURVE))
+    offset = where(curved, (right - left) / where(curved, 2.0 * curve, 1.0), 0.0)
     return offset.at_least(-0.5).at_most(0.5)
 
 
