@@ -27,7 +27,7 @@ from .samples import positive
 PRODUCT = "bladewing raw-IQ graph"
 """What the metadata of an exported graph call it."""
 
-TOLERANCE = 1e-3
+TOLERANCE = 2e-3
 """Largest difference of a probability from `Classifier.predict` that an exported graph may show."""
 
 _CHECKED = 16

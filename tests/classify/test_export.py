@@ -11,7 +11,7 @@ import onnxruntime
 import pytest
 from bladewing.classify import BadInput, Classifier
 from bladewing.classify.cli import main
-from bladewing.classify.export import PRODUCT, export_raw_iq
+from bladewing.classify.export import TOLERANCE, PRODUCT, export_raw_iq
 from bladewing.features.graph.inputs import IQ, input_graph
 from bladewing.features.graph.operators import Graph
 from bladewing.features.inputs import model_inputs
@@ -112,9 +112,9 @@ def test_the_shipped_model_answers_the_same_from_raw_iq(radar, tmp_path):
     iq = np.concatenate([records(100, **radar, seed=3), extremes(**radar)])
     expected = classifier.predict(iq, carrier_hz=radar["carrier_hz"], prf_hz=radar["prf_hz"])
     probabilities, label = run(opened(out), iq)
-    np.testing.assert_allclose(probabilities, expected.probabilities, atol=1e-3)
+    np.testing.assert_allclose(probabilities, expected.probabilities, atol=TOLERANCE)
     limits = np.asarray(classifier.accept)[expected.probabilities.argmax(axis=-1)]
-    clear = np.abs(expected.probabilities.max(axis=-1) - limits) > 1e-3
+    clear = np.abs(expected.probabilities.max(axis=-1) - limits) > TOLERANCE
     np.testing.assert_array_equal(LABELS[label][clear], expected.labels[clear])
     assert clear.sum() > 90
 
