@@ -11,7 +11,7 @@ import onnxruntime
 import pytest
 from bladewing.classify import BadInput, Classifier
 from bladewing.classify.cli import main
-from bladewing.classify.export import TOLERANCE, PRODUCT, export_raw_iq
+from bladewing.classify.export import PRODUCT, TOLERANCE, export_raw_iq
 from bladewing.features.graph.inputs import IQ, input_graph
 from bladewing.features.graph.operators import Graph
 from bladewing.features.inputs import model_inputs
