@@ -197,7 +197,7 @@ def score(
 
     Parameters
     ----------
-    evidence : ndarray of float32, shape (bins, line SNRs)
+    evidence : ndarray of float32, shape (line SNRs, bins)
         From `line_evidence`, 0 where a line cannot be seen.
     spacings, centres : ndarray, shape (candidates,)
         [cycles a sample].
@@ -211,40 +211,58 @@ def score(
     low, high : ndarray of int, shape (candidates,)
         Outermost orders.
     """
-    size = len(evidence)
     best = np.zeros(len(spacings))
     reach = np.zeros((2, len(spacings)), np.intp)
     widest = (0.5 / spacings).astype(np.intp)
     octave = np.floor(2 * np.log2(widest)).astype(np.intp)  # combs of about as many lines are summed together
     for group in np.unique(octave):
         rows = np.flatnonzero(octave == group)
-        order = np.arange(1, widest[rows].max() + 1)
-        beyond = order > widest[rows][:, None]
-        sides = []
-        for sign in (-1, 1):
-            place = (centres[rows][:, None] + sign * spacings[rows][:, None] * order) * size
-            seen = evidence[np.rint(place).astype(np.intp) % size]
-            seen[beyond] = 0.0
-            sides.append(np.cumsum(seen, axis=1))
+        own_best, own_reach = _score_alike(evidence, spacings[rows], centres[rows], widest[rows], even)
+        best[rows], reach[:, rows] = own_best, own_reach
+    return best, -reach[0], reach[1]
+
+
+def _score_alike(
+    evidence: NDArray[np.float32],
+    spacings: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    widest: NDArray[np.intp],
+    even: bool,
+) -> tuple[NDArray[np.float32], NDArray[np.intp]]:
+    """`score` of combs of about as many lines, `widest` at most: the score and how far each side reaches."""
+    size = evidence.shape[-1]
+    order = np.arange(1, widest.max() + 1)
+    beyond = order > widest[:, None]
+    step = (spacings * size)[:, None] * order
+    middle = (centres * size)[:, None]
+    places = [np.rint(middle + sign * step).astype(np.intp) for sign in (-1, 1)]
+    number = np.arange(len(spacings))
+    best = np.full(len(spacings), -np.inf, np.float32)
+    reach = np.zeros((2, len(spacings)), np.intp)
+    for row in evidence:
+        sides = [row.take(place, mode="wrap") for place in places]
+        for side in sides:
+            side[beyond] = 0.0
+        if not even:
+            for side in sides:
+                side.cumsum(axis=1, out=side)
         # a rotor's lines reach equally far to both sides; other reaches cost as much as the choice of two ends gives
         both = sides[0] + sides[1]
-        last = both.argmax(axis=1)  # (rows, line SNRs)
-        equal = np.maximum(np.take_along_axis(both, last[:, None], 1)[:, 0], 0)
-        apart = np.stack([side.argmax(axis=1) for side in sides])
-        heights = np.stack(
-            [
-                np.maximum(np.take_along_axis(side, end[:, None], 1)[:, 0], 0)
-                for side, end in zip(sides, apart, strict=True)
-            ]
-        )
-        uneven = heights.sum(axis=0) - (np.inf if even else UNEVEN_COST)
-        total = np.maximum(equal, uneven)
-        column = total.argmax(axis=1)
-        at = np.arange(len(rows)), column
-        best[rows] = total[at]
-        ends = np.where(uneven > equal, np.where(heights > 0, apart + 1, 0), last + 1)
-        reach[:, rows] = ends[:, *at]
-    return best, -reach[0], reach[1]
+        if even:
+            both.cumsum(axis=1, out=both)
+        last = both.argmax(axis=1)
+        total = np.maximum(both[number, last], 0)
+        ends = np.stack([last, last]) + 1
+        if not even:
+            apart = np.stack([side.argmax(axis=1) for side in sides])
+            heights = np.stack([np.maximum(side[number, end], 0) for side, end in zip(sides, apart, strict=True)])
+            uneven = heights.sum(axis=0) - np.float32(UNEVEN_COST)
+            ends = np.where(uneven > total, np.where(heights > 0, apart + 1, 0), ends)
+            total = np.maximum(total, uneven)
+        better = total > best
+        best[better] = total[better]
+        reach[:, better] = ends[:, better]
+    return best, reach
 
 
 def _families(
@@ -281,8 +299,7 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     factors = 1 + np.arange(-COARSE_STEPS, COARSE_STEPS + 1) / data.pulses
     spacings = np.concatenate([np.outer(s, factors).ravel() for s, _ in tried])
     centres = np.concatenate([np.full(len(s) * len(factors), c) for s, c in tried])
-    columns = np.ascontiguousarray(evidence.T)
-    scores, _, _ = score(columns, spacings, centres)
+    scores, _, _ = score(evidence, spacings, centres)
     if not len(scores):
         return None
     chosen = _families(spacings, scores, centres, data.pulses)
@@ -294,7 +311,7 @@ def best_candidate(data: Periodogram) -> Candidate | None:
         [np.repeat(centres[i] + np.array(s) / data.pulses, len(fine)) for i, s in zip(chosen, shifts, strict=True)]
     )
     spacings = np.concatenate([np.tile(spacings[i] * fine, len(s)) for i, s in zip(chosen, shifts, strict=True)])
-    scores, lows, highs = score(columns, spacings, centres)
+    scores, lows, highs = score(evidence, spacings, centres)
     found = []
     for number in range(len(chosen)):
         index = int(np.where(family == number, scores, -np.inf).argmax())
@@ -302,10 +319,10 @@ def best_candidate(data: Periodogram) -> Candidate | None:
         flash = flash_evidence(data, *place)
         # flashes must not make a comb of what hardly is one: they speak for as much as the lines' powers do
         found.append(Candidate(*place, float(scores[index]) + min(flash, float(scores[index]))))
-    return _centred(data, columns, max(found, key=lambda c: c.score))
+    return _centred(data, evidence, max(found, key=lambda c: c.score))
 
 
-def _centred(data: Periodogram, columns: NDArray[np.float32], found: Candidate) -> Candidate:
+def _centred(data: Periodogram, evidence: NDArray[np.float32], found: Candidate) -> Candidate:
     """The same comb, counted from the line that is most likely the body's.
 
     Any line of a comb may pass for its centre. A rotor's lines reach equally far to both sides of the body, and the
@@ -329,7 +346,7 @@ def _centred(data: Periodogram, columns: NDArray[np.float32], found: Candidate) 
     for centre, bonus in dict(options).items():
         # one comb for several rotors may pass a little beside the body's line: either place will do
         beside = found.centre + found.spacing * round((centre - found.centre) / found.spacing)
-        heights, _, _ = score(columns, np.tile(steps, 2), np.repeat([centre, beside], len(steps)), even=True)
+        heights, _, _ = score(evidence, np.tile(steps, 2), np.repeat([centre, beside], len(steps)), even=True)
         index = int(heights.argmax())
         if heights[index] + bonus > most:
             most = heights[index] + bonus

@@ -42,6 +42,9 @@ MEETING_BINS = 1.5
 #: Candidates looked at closely.
 CLOSER = 4
 
+#: Spacings scored together at most: their sums must stay in the cache.
+ROWS_AT_ONCE = 128
+
 
 @dataclass(frozen=True)
 class Gear:
@@ -216,16 +219,34 @@ def _loudest(
     )
     if not len(spacings):
         return None
-    order = np.arange(1, int(0.5 / spacings[0]) + 1)
-    size = evidence.shape[-1]
-    place = np.rint(spacings[:, None] * order * size).astype(np.intp)
-    beyond = spacings[:, None] * order > 0.5
-    middle = round(centre * size)
-    both = evidence[:, (middle + place) % size] + evidence[:, (middle - place) % size]
-    both[:, beyond] = 0.0
-    heights = both.cumsum(axis=2).max(axis=(0, 2))
+    heights = _heights(evidence, spacings, centre)
     loudest = spacings[np.argsort(heights)[: -CLOSER - 1 : -1]]
     return _closest(rest, evidence, loudest, centre)
+
+
+def _heights(evidence: NDArray[np.float32], spacings: NDArray[np.float64], centre: float) -> NDArray[np.float32]:
+    """Best evidence of each spacing, rising, with both sides equally far."""
+    size = evidence.shape[-1]
+    # both sides at once: the spectrum folded about the centre
+    middle, away = round(centre * size), np.arange(size // 2 + 1)
+    folded = evidence.take(middle + away, axis=1, mode="wrap") + evidence.take(middle - away, axis=1, mode="wrap")
+    out = np.empty(len(spacings), np.float32)
+    start = 0
+    while start < len(spacings):  # combs of about as many lines are summed together
+        stop = min(int(np.searchsorted(spacings, 1.3 * spacings[start])), start + ROWS_AT_ONCE)
+        widest = (0.5 / spacings[start:stop]).astype(np.intp)
+        order = np.arange(1, widest[0] + 1)
+        beyond = order > widest[:, None]
+        place = np.rint((spacings[start:stop] * size)[:, None] * np.where(beyond, 0, order)).astype(np.intp)
+        best = np.full(stop - start, -np.inf, np.float32)
+        for row in folded:
+            seen = row.take(place, mode="clip")
+            seen[beyond] = 0.0
+            seen.cumsum(axis=1, out=seen)
+            np.maximum(best, seen.max(axis=1), out=best)
+        out[start:stop] = best
+        start = stop
+    return out
 
 
 def _geometric(low: float, high: float, pulses: int) -> NDArray[np.float64]:
@@ -241,6 +262,6 @@ def _closest(
     """The best of spacings and of those near them."""
     factors = 1 + 0.25 / rest.pulses * np.arange(-2 * FINE_STEPS, 2 * FINE_STEPS + 1)
     tried = np.outer(spacings, factors).ravel()
-    heights, lows, highs = score(np.ascontiguousarray(evidence.T), tried, np.full(len(tried), centre))
+    heights, lows, highs = score(evidence, tried, np.full(len(tried), centre))
     index = int(heights.argmax())
     return Candidate(float(tried[index]), centre, int(lows[index]), int(highs[index]), float(heights[index]))

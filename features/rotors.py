@@ -66,7 +66,7 @@ def _strongest(data: Periodogram, centre: float, rates: NDArray[np.float64]) -> 
     size = len(data.power)
     evidence = line_evidence(data.power, int(BLOCK_BINS * size / data.pulses))
     evidence[:, ~data.usable(np.arange(size) / size)] = 0.0
-    powers, _, reach = score(np.ascontiguousarray(evidence.T), rates, np.full(len(rates), centre), even=True)
+    powers, _, reach = score(evidence, rates, np.full(len(rates), centre), even=True)
     order = np.arange(1, reach.max() + 1)
     flashes = np.zeros(len(rates))
     for sign in (-1, 1):
