@@ -62,6 +62,21 @@ class CombFit:
         return np.asarray(self.centre + self.spacing * self.orders, np.float64)
 
 
+def _times(matrix: NDArray[np.float64], columns: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Real matrix times complex columns; numpy would turn the matrix into a complex one each time."""
+    return _whole(matrix @ _parts(columns)).reshape(columns.shape)
+
+
+def _parts(columns: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Real and imaginary parts as columns of their own."""
+    return np.ascontiguousarray(columns).view(np.float64).reshape(len(columns), -1)
+
+
+def _whole(parts: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """The way back from `_parts`, shape (rows, columns)."""
+    return np.ascontiguousarray(parts).view(np.complex128)
+
+
 def fit_combs(
     data: Periodogram,
     centre: float,
@@ -132,16 +147,17 @@ def fit_combs(
             factor = cho_factor(plain + np.diag(held_back))
         except np.linalg.LinAlgError:  # what is tabulated of the notch is a little off where nearly all was taken out
             factor = cho_factor(plain + np.diag(held_back + NOTCH_RIDGE))
-        amplitudes = cho_solve(factor, seen)
-        left = seen - plain @ amplitudes
+        amplitudes = _whole(cho_solve(factor, _parts(seen)))[:, 0]
+        left = seen - _times(plain, amplitudes)
         snr = np.maximum(share @ (np.abs(amplitudes + left) ** 2 * pulses / level) - 1, 1e-3)
-        slope = moment - 1j * (first.T @ amplitudes)
+        slope = moment - 1j * _times(first.T, amplitudes)
         weighed = np.where(used, amplitudes, 0.0) / np.sqrt(level)
         # the score of each line's frequency, and the Fisher matrix of centre and spacings
         pull = (weighed.conj() * slope).imag / np.sqrt(level) * (4 * np.pi * pulses)
         sway = weighed[:, None] * design
-        leaked = first @ sway
-        fisher = (sway.conj().T @ (second @ sway) - leaked.conj().T @ cho_solve(factor, leaked)).real
+        leaked = _times(first, sway)
+        kept = _whole(cho_solve(factor, _parts(leaked)))
+        fisher = (sway.conj().T @ _times(second, sway) - leaked.conj().T @ kept).real
         fisher *= 8 * np.pi**2 * pulses
         fisher[np.diag_indices_from(fisher)] *= 1 + 1e-9
         step = np.linalg.solve(fisher, design.T @ pull)

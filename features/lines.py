@@ -103,12 +103,16 @@ def line_products(
     outer, inner = np.exp(1j * pulses * turns), np.exp(1j * turns)
     top = np.outer(outer.conj(), outer)  # angle pi N (f_l - f_k)
     low = np.outer(inner.conj(), inner)
-    sine, cosine = top.imag, top.real
-    below, beside = low.imag, low.real
-    near = np.abs(below) < 1e-5 / pulses
-    safe = np.where(near, 1.0, below)
-    plain = np.where(near, 1.0, sine / (pulses * safe))
-    ratio = np.where(near, 0.0, beside / safe)
-    first = np.where(near, 0.0, cosine / safe - plain * ratio)  # D' / pi
-    second = np.where(near, -(pulses**2 - 1) / 3, (1 - pulses**2) * plain - 2 * ratio * first)  # D'' / pi^2
+    near = np.abs(low.imag) < 1e-5 / pulses
+    over = 1 / np.where(near, 1.0, low.imag)
+    plain = top.imag * over
+    plain /= pulses
+    plain[near] = 1.0
+    ratio = low.real * over
+    first = top.real * over  # D' / pi
+    first -= plain * ratio
+    first[near] = 0.0
+    second = (1 - pulses**2) * plain  # D'' / pi^2
+    second -= 2 * ratio * first
+    second[near] = -(pulses**2 - 1) / 3
     return plain, first / 2, -second / 4

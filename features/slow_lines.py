@@ -83,7 +83,7 @@ def _odd(basis: NDArray[np.float64]) -> NDArray[np.bool_]:
 def _held(pulses: int, half_bins: float) -> NDArray[np.float32]:
     """Unit lines, and those times time, seen by the sequences, even and odd ones both real.
 
-    Shape (2, sequences, steps); steps of 1 / (`_HELD_STEPS` x pulses) cycles a sample from -1/2 to 1/2 and some over.
+    Shape (steps, 2, sequences); steps of 1 / (`_HELD_STEPS` x pulses) cycles a sample from -1/2 to 1/2 and some over.
     """
     size = _HELD_STEPS * pulses
     place = np.arange(-(size // 2) - 4, size // 2 + 4)
@@ -92,7 +92,8 @@ def _held(pulses: int, half_bins: float) -> NDArray[np.float32]:
     turn = (np.exp(1j * np.pi * (pulses - 1) / size * place) / np.sqrt(pulses)).astype(np.complex64)
     plain, timed = (fft.fft(v.astype(np.complex64), size)[:, place % size] * turn for v in (basis, basis * time))
     odd = _odd(basis)[:, None]
-    out = np.stack([np.where(odd, -plain.imag, plain.real), np.where(odd, timed.real, timed.imag)])
+    seen = np.where(odd, -plain.imag, plain.real), np.where(odd, timed.real, timed.imag)
+    out = np.ascontiguousarray(np.stack(seen).transpose(2, 0, 1))
     out.setflags(write=False)
     return out
 
@@ -125,7 +126,7 @@ def without_bands(
         table = _held(pulses, float(half))
         away = frequency - centre
         turns = np.rint(away)
-        place = (away - turns) * (pulses * _HELD_STEPS) + table.shape[-1] // 2
+        place = (away - turns) * (pulses * _HELD_STEPS) + len(table) // 2
         first = np.floor(place).astype(np.intp)
         # the polynomial through six points; time counts from the middle, half a sample off where the pulses are even
         sign = 1 - 2 * (turns % 2) * (pulses % 2 == 0)
@@ -133,18 +134,17 @@ def without_bands(
         weights = [
             np.prod(np.delete(gaps, i, 1), axis=1) / np.prod(n - np.delete(nodes, i)) for i, n in enumerate(nodes)
         ]
-        plain, timed = sum(table[..., first + n] * (w * sign) for n, w in zip(nodes, weights, strict=True))
-        plains.append(plain)
-        timeds.append(timed)
+        held = sum(table[first + n] * (w * sign)[:, None, None] for n, w in zip(nodes, weights, strict=True))
+        plains.append(held[:, 0])
+        timeds.append(held[:, 1])
     if not plains:
         return
-    plain, timed = np.concatenate(plains), np.concatenate(timeds)
+    plain, timed = np.concatenate(plains, axis=1), np.concatenate(timeds, axis=1)
+    left, also = plain, timed
     if len(plains) > 1:
         inverse = _gram_inverse(pulses, bands)
-        left, also = plain.T @ inverse, timed.T @ inverse
-    else:
-        left, also = plain.T, timed.T
-    for product, part in zip(products, (left @ plain, left @ timed, also @ timed), strict=True):
+        left, also = plain @ inverse, timed @ inverse
+    for product, part in zip(products, (left @ plain.T, left @ timed.T, also @ timed.T), strict=True):
         product -= part
 
 
