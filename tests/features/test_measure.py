@@ -256,6 +256,23 @@ def test_the_chopping_of_several_rotors_is_that_of_their_mean():
     assert abs(found.chopping_hz - 2 * np.mean(rates_hz)) < 4 * found.chopping_hz_std < 0.2
 
 
+def test_what_strong_lines_leak_into_each_other_moves_no_comb():
+    # The slope of a line's likelihood must lose what the other lines have in it: 25 dB up that, not noise, is the error.
+    orders = np.arange(-30, 31)
+    errors = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        spacings_hz = rng.uniform(100, 130) * np.array([1.0, 1.01])
+        lines = white(rng, 2, len(orders)) * (orders != 0)
+        iq = sum(one @ tone(orders * hz) for one, hz in zip(lines, spacings_hz, strict=True))
+        iq = 10 ** (25 / 20) * (iq / np.sqrt(np.mean(np.abs(iq) ** 2)) + 3) + white(rng, PULSES)
+        data = prepare(iq.astype(np.complex64), **RADAR)
+        fits, _ = fit_combs(data, 0.0, list(1.0001 * spacings_hz / PRF_HZ), [(-30, 30)] * 2, 20)
+        errors += [(f.spacing * PRF_HZ - hz) / (f.spacing_std * PRF_HZ) for f, hz in zip(fits, spacings_hz, strict=True)]
+    # chi-squared of 24 degrees of freedom over 24 stays under 2.14 in 99.9 %
+    assert np.mean(np.square(errors)) < 2.14
+
+
 def test_unresolved_rotors_carry_their_spread():
     found = measure(drone(np.array([3440.0, 3447.0]) / 60, snr_db=10, velocity_mps=5.0, body=10.0), **RADAR)
     assert not found.rotors_resolved or found.rotor_count == 2
