@@ -58,10 +58,14 @@ def flash_evidence(data: Periodogram, spacing: float, centre: float, low: int, h
         Outermost orders, low <= 0 <= high.
     """
     size = len(data.amplitude)
-    total = 0.0
+    sides = []
     for sign, reach in ((-1, -low), (1, high)):
-        if reach >= LEAST_LINES:
-            frequency = centre + sign * spacing * np.arange(1, reach + 1)
-            seen = data.amplitude[np.rint(frequency * size).astype(np.intp) % size]
-            total += float(flash_nats(np.where(data.usable(frequency), seen, 0)))
-    return total
+        frequency = centre + sign * spacing * np.arange(1, reach + 1)
+        seen = data.amplitude[np.rint(frequency * size).astype(np.intp) % size]
+        sides.append(np.where(data.usable(frequency), seen, 0))
+    apart = sum(float(flash_nats(side)) for side in sides if len(side) >= LEAST_LINES)
+    left, right = sides
+    # J_-n = (-1)^n J_n: one step for both sides, with half a turn more on the one where the blades are of odd number
+    turned = left * (-1.0) ** np.arange(1, len(left) + 1)
+    both = np.stack([np.concatenate([side[::-1], [0], right]) for side in (left, turned)])
+    return max(apart, float(flash_nats(both).max()) - float(np.log(2)))

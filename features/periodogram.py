@@ -40,6 +40,10 @@ LEAST_LEVEL = 0.8
 TAPER_FROM_DB = 23.0
 TAPER_BETA = 3.0
 
+#: A click: one sample so many times over the noise, and over both beside it, fewer to a record than a rotor has flashes.
+#: A flash is as long as the rotor's band is narrow: its samples beside are as strong.
+CLICK_POWER, CLICK_OVER_BESIDE, MOST_CLICKS = 25.0, 4.0, 5
+
 #: A line weaker than its neighbourhood by this factor in power is a leak or an imbalance, not a line of the comb.
 NEIGHBOUR_SHARE = 0.03
 
@@ -211,6 +215,21 @@ def local_level(power: NDArray[np.float64], keep: NDArray[np.bool_], floor: floa
     return np.exp(np.interp(np.arange(size), middles[known], np.log(levels[known]), period=size))
 
 
+def without_clicks(samples: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Samples with single ones that stand far out set to 0: two clicks are as far apart as the flashes of some rotor.
+
+    Parameters
+    ----------
+    samples : ndarray of complex128, shape (pulses,)
+        One record, strong lines taken out.
+    """
+    power = squared(samples)
+    noise = float(np.median(power)) / np.log(2)
+    beside = np.maximum(np.roll(power, 1), np.roll(power, -1))
+    clicks = (power > CLICK_POWER * noise) & (power > CLICK_OVER_BESIDE * beside)
+    return np.where(clicks, 0.0, samples) if 0 < clicks.sum() <= MOST_CLICKS else samples
+
+
 def prepare(iq: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float) -> Periodogram | None:
     """Make one record ready: find the body line, take it and the static background out, whiten.
 
@@ -277,7 +296,7 @@ def _prepare(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram:
         if level > LINE_DB and (abs(turn) * pulses > rest_half or not bands)
     ]
     samples = iq.astype(np.complex128) / np.sqrt(spectrum.floor)
-    samples = remove_bands(samples, bands)
+    samples = without_clicks(remove_bands(samples, bands))
     blocked = tuple((turn, (half + 2) / pulses) for turn, half in bands)
 
     size = fft.next_fast_len(PADDING * pulses)
