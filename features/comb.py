@@ -12,7 +12,7 @@ from .periodogram import LINE_DB, Periodogram
 
 #: Score that chance alone exceeds in under 1 % of the records: of white noise; where a line was taken out; where the
 #: static background was, with its skirt [nats]. Checked by tests/benchmarks/measurement_tables.py.
-THRESHOLDS = (17.0, 17.5, 25.0)
+THRESHOLDS = (18.0, 18.0, 25.0)
 
 #: A rotor's lines reach at least so far from the body [m/s]; wings, limbs and wheels seldom do with so few lines.
 LEAST_REACH_MPS = 12.0

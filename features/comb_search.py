@@ -31,6 +31,10 @@ MISSING_SHARE = 0.15
 #: No single line speaks for more than this [nats]: a lone line is no comb.
 LINE_CAP = 5.0
 
+#: Flashes speak for a comb by at most so many times what the powers of its lines do: they must not make one of what
+#: hardly is one.
+FLASH_SHARE = 2.0
+
 #: What a comb whose sides reach unequally far must have more [nats].
 UNEVEN_COST = 4.0
 
@@ -317,8 +321,7 @@ def best_candidate(data: Periodogram) -> Candidate | None:
         index = int(np.where(family == number, scores, -np.inf).argmax())
         place = (float(spacings[index]), float(centres[index]), int(lows[index]), int(highs[index]))
         flash = flash_evidence(data, *place)
-        # flashes must not make a comb of what hardly is one: they speak for as much as the lines' powers do
-        found.append(Candidate(*place, float(scores[index]) + min(flash, float(scores[index]))))
+        found.append(Candidate(*place, float(scores[index]) + min(flash, FLASH_SHARE * float(scores[index]))))
     return _centred(data, evidence, max(found, key=lambda c: c.score))
 
 
