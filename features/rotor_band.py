@@ -20,6 +20,14 @@ LEAK_SHARE = 0.001
 MODEL_ERROR_SPACINGS = 0.1
 
 
+#: How unlike the powers of a family's lines may be: variances over the mean's square. A uniform blade's inner lines
+#: are nearly equal, a real one's fade and scatter; what the lines themselves show decides.
+POWER_VARIANCES = (0.02, 0.1, 0.3, 1.0)
+
+#: Step of the edges tried, in spacings.
+FINE_STEP = 1 / 12
+
+
 @lru_cache(maxsize=1)
 def roll_off() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Line power of a uniform blade about the tip's Doppler, 1 well inside.
@@ -47,16 +55,19 @@ def expected_power(away: NDArray[np.float64], edge: NDArray[np.float64], rotatio
 
 
 def _log_likelihood(
-    away: NDArray[np.float64],
-    power: NDArray[np.float64],
-    bins: NDArray[np.float64],
-    rotation: float,
-    edges: NDArray[np.float64],
-    levels: NDArray[np.float64],
+    shape: NDArray[np.float64], power: NDArray[np.float64], bins: NDArray[np.float64], level: float, share: float
 ) -> NDArray[np.float64]:
-    """Log likelihood of each edge, over the levels; line and noise are complex Gaussian."""
-    mean = 1 + levels[:, None, None] * expected_power(away, edges[:, None], rotation)
-    return np.logaddexp.reduce(-(bins * (np.log(mean) + power / mean)).sum(axis=-1), axis=0)
+    """Log likelihood of expected line powers `level` x `shape` over the noise.
+
+    The mean of lines of the amplitudes' variance `share` x level^2 in noise, as a gamma law of the same mean and
+    variance: exact for noise alone and for lines that are complex Gaussian (share 1).
+    """
+    line = level * shape
+    mean = 1 + line
+    number = bins * mean**2 / (1 + 2 * line + share * line**2)
+    ratio = power / mean
+    # Stirling's series for the gamma function
+    return np.asarray((0.5 * np.log(number) - 1 / (12 * number) - number * (ratio - 1 - np.log(ratio))).sum(axis=-1))
 
 
 def fit_edge(
@@ -81,13 +92,25 @@ def fit_edge(
         The tip's Doppler frequency and its standard deviation, in the unit of `away`.
     """
     spacing = float(np.min(away))
-    power = power / (1 + LEAK_SHARE * float(np.quantile(power, 0.9)))
+    power = np.maximum(power / (1 + LEAK_SHARE * float(np.quantile(power, 0.9))), 1e-3)
     levels = np.geomspace(0.3, max(10.0, 2 * float(power.max())), 8)
     coarse = np.arange(1.5 * spacing, away.max() + spacing, spacing)
-    best = coarse[_log_likelihood(away, power, bins, rotation, coarse, levels).argmax()]
-    fine = best + spacing * np.arange(-3, 3.01, 1 / 16)
+    shape = expected_power(away, coarse[:, None], rotation)
+    likelihood = np.logaddexp.reduce([_log_likelihood(shape, power, bins, level, 1.0) for level in levels], axis=0)
+    best = coarse[likelihood.argmax()]
+    fine = best + spacing * np.arange(-3, 3.01, FINE_STEP)
     fine = fine[fine > spacing]
-    likelihood = _log_likelihood(away, power, bins, rotation, fine, levels)
+    shape = expected_power(away, fine[:, None], rotation)
+    # the level that fits each edge best, and others as far off as chance allows
+    height = np.maximum(((power - 1) * bins * shape).sum(axis=1) / (bins * shape**2).sum(axis=1), 0.1)[:, None]
+    total = (bins * shape).sum(axis=1)[:, None]
+    tables = []
+    for share in POWER_VARIANCES:
+        off = np.sqrt((1 + 2 * height + share * height**2) / total)
+        for deviations in (-1.5, -0.5, 0.5, 1.5):
+            level = np.maximum(height + deviations * off, 0.05)
+            tables.append(_log_likelihood(shape, power, bins, level, share))
+    likelihood = np.logaddexp.reduce(tables, axis=0)
     weight = np.exp(likelihood - likelihood.max())
     weight /= weight.sum()
     edge = float((weight * fine).sum())
