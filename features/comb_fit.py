@@ -62,12 +62,12 @@ class CombFit:
         return np.asarray(self.centre + self.spacing * self.orders, np.float64)
 
 
-def _times(matrix: NDArray[np.float64], columns: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _times(matrix: NDArray[np.float64], columns: NDArray[np.complexfloating]) -> NDArray[np.complex128]:
     """Real matrix times complex columns; numpy would turn the matrix into a complex one each time."""
     return _whole(matrix @ _parts(columns)).reshape(columns.shape)
 
 
-def _parts(columns: NDArray[np.complex128]) -> NDArray[np.float64]:
+def _parts(columns: NDArray[np.complexfloating]) -> NDArray[np.float64]:
     """Real and imaginary parts as columns of their own."""
     return np.ascontiguousarray(columns).view(np.float64).reshape(len(columns), -1)
 
@@ -147,14 +147,14 @@ def fit_combs(
             factor = cho_factor(plain + np.diag(held_back))
         except np.linalg.LinAlgError:  # what is tabulated of the notch is a little off where nearly all was taken out
             factor = cho_factor(plain + np.diag(held_back + NOTCH_RIDGE))
-        amplitudes = _whole(cho_solve(factor, _parts(seen)))[:, 0]
+        amplitudes: NDArray[np.complex128] = _whole(cho_solve(factor, _parts(seen)))[:, 0]
         left = seen - _times(plain, amplitudes)
         snr = np.maximum(share @ (np.abs(amplitudes + left) ** 2 * pulses / level) - 1, 1e-3)
         slope = moment - 1j * _times(first.T, amplitudes)
         weighed = np.where(used, amplitudes, 0.0) / np.sqrt(level)
         # the score of each line's frequency, and the Fisher matrix of centre and spacings
         pull = (weighed.conj() * slope).imag / np.sqrt(level) * (4 * np.pi * pulses)
-        sway = weighed[:, None] * design
+        sway = np.asarray(weighed[:, None] * design, np.complex128)
         leaked = _times(first, sway)
         kept = _whole(cho_solve(factor, _parts(leaked)))
         fisher = (sway.conj().T @ _times(second, sway) - leaked.conj().T @ kept).real

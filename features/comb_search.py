@@ -33,7 +33,8 @@ LINE_CAP = 5.0
 
 #: Flashes speak for a comb by at most so many times what the powers of its lines do: they must not make one of what
 #: hardly is one.
-FLASH_SHARE = 2.0
+#: Beside a static background, where supplies click, it is less.
+FLASH_SHARE, REST_FLASH_SHARE = 2.0, 1.0
 
 #: What a comb whose sides reach unequally far must have more [nats].
 UNEVEN_COST = 4.0
@@ -316,12 +317,13 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     )
     spacings = np.concatenate([np.tile(spacings[i] * fine, len(s)) for i, s in zip(chosen, shifts, strict=True)])
     scores, lows, highs = score(evidence, spacings, centres)
+    share = REST_FLASH_SHARE if data.rest_half > 0 else FLASH_SHARE
     found = []
     for number in range(len(chosen)):
         index = int(np.where(family == number, scores, -np.inf).argmax())
         place = (float(spacings[index]), float(centres[index]), int(lows[index]), int(highs[index]))
         flash = flash_evidence(data, *place)
-        found.append(Candidate(*place, float(scores[index]) + min(flash, FLASH_SHARE * float(scores[index]))))
+        found.append(Candidate(*place, float(scores[index]) + min(flash, share * float(scores[index]))))
     return _centred(data, evidence, max(found, key=lambda c: c.score))
 
 

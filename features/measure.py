@@ -14,7 +14,7 @@ from .lines import LineSpace
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .periodogram import Periodogram, prepare
 from .rotor_band import fit_edge
-from .rotors import MAX_ROTORS
+from .rotors import MAX_ROTORS, Rotors
 from .smearing import smearing_index
 from .spectrum import LEAST_PART, Spectrum, doppler_spectrum, largest_part
 
@@ -26,6 +26,12 @@ BLADE_CHOICES = (1, 2, 3, 4, 5)
 
 #: Rates nearer than this at an order [bins] have one line there.
 MERGED_BINS = 1.0
+
+#: Edges found in two ways agree within so many standard deviations.
+AGREED_DEVIATIONS = 3.0
+
+#: Rotors that are not told apart differ by about so much in their rates, relative.
+LEAST_SPREAD = 0.02
 
 
 @dataclass(frozen=True)
@@ -243,6 +249,8 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         edge, edge_std = _edge(data, rotors.fits, rotors.rest, 1, blades or 2)
     if not rotors.resolved:  # the mean lies anywhere within what the unresolved rates span
         out["chopping_hz_std"] = float(np.hypot(out["chopping_hz_std"], rotors.spread * prf_hz / np.sqrt(12)))
+    if count > 1 or not rotors.resolved:
+        edge, edge_std = _agreed((edge, edge_std), _edge_around(data, comb, rotors, blades or 2))
     for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):
         padded = np.full(MAX_ROTORS, np.nan)
         padded[:count] = values * prf_hz
@@ -317,3 +325,45 @@ def _edge(
     # where the single rotors' lines lie in one another they add up: those orders stand too high beside the outer ones
     seen = (number > 0) & (order * np.ptp(spacings) * data.pulses >= MERGED_BINS * (len(fits) > 1))
     return fit_edge(order[seen] * fastest, total[seen] / number[seen], number[seen], fastest / blades)
+
+
+def _agreed(lines: tuple[float, float], around: tuple[float, float]) -> tuple[float, float]:
+    """One edge and its deviation from that of the fitted lines and that of all about them, of several rotors.
+
+    Rotors that were not told apart show in the second alone. Where the two agree each is off for reasons of its own,
+    but by the same noise, so that their mean is no surer than they are.
+    """
+    if abs(around[0] - lines[0]) > AGREED_DEVIATIONS * np.hypot(lines[1], around[1]):
+        return around
+    weights = 1 / np.square([lines[1], around[1]])
+    edge, std = np.average([lines, around], axis=0, weights=weights)
+    return float(edge), float(std)
+
+
+def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int) -> tuple[float, float]:
+    """Edge and its standard deviation by all that lies about each order: rotors that are not told apart count too.
+
+    What they hold between the lines lifts the local level as well, which therefore counts up to the floor only.
+    """
+    nominal, centre = comb.chopping, comb.fit.centre
+    size, pulses = len(data.power), data.pulses
+    order = np.arange(1, int(0.49 / nominal) + 1)
+    spread = max(rotors.spread, LEAST_SPREAD * nominal)
+    half_bins = min(nominal * pulses / 2, 1 + comb.last / comb.per_turn * spread * pulses)
+    half = int(half_bins * size / pulses)
+    level = data.level_of(rotors.rest)
+    total, number = np.zeros(len(order)), np.zeros(len(order))
+    for sign in (-1, 1):
+        middle = np.rint((centre + sign * order * nominal) * size).astype(np.intp)
+        frequency = (middle[:, None] + np.arange(-half, half + 1)) / size
+        power = data.at(frequency) * data.level_at(frequency) / np.minimum(level(frequency), 1.0)
+        usable = data.usable(frequency)
+        bins = usable.sum(axis=1) * pulses / size
+        total += np.where(usable, power, 0.0).sum(axis=1) * pulses / size
+        number += np.asarray(bins, np.float64)
+    seen = number > 2
+    fastest = float(max(nominal, rotors.rates.max()))
+    mean = np.asarray(total / np.maximum(number, 1.0), np.float64)
+    away = np.asarray(order[seen] * nominal, np.float64)
+    edge, std = fit_edge(away, mean[seen], number[seen], nominal / blades)
+    return edge * fastest / nominal, std

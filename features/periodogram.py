@@ -40,7 +40,7 @@ LEAST_LEVEL = 0.8
 TAPER_FROM_DB = 23.0
 TAPER_BETA = 3.0
 
-#: A click: one sample so many times over the noise, and over both beside it, fewer to a record than a rotor has flashes.
+#: A click: one sample so many times over the noise, and over both beside it; fewer in a record than a rotor's flashes.
 #: A flash is as long as the rotor's band is narrow: its samples beside are as strong.
 CLICK_POWER, CLICK_OVER_BESIDE, MOST_CLICKS = 25.0, 4.0, 5
 

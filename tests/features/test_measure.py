@@ -5,7 +5,7 @@ from bladewing.features.comb import find_comb, strong_multiple
 from bladewing.features.comb_fit import fit_combs
 from bladewing.features.flashes import flash_nats
 from bladewing.features.lines import LineSpace, line_products, sum_of_lines
-from bladewing.features.periodogram import prepare
+from bladewing.features.periodogram import prepare, without_clicks
 from bladewing.features.rotor_band import expected_power, fit_edge
 from bladewing.features.slow_lines import remove_bands, slepian, without_bands
 
@@ -203,6 +203,33 @@ def test_the_products_of_lines_know_what_the_notch_takes(bands):
     np.testing.assert_allclose(products[2], timed.conj() @ timed.T / pulses, atol=1e-4 * pulses**2)
 
 
+def test_clicks_are_taken_out_and_flashes_are_not():
+    rng = np.random.default_rng(5)
+    noise = white(rng, PULSES)
+    clicked = noise.copy()
+    clicked[[700, 1100]] += [20, 30j]
+    clean = without_clicks(clicked)
+    np.testing.assert_array_equal(np.flatnonzero(clean != noise), [700, 1100])
+    assert not clean[[700, 1100]].any()
+    np.testing.assert_array_equal(without_clicks(noise), noise)
+    # a click's samples beside are as weak as ever, those of a band-limited flash are not
+    flash = noise + 20 * np.sinc((np.arange(PULSES) - 900.3) * 0.4)
+    np.testing.assert_array_equal(without_clicks(flash), flash)
+    # two clicks are as far apart as the flashes of a rotor: 400 samples are 87.5 Hz
+    assert np.isnan(measure(clicked, **RADAR).chopping_hz)
+
+
+def test_unresolved_rotors_near_the_noise_keep_their_band():
+    rates_hz = np.array([3395.0, 3430.0, 3465.0, 3500.0]) / 60
+    theory_hz = 8 * np.pi * rates_hz.max() * 0.15 / WAVELENGTH_M
+    errors = []
+    for seed in range(8):
+        iq = drone(rates_hz * (1 + 0.001 * seed), snr_db=-8, seed=seed, body=10.0)
+        errors.append(float(measure(iq, **RADAR, blades=2).bandwidth_hz) / theory_hz / (1 + 0.001 * seed) - 1)
+    # half of the draws are off by under 2 % at -10 dB; without what lies about the lines, by over 4 %
+    assert np.median(np.abs(errors)) < 0.03
+
+
 def test_phases_in_step_are_evidence_and_random_ones_are_not():
     rng = np.random.default_rng(6)
     noise = flash_nats(white(rng, 4000, 30))
@@ -257,7 +284,7 @@ def test_the_chopping_of_several_rotors_is_that_of_their_mean():
 
 
 def test_what_strong_lines_leak_into_each_other_moves_no_comb():
-    # The slope of a line's likelihood must lose what the other lines have in it: 25 dB up that, not noise, is the error.
+    # The slope of a line's likelihood must lose what the other lines have in it: 25 dB up that is the error.
     orders = np.arange(-30, 31)
     errors = []
     for seed in range(12):
@@ -268,7 +295,8 @@ def test_what_strong_lines_leak_into_each_other_moves_no_comb():
         iq = 10 ** (25 / 20) * (iq / np.sqrt(np.mean(np.abs(iq) ** 2)) + 3) + white(rng, PULSES)
         data = prepare(iq.astype(np.complex64), **RADAR)
         fits, _ = fit_combs(data, 0.0, list(1.0001 * spacings_hz / PRF_HZ), [(-30, 30)] * 2, 20)
-        errors += [(f.spacing * PRF_HZ - hz) / (f.spacing_std * PRF_HZ) for f, hz in zip(fits, spacings_hz, strict=True)]
+        found, stds = np.array([(fit.spacing, fit.spacing_std) for fit in fits]).T
+        errors += list((found - spacings_hz / PRF_HZ) / stds)
     # chi-squared of 24 degrees of freedom over 24 stays under 2.14 in 99.9 %
     assert np.mean(np.square(errors)) < 2.14
 
