@@ -215,19 +215,23 @@ def test_clicks_are_taken_out_and_flashes_are_not():
     # a click's samples beside are as weak as ever, those of a band-limited flash are not
     flash = noise + 20 * np.sinc((np.arange(PULSES) - 900.3) * 0.4)
     np.testing.assert_array_equal(without_clicks(flash), flash)
-    # two clicks are as far apart as the flashes of a rotor: 400 samples are 87.5 Hz
-    assert np.isnan(measure(clicked, **RADAR).chopping_hz)
+    # two clicks are as far apart as the flashes of a rotor, 400 samples are 87.5 Hz: each of these had a comb
+    for seed in (4, 6, 11, 13):
+        clicked = white(np.random.default_rng(seed), PULSES)
+        clicked[[700, 1100]] += [20, 30j]
+        assert np.isnan(measure(clicked, **RADAR).chopping_hz)
 
 
-def test_unresolved_rotors_near_the_noise_keep_their_band():
-    rates_hz = np.array([3395.0, 3430.0, 3465.0, 3500.0]) / 60
+def test_six_rotors_of_which_some_are_not_told_apart_keep_their_band():
+    rates_hz = np.linspace(3395.0, 3500.0, 6) / 60
     theory_hz = 8 * np.pi * rates_hz.max() * 0.15 / WAVELENGTH_M
     errors = []
-    for seed in range(8):
-        iq = drone(rates_hz * (1 + 0.001 * seed), snr_db=-8, seed=seed, body=10.0)
-        errors.append(float(measure(iq, **RADAR, blades=2).bandwidth_hz) / theory_hz / (1 + 0.001 * seed) - 1)
-    # half of the draws are off by under 2 % at -10 dB; without what lies about the lines, by over 4 %
-    assert np.median(np.abs(errors)) < 0.03
+    for seed in range(4):
+        factor = 1 + 0.001 * seed
+        found = measure(drone(rates_hz * factor, snr_db=-5, seed=seed, body=10.0), **RADAR, blades=2)
+        errors.append(float(found.bandwidth_hz) / (theory_hz * factor) - 1)
+    # the rotors that are not found leave holes where the others' lines part: the edge was taken for one of these
+    assert np.max(np.abs(errors)) < 0.04
 
 
 def test_phases_in_step_are_evidence_and_random_ones_are_not():
