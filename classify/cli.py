@@ -79,6 +79,14 @@ def predict(
             show_default=False,
         ),
     ] = None,
+    coverage: Annotated[
+        float | None,
+        typer.Option(
+            metavar="C",
+            help="Name only what a prediction set of this coverage holds alone: 0.8, 0.9, 0.95, 0.98 or 0.99.",
+            show_default=False,
+        ),
+    ] = None,
     dwell: DwellS = 0.08,
     carrier_hz: CarrierHz = None,
     prf_hz: PrfHz = None,
@@ -92,7 +100,7 @@ def predict(
     from .inference import Classifier
 
     dwell_s = work.checked_dwell_s(dwell)
-    classifier = Classifier.load(model, budget_us=budget_us, max_false_alarm=max_false_alarm)
+    classifier = Classifier.load(model, budget_us=budget_us, max_false_alarm=max_false_alarm, coverage=coverage)
     if classifier.operating_point is not None:
         _complain(work.terms(classifier.operating_point), kind="note")
     said: Counter[str] = Counter()

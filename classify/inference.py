@@ -25,7 +25,7 @@ from .bounds import MOST_MODEL_BYTES
 from .envelope import Envelope
 from .errors import BadInput
 from .files import read_bounded
-from .labels import CLASSES, UNKNOWN, decide
+from .labels import CLASSES, UNKNOWN, decide, decide_by_sets
 from .ladder import PLACES, by_budget, by_place, measured_fft_us, shipped_account
 from .samples import complex_samples, positive
 
@@ -33,6 +33,12 @@ __all__ = ["Classifier", "Envelope", "Prediction", "model_names"]
 
 CURVE_KEY = "operating_curve"
 """Metadata of the thresholds for every false-alarm rate; models of earlier versions hold none."""
+
+SETS_KEY = "prediction_sets"
+"""Metadata of the thresholds of prediction sets, rows of coverage and one a class; earlier models hold none."""
+
+COVERAGES = (0.8, 0.9, 0.95, 0.98, 0.99)
+"""Coverages that a training stores."""
 
 FORMAT = "1"
 """Version of the metadata that this code reads."""
@@ -113,6 +119,10 @@ class Classifier:
     max_false_alarm
         Largest share of birds and clutter that may be named UAV; sets the threshold on "uav", above or below the
         model's own.
+    coverage
+        Instead of that: name a record only where its prediction set holds one class alone. For each class, at least
+        this share of its records have a set that holds it (on records like those of the calibration). One of the
+        coverages that the model stores, 0.9 say.
 
     Attributes
     ----------
@@ -123,18 +133,20 @@ class Classifier:
     envelope
         The radars it answers for.
     accept
-        Least probability at which each class is named.
+        Least probability at which each class is named; without effect under a `coverage`.
     inputs
         Names of the inputs it reads, keys of `bladewing.features.schema.INPUT_SHAPES`.
     operating_point
         The threshold that `max_false_alarm` chose and the detection probability that remains, of its calibration
         records; None without one.
+    coverage
+        As it was asked for, or None.
 
     Raises
     ------
     BadInput
         Not a bladewing model, altered after it was written, or made for other inputs or another version; or its
-        calibration records do not support the false-alarm rate.
+        calibration records do not support the false-alarm rate, or it stores no prediction sets of that coverage.
     """
 
     classes: tuple[str, str, str] = CLASSES
@@ -143,12 +155,23 @@ class Classifier:
     accept: tuple[float, float, float]
     inputs: tuple[str, ...]
     operating_point: OperatingPoint | None
+    coverage: float | None
 
     def __init__(
-        self, onnx_bytes: bytes, *, source: str = "model", threads: int = 1, max_false_alarm: float | None = None
+        self,
+        onnx_bytes: bytes,
+        *,
+        source: str = "model",
+        threads: int = 1,
+        max_false_alarm: float | None = None,
+        coverage: float | None = None,
     ) -> None:
         if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
             raise BadInput(f"threads is {threads!r}: it must be a whole number of 1 or more")
+        if max_false_alarm is not None and coverage is not None:
+            raise BadInput(
+                f"a false-alarm rate of {max_false_alarm:g} and a coverage of {coverage:g}: give one of them"
+            )
         try:
             verify(onnx_bytes)  # before anything of the file is opened, and so is what it says of itself
             self.metadata = MappingProxyType(read_metadata(onnx_bytes))
@@ -163,6 +186,9 @@ class Classifier:
         if max_false_alarm is not None:
             self.operating_point = _operating_point(self.metadata, max_false_alarm, source)
             self.accept = (self.operating_point.threshold, *self.accept[1:])
+        self.coverage = coverage
+        if coverage is not None:
+            self._sets_hold = _prediction_sets(self.metadata, coverage, source)
 
     @classmethod
     def load(
@@ -172,6 +198,7 @@ class Classifier:
         *,
         budget_us: float | None = None,
         max_false_alarm: float | None = None,
+        coverage: float | None = None,
     ) -> "Classifier":
         """Load a shipped model by its name, or any bladewing model by its path.
 
@@ -185,7 +212,7 @@ class Classifier:
         budget_us
             Instead of a name: the most accurate shipped model that takes at most this for a record of 2048 pulses in
             batches of 64 on one thread of this machine [us].
-        max_false_alarm
+        max_false_alarm, coverage
             See `Classifier`.
 
         Raises
@@ -194,7 +221,19 @@ class Classifier:
             There is no such model, or it is not one that can be used (see `Classifier`).
         """
         content, source = read_model(name_or_path, budget_us)
-        return cls(content, source=source, threads=threads, max_false_alarm=max_false_alarm)
+        return cls(content, source=source, threads=threads, max_false_alarm=max_false_alarm, coverage=coverage)
+
+    def decide(self, probabilities: NDArray[np.floating]) -> tuple[NDArray[np.str_], list[str]]:
+        """Name a class or say "unknown", and why, by the rule that this classifier was loaded with.
+
+        Parameters
+        ----------
+        probabilities
+            Shape (records, 3), as `predict` gives them.
+        """
+        if self.coverage is not None:
+            return decide_by_sets(probabilities, self._sets_hold, self.coverage)
+        return decide(probabilities, self.accept)
 
     def predict(self, iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Prediction:
         """Tell UAV, bird and clutter apart.
@@ -243,7 +282,7 @@ class Classifier:
             largest = largest_part(records)
             live = np.flatnonzero(largest >= LEAST_PART)
             probabilities[live] = self._probabilities(records, live, carrier_hz, prf_hz)
-            labels[live], why = decide(probabilities[live], self.accept)
+            labels[live], why = self.decide(probabilities[live])
             if len(live) < len(records):
                 texts = np.full(len(records), "no signal: every sample is 0", dtype=object)
                 texts[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
@@ -320,6 +359,22 @@ def _operating_point(metadata: Mapping[str, str], max_false_alarm: float, source
         return OperatingCurve.from_json(metadata[CURVE_KEY]).at(max_false_alarm)
     except ValueError as error:
         raise BadInput(f"{source}: {error}") from None
+
+
+def _prediction_sets(metadata: Mapping[str, str], coverage: float, source: str) -> tuple[float, ...]:
+    """The thresholds of the model's prediction sets of one coverage."""
+    if SETS_KEY not in metadata:
+        raise BadInput(f"{source}: holds no prediction sets, so no coverage can be chosen: train it again")
+    try:
+        rows = {float(row[0]): tuple(map(float, row[1:])) for row in json.loads(metadata[SETS_KEY])}
+        if any(len(limits) != len(CLASSES) or not np.isfinite(limits).all() for limits in rows.values()):
+            raise ValueError(f"there must be {len(CLASSES)} finite thresholds a coverage")
+    except (TypeError, KeyError, IndexError, ValueError, OverflowError, RecursionError) as error:
+        raise BadInput(f"{source}: damaged prediction sets: {error}: train it again") from None
+    if coverage not in rows:
+        held = ", ".join(f"{value:g}" for value in rows) or "none"
+        raise BadInput(f"{source}: a coverage of {coverage:g} is not among those that it holds: {held}: ask for one")
+    return rows[coverage]
 
 
 def _read_inputs(session: onnxruntime.InferenceSession, source: str) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from .errors import BadInput, one_line
 from .labels import CLASSES, UNKNOWN
 from .recording import Recording, find_recording, load_recording
 from .samples import positive
-from .track import Track, fuse
+from .track import LONGER, Track, fuse
 
 if TYPE_CHECKING:
     from bladewing.models.operating import OperatingPoint
@@ -56,6 +56,13 @@ class Answer:
     dwells: "Prediction"
     track: Track
 
+    @property
+    def declared_s(self) -> float | None:
+        """From the beginning of the recording to the end of the dwell that let a class be declared [s], or None."""
+        if not self.track.declared:
+            return None
+        return round(float(self.stop_s[self.track.declared_after - 1] - self.start_s[0]), 9)
+
     def json_objects(self) -> Iterator[dict[str, Any]]:
         """One object a dwell and a closing one, as `predict --json` prints them."""
         rows = zip(
@@ -74,6 +81,8 @@ class Answer:
             "label": self.track.label,
             "probabilities": _named(self.track.probabilities),
             "dwells": len(self.dwells.labels),
+            "declared": self.track.declared or None,
+            "declared_s": self.declared_s,
         }
         yield {"file": self.name, "track": track}
 
@@ -106,6 +115,9 @@ class Answer:
         if self.track.reason:
             line.append(f"  ({self.track.reason})")
         console.print(line)
+        if self.declared_s is not None:
+            later = "" if self.track.declared == self.track.label else ", which later dwells do not bear out"
+            console.print(Text(f"declared {self.track.declared} after {self.declared_s:.3g} s{later}"))
 
 
 def distinct(paths: Iterable[Path]) -> Iterator[Path]:
@@ -151,7 +163,12 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
     count, wanted = iq.shape
     dwells = classifier.predict(iq, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
     start_s = recording.start_s + np.arange(count) * wanted / recording.prf_hz
-    track = fuse(dwells.probabilities, dwells.labels, accept=classifier.accept)
+    longer = None
+    if count >= LONGER:
+        joined = iq[: count // LONGER * LONGER].reshape(count // LONGER, LONGER * wanted)
+        looks = classifier.predict(joined, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
+        longer = looks.probabilities, looks.labels
+    track = fuse(dwells.probabilities, dwells.labels, longer=longer, rule=classifier.decide)
     return Answer(recording.name, start_s, start_s + wanted / recording.prf_hz, dwells, track)
 
 

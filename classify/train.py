@@ -21,7 +21,7 @@ from .envelope import Envelope
 from .errors import BadInput
 from .files import result_folder, write_together
 from .gather import Gathered, gather, gather_from
-from .inference import CURVE_KEY
+from .inference import COVERAGES, CURVE_KEY, SETS_KEY
 from .labels import CLASSES
 from .ladder import COST_KEY, PULSES, RECORDS
 from .progress import Progress
@@ -163,6 +163,7 @@ def _train_one(
     """Train, calibrate, export and compare one model; give its sealed file and its account."""
     from bladewing.models.calibration import (
         acceptance_thresholds,
+        conformal_thresholds,
         expected_calibration_error,
         fit_vector_scaling,
     )
@@ -179,6 +180,10 @@ def _train_one(
     # A false drone is what users complain of: "uav" must also keep the false-alarm rate, however many UAVs it costs.
     accept[0] = max(accept[0], _alarm_threshold(calibrated, sets.calibrate.labels, settings.false_alarm))
     curve = operating_curve(calibrated, sets.calibrate.labels)
+    sets_hold = [
+        [coverage, *(float(limit) for limit in conformal_thresholds(calibrated, sets.calibrate.labels, coverage))]
+        for coverage in COVERAGES
+    ]
     onnx_bytes = export(calibration)
     probabilities = calibration.probabilities(scores_of(sets.test))
     difference = check_export(
@@ -207,6 +212,7 @@ def _train_one(
         "calibration": json.dumps(account["calibration"]),
         "accept": json.dumps(account["accept"]),
         CURVE_KEY: curve.to_json(),
+        SETS_KEY: json.dumps(sets_hold),
         "training": settings.model_dump_json(),
     }
     sealed = seal(attach_metadata(onnx_bytes, metadata))

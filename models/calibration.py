@@ -257,6 +257,49 @@ def acceptance_thresholds(
     return thresholds
 
 
+def conformal_thresholds(probabilities: ArrayLike, labels: NDArray[np.integer], coverage: float) -> NDArray[np.float64]:
+    """Return, for each class, the least probability at which a prediction set holds it.
+
+    Class-conditional conformal prediction: with n records of a class, the threshold is the k-th smallest probability
+    that they gave to it, k = floor((1 - coverage) (n + 1)). The rank of a new record of that class among them is
+    uniform, so its set misses the class with probability at most k / (n + 1).
+
+    Parameters
+    ----------
+    probabilities
+        Of records that the model did not train on, shape (n, 3).
+    labels
+        Shape (n,), whole numbers 0 to 2.
+    coverage
+        Least share of each class's records whose set holds that class, above 0 and below 1.
+
+    Returns
+    -------
+    ndarray
+        Shape (3,): the set of a record holds class c where its probability is at least threshold c. 0, always, where
+        there are too few records of a class to promise more.
+
+    Raises
+    ------
+    ValueError
+        Where shapes disagree, there is no record, or `coverage` is out of range.
+
+    References
+    ----------
+    Vovk, "Conditional validity of inductive conformal predictors", Machine Learning 92 (2013): one quantile a class.
+    """
+    table = _require_table(probabilities, labels, "probabilities")
+    if not 0 < coverage < 1:
+        raise ValueError(f"coverage is {coverage}; it must be above 0 and below 1")
+    thresholds = np.zeros(CLASS_COUNT)
+    for index in range(CLASS_COUNT):
+        truth = np.sort(table[labels == index, index])
+        rank = int((1 - coverage) * (len(truth) + 1) * (1 + 1e-9))
+        if rank:
+            thresholds[index] = truth[rank - 1]
+    return thresholds
+
+
 def _require_table(table: ArrayLike, labels: NDArray[np.integer], name: str) -> NDArray[np.float64]:
     table = np.asarray(table, dtype=np.float64)
     if table.ndim != 2 or table.shape[1] != CLASS_COUNT or not len(table):

@@ -14,7 +14,10 @@ import numpy as np
 from bladewing.classify import Classifier
 from bladewing.classify.labels import CLASSES
 from bladewing.classify.predict import answer
-from bladewing.classify.recording import load_recording
+from bladewing.classify.recording import Recording, load_recording
+from bladewing.classify.track import CORRELATION, LONGER, fuse
+from bladewing.features.wingbeat import wingbeat
+from bladewing.models.calibration import expected_calibration_error, negative_log_likelihood
 from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.dataset import KINDS, draw_radar
 
@@ -89,9 +92,107 @@ def recordings(classifier: Classifier, _: int) -> None:
         print(f"{group:10s} " + ", ".join(f"{name} {n} ({n / counts.total():.1%})" for name, n in counts.items()))
 
 
+TRACK_S, DWELL_S, OF_RADAR = 2.5, 0.08, 24
+
+
+def track_radars(count: int) -> Iterator[Radar]:
+    """Radars that can hold a decision: to 40 m/s and more; PRFs to 25 kHz, so that a track fits a few MB."""
+    rng = np.random.default_rng(7)
+    for _ in range(count):
+        carrier_hz = 2e9 * (35 / 2) ** rng.random()
+        prf_hz = min(4 * carrier_hz / 299_792_458 * 40 * (200 / 40) ** rng.random(), 25e3)
+        yield Radar(carrier_hz, prf_hz, round(TRACK_S * prf_hz))
+
+
+def drawn_tracks(count: int, purpose: str) -> Iterator[tuple[Radar, np.ndarray, dict]]:
+    """Samples and truth of each radar's tracks, balanced over the classes, long records cut by whoever looks."""
+    for number, radar in enumerate(track_radars(-(-count // OF_RADAR))):
+        records = draw_records(radar, OF_RADAR, 7, purpose=purpose, start=number * OF_RADAR)
+        yield radar, records.iq, {"label": records.labels, **records.truth}
+
+
+def tracks(classifier: Classifier, count: int) -> None:
+    """Tracks of 2.5 s at 0 dB and above, noise among them: accuracy, what was declared and when, wingbeat."""
+    parts = []
+    for radar, iq, truth in drawn_tracks(count // 6, "bench"):
+        for row, samples in enumerate(iq):
+            if not (truth["snr_db"][row] >= 0 or truth["kind"][row] == "noise"):
+                continue
+            given = answer(Recording("drawn", samples, radar.carrier_hz, radar.prf_hz), classifier, dwell_s=DWELL_S)
+            bird = truth["label"][row] == "bird"
+            beat = wingbeat(samples, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz).wingbeat_hz if bird else np.nan
+            declared_s = np.inf if given.declared_s is None else given.declared_s
+            said = {"best": CLASSES[int(given.track.probabilities.argmax())], "final": given.track.label}
+            said |= {"first": given.dwells.labels[0], "declared": given.track.declared, "declared_s": declared_s}
+            parts.append({name: values[row] for name, values in truth.items()} | said | {"beat": beat})
+    every = {name: np.array([part[name] for part in parts]) for name in parts[0]}
+    truth = every["label"]
+    print(f"\ntracks of {TRACK_S} s at 0 dB and above, dwells of {DWELL_S} s, {len(parts)} tracks")
+    recalls = [np.mean(every["best"][truth == name] == name) for name in CLASSES]
+    print(f"balanced accuracy of the most probable class {np.mean(recalls):.3f} (goal 0.97)")
+    named = every["final"] != "unknown"
+    print(f"named {named.mean():.3f}, of these right {np.mean((every['final'] == truth)[named]):.3f}")
+    changed = (every["declared"] != "") & (every["declared"] != every["final"])
+    print(f"declared {np.mean(every['declared'] != ''):.3f}, of these not borne out at the end {changed.mean():.3f}")
+    other = truth != "uav"
+    for rule in ("first", "declared", "final"):
+        print(f"birds and clutter named uav, {rule}: {np.mean(every[rule][other] == 'uav'):.4f}")
+    uav = (truth == "uav") & (every["declared"] == "uav")
+    found = np.where(uav, every["declared_s"], np.inf)[truth == "uav"]
+    within, ever = np.mean(found <= 0.1), np.isfinite(found).mean()
+    print(f"UAVs: declared within 0.1 s {within:.3f}, ever {ever:.3f}, median {np.median(found):.3g} s")
+    flapping = every["kind"] == "flapping_bird"
+    error = np.abs(every["beat"] - every["wingbeat_hz"])[flapping]
+    some = np.isfinite(error)
+    close = (error[some] <= 0.3).mean()
+    print(f"wingbeat of flapping birds: found in {some.mean():.3f} of {len(some)}, of these within 0.3 Hz {close:.3f}")
+    print(f"{'':16s} {'n':>6s} {'best':>8s} " + " ".join(f"{name:>8s}" for name in (*CLASSES, "unknown")))
+    for kind in (kind for group in KINDS.values() for kind in group):
+        rows = every["kind"] == kind
+        shares = [np.mean(every["best"][rows] == truth[rows])]
+        shares += [np.mean(every["final"][rows] == name) for name in (*CLASSES, "unknown")]
+        print(f"{kind:16s} {rows.sum():6d} " + " ".join(f"{share:8.3f}" for share in shares))
+
+
+def fusion(classifier: Classifier, count: int) -> None:
+    """What the correlation of dwells should be: calibration of fused probabilities, tracks of every SNR."""
+    seen = []
+    for radar, iq, truth in drawn_tracks(count // 6, "calibrate"):
+        shown = {"carrier_hz": radar.carrier_hz, "prf_hz": radar.prf_hz}
+        pulses = round(DWELL_S * radar.prf_hz)
+        dwells = classifier.predict(_cut(iq, pulses), **shown)
+        looks = classifier.predict(_cut(iq, LONGER * pulses), **shown)
+        seen += [
+            (dwells.probabilities[row], dwells.labels[row], (looks.probabilities[row], looks.labels[row]), label)
+            for row, label in enumerate(truth["label"])
+        ]
+    truth = np.array([CLASSES.index(label) for *_, label in seen])
+    print(f"\nfused probabilities of {len(seen)} tracks of every SNR: calibration error, nats a track")
+    lengths = (1, 2, 4, 5, 10, 20, 31)
+    print("correlation | " + " | ".join(f"{length:4d} dwells" for length in lengths))
+    for longer in (False, True):
+        for correlation in (0.25, 0.5, 0.6, 0.65, 0.7, CORRELATION, 0.75, 0.8, 0.9):
+            cells = []
+            for length in lengths:
+                p = np.array([
+                    fuse(p[:length], labels[:length], longer=looks if longer else None, correlation=correlation)
+                    .probabilities for p, labels, looks, _ in seen
+                ])  # fmt: skip
+                error = expected_calibration_error(p, truth)
+                cells.append(f"{error:.3f} {negative_log_likelihood(p, truth):.3f}")
+            print(f"{correlation:11.2f} | " + " | ".join(cells) + ("" if longer else "   without longer looks"))
+
+
+def _cut(iq: np.ndarray, pulses: int) -> np.ndarray:
+    count = iq.shape[-1] // pulses
+    return iq[:, : count * pulses].reshape(len(iq), count, pulses)
+
+
 TABLES: dict[str, Callable[[Classifier, int], None]] = {
     "detection": detection,
     "kinds": kinds,
+    "tracks": tracks,
+    "fusion": fusion,
     "recordings": recordings,
 }
 

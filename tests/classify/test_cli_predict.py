@@ -63,8 +63,9 @@ def test_one_line_a_dwell_and_a_closing_line(run_json, sigmf_pair):
     assert second == said | {"start_s": 0.08, "stop_s": 0.16, "reason": None}
     assert list(first) == ["file", "start_s", "stop_s", "label", "probabilities", "reason"]
     assert list(closing) == ["file", "track"]
-    assert list(closing["track"]) == ["label", "probabilities", "dwells"]
+    assert list(closing["track"]) == ["label", "probabilities", "dwells", "declared", "declared_s"]
     assert (closing["track"]["label"], closing["track"]["dwells"]) == ("uav", 2)
+    assert (closing["track"]["declared"], closing["track"]["declared_s"]) == ("uav", 0.08)
     assert list(closing["track"]["probabilities"]) == NAMES
     assert closing["track"]["probabilities"]["uav"] > 0.8  # two dwells that agree
 
@@ -100,7 +101,8 @@ def test_outside_the_envelope_is_answered_unknown_with_the_cure(run_json, sigmf_
         "unambiguous velocity 7.5 m/s is below 10 m/s (wavelength x PRF / 4): raise the PRF to 1335 Hz or more"
     }
     assert dwells[0]["probabilities"] == dict.fromkeys(NAMES, 0.333333)
-    assert closing["track"] == {"label": "unknown", "probabilities": dict.fromkeys(NAMES, 0.333333), "dwells": 4}
+    nothing = {"label": "unknown", "probabilities": dict.fromkeys(NAMES, 0.333333), "declared": None}
+    assert closing["track"] == nothing | {"dwells": 4, "declared_s": None}
 
 
 def test_a_dwell_too_short_is_unknown(run_json, sigmf_pair):
@@ -122,7 +124,8 @@ def test_a_silent_dwell_is_unknown_and_left_out_of_the_track(run_json, sigmf_pai
     iq[:1600] = 0
     silent, heard, closing = run_json(sigmf_pair(iq=iq))
     assert (silent["label"], silent["reason"]) == ("unknown", "no signal: every sample is 0")
-    assert closing["track"] == {"label": "uav", "probabilities": heard["probabilities"], "dwells": 2}
+    said = {"label": "uav", "probabilities": heard["probabilities"], "dwells": 2}
+    assert closing["track"] == said | {"declared": "uav", "declared_s": 0.16}  # the silent dwell took its time
 
 
 def test_both_files_of_a_recording_are_answered_once(run_json, sigmf_pair):
@@ -160,6 +163,7 @@ def test_people_get_a_table_that_fits_80_columns(run, sigmf_pair):
     assert lines[1].split() == ["start", "s", "stop", "s", "label", *NAMES, "reason"]
     assert lines[2].split() == ["0.000", "0.200", "uav", "0.80", "0.15", "0.05"]
     assert lines[3] == "track: uav  uav 0.80  bird 0.15  clutter 0.05  from 1 of 1 dwells"
+    assert lines[4] == "declared uav after 0.2 s"
     text = " ".join(out.split())
     assert "unambiguous velocity 7.5 m/s is below 10 m/s" in text
     assert text.count("as above") == 3  # four dwells, one reason

@@ -6,6 +6,7 @@ from bladewing.models.calibration import (
     NEVER,
     Calibration,
     acceptance_thresholds,
+    conformal_thresholds,
     expected_calibration_error,
     fit_temperature,
     fit_vector_scaling,
@@ -161,6 +162,48 @@ def test_equal_probabilities_are_accepted_together():
     assert acceptance_thresholds(table, labels, 0.95)[0] == 0.9  # not in the midst of those with 0.6
 
 
+@settings(deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), coverage=st.floats(0.5, 0.99))
+def test_sets_hold_the_truth_as_often_as_they_promise(seed, coverage):
+    scores, labels = _draw(8000, seed)
+    table = softmax(scores * [3.0, 0.5, 1.0])  # badly calibrated: the promise does not rest on calibration
+    limits = conformal_thresholds(table[:4000], labels[:4000], coverage)
+    for index, limit in enumerate(limits):
+        known, fresh = np.sum(labels[:4000] == index), labels[4000:] == index
+        covered = (table[4000:][fresh, index] >= limit).mean()
+        # both samples scatter: the quantile of the first and the share of the second
+        spread = np.sqrt(coverage * (1 - coverage) * (1 / known + 1 / fresh.sum()))
+        assert abs(covered - coverage) < 5.5 * spread + 1 / known
+
+
+def test_the_promise_is_exact_for_few_records():
+    # Of n + 1 records that could each be the new one, at most k = floor((1 - coverage)(n + 1)) fall out of their set.
+    rng = np.random.default_rng(4)
+    for count, coverage in ((9, 0.9), (10, 0.9), (19, 0.9), (30, 0.8), (30, 0.95)):
+        p = rng.random(count + 1)
+        table, labels = np.column_stack([p, 1 - p, 0 * p]), np.zeros(count + 1, int)
+        missed = 0
+        for new in range(count + 1):
+            others = np.arange(count + 1) != new
+            missed += p[new] < conformal_thresholds(table[others], labels[others], coverage)[0]
+        assert missed == int((1 - coverage) * (count + 1) + 1e-9)
+
+
+@settings(deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), coverages=st.tuples(*[st.floats(0.01, 0.99)] * 2), count=st.integers(1, 200))
+def test_a_higher_coverage_gives_larger_sets(seed, coverages, count):
+    scores, labels = _draw(count, seed)
+    table = softmax(scores)
+    lower, higher = (conformal_thresholds(table, labels, coverage) for coverage in sorted(coverages))
+    assert (higher <= lower).all()
+
+
+def test_a_class_without_enough_records_is_in_every_set():
+    table = np.array([[0.6, 0.3, 0.1]] * 20 + [[0.2, 0.7, 0.1]] * 8)
+    labels = np.array([0] * 20 + [1] * 8)  # 8 bird records cannot promise 90 %: floor(0.1 x 9) = 0
+    assert conformal_thresholds(table, labels, 0.9).tolist() == [0.6, 0.0, 0.0]
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -174,6 +217,8 @@ def test_equal_probabilities_are_accepted_together():
         (lambda: expected_calibration_error(np.eye(3), np.arange(3), bins=0), "bins is 0"),
         (lambda: acceptance_thresholds(np.eye(3), np.arange(3), precision=1.1), "precision is 1.1"),
         (lambda: acceptance_thresholds(np.eye(3), np.arange(3), support=0), "support is 0"),
+        (lambda: conformal_thresholds(np.eye(3), np.arange(3), 1.0), "coverage is 1.0"),
+        (lambda: conformal_thresholds(np.eye(3), np.zeros(3), 0.9), "labels must be integers"),
     ],
 )
 def test_bad_input_is_named(call, message):
