@@ -17,6 +17,10 @@ CORRELATION = 0.72
 LONGER = 5
 """Dwells in a row that are looked at once more as one: a slow target shows its motion only to a long look."""
 
+# Who may speak after every dwell errs more often than who speaks once: on tracks of 2.5 s, 1.9 % of birds and clutter
+# were declared UAV at limits that 0.8 % of single dwells exceed. Odds halved before they are judged bring 0.8 % back.
+DOUBT = 2.0
+
 _FLOOR = 1e-6  # no single dwell rules a class out for ever
 
 Decide = Callable[[NDArray[np.floating]], tuple[NDArray[np.str_], list[str]]]
@@ -38,8 +42,8 @@ class Track:
     used
         Number of dwells that carried evidence.
     declared
-        The class that was named first, as dwell after dwell came in; "" where none ever was. It stands: later dwells
-        may carry the label elsewhere, and then the two differ.
+        The class that was safe to name first, as dwell after dwell came in; "" where none ever was. It stands: later
+        dwells may carry the label elsewhere, and then the two differ.
     declared_after
         Dwells that it took, silent ones among them; 0 where none was declared.
     """
@@ -69,8 +73,8 @@ def fuse(
     two averages counts. A look without evidence ("unknown" with 1/3 each: outside the envelope, or without signal) is
     left out; one that was merely not sure counts with what it said.
 
-    Where the fused probabilities are calibrated after every dwell, a class that is declared as soon as it reaches its
-    limit is right with at least that probability: stopping early takes nothing from a posterior probability.
+    A class is declared after the first dwell at which it would be named even with its odds divided by `DOUBT`: one who
+    may speak after every dwell must be surer than one who speaks once. So a label may stand that never was declared.
 
     Parameters
     ----------
@@ -113,18 +117,21 @@ def fuse(
     weights = np.exp(evidence - evidence.max(axis=1, keepdims=True))
     fused = weights / weights.sum(axis=1, keepdims=True)
     fused[(used == 1) & (looks == 0)] = p[np.argmax(heard)]  # to the last digit
-    named, reasons = (rule or partial(decide, accept=accept))(fused)
-    named[used == 0] = UNKNOWN
-    first = int(np.argmax(named != UNKNOWN))
-    declared = str(named[first]) if named[first] != UNKNOWN else ""
-    return Track(
-        str(named[-1]),
-        fused[-1].astype(np.float32),
-        reasons[-1],
-        int(used[-1]),
-        declared,
-        first + 1 if declared else 0,
-    )
+    rule = rule or partial(decide, accept=accept)
+    (named, reasons), (doubted, _) = rule(fused), rule(_doubted(fused))
+    # the same class, or halved odds would let the second speak
+    safe = np.where((used > 0) & (named == doubted), named, UNKNOWN)
+    first = int(np.argmax(safe != UNKNOWN))
+    declared = str(safe[first]) if safe[first] != UNKNOWN else ""
+    after = first + 1 if declared else 0
+    return Track(str(named[-1]), fused[-1].astype(np.float32), reasons[-1], int(used[-1]), declared, after)
+
+
+def _doubted(p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Divide the odds of the most probable class of each row by `DOUBT`."""
+    best = p == p.max(axis=1, keepdims=True)
+    weights = np.where(best, p / DOUBT, p)
+    return weights / weights.sum(axis=1, keepdims=True)
 
 
 def _heard(
@@ -142,6 +149,6 @@ def _heard(
 
 def _running_mean(p: NDArray[np.float64], heard: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Mean log-probability of the looks heard so far, and their number; 0 where there is none."""
-    used = np.cumsum(heard)
+    used = np.cumsum(heard, dtype=np.intp)
     logs = np.where(heard[:, None], np.log(np.maximum(p, _FLOOR)), 0.0)
     return np.cumsum(logs, axis=0) / np.maximum(used, 1)[:, None], used

@@ -180,10 +180,7 @@ def _train_one(
     # A false drone is what users complain of: "uav" must also keep the false-alarm rate, however many UAVs it costs.
     accept[0] = max(accept[0], _alarm_threshold(calibrated, sets.calibrate.labels, settings.false_alarm))
     curve = operating_curve(calibrated, sets.calibrate.labels)
-    sets_hold = [
-        [coverage, *(float(limit) for limit in conformal_thresholds(calibrated, sets.calibrate.labels, coverage))]
-        for coverage in COVERAGES
-    ]
+    limits = np.array([conformal_thresholds(calibrated, sets.calibrate.labels, coverage) for coverage in COVERAGES])
     onnx_bytes = export(calibration)
     probabilities = calibration.probabilities(scores_of(sets.test))
     difference = check_export(
@@ -193,7 +190,8 @@ def _train_one(
     account = {
         "inputs": list(LADDER[name]),
         "test": _figures(probabilities, labels, accept, settings.false_alarm)
-        | {"expected_calibration_error": round(expected_calibration_error(probabilities, labels), 4)},
+        | {"expected_calibration_error": round(expected_calibration_error(probabilities, labels), 4)}
+        | {"coverage": [round(share, 4) for share in _covered(probabilities, labels, limits)]},
         "calibration": {"scale": float(calibration.scale), "bias": [float(b) for b in calibration.bias]},
         "accept": [float(limit) for limit in accept],
         "export_difference": difference,
@@ -212,7 +210,7 @@ def _train_one(
         "calibration": json.dumps(account["calibration"]),
         "accept": json.dumps(account["accept"]),
         CURVE_KEY: curve.to_json(),
-        SETS_KEY: json.dumps(sets_hold),
+        SETS_KEY: json.dumps([[coverage, *row] for coverage, row in zip(COVERAGES, limits.tolist(), strict=True)]),
         "training": settings.model_dump_json(),
     }
     sealed = seal(attach_metadata(onnx_bytes, metadata))
@@ -296,6 +294,14 @@ def _network(
 def _alarm_threshold(probabilities: NDArray[np.floating], labels: NDArray[np.integer], false_alarm: float) -> float:
     """UAV probability that this share of the birds and the clutter exceeds."""
     return float(np.quantile(probabilities[labels != 0, 0], 1 - false_alarm, method="higher"))
+
+
+def _covered(
+    probabilities: NDArray[np.floating], labels: NDArray[np.integer], limits: NDArray[np.floating]
+) -> list[float]:
+    """Share of the records whose prediction set holds their class, for each row of thresholds (coverages, 3)."""
+    truth = probabilities[np.arange(len(labels)), labels]
+    return [float(np.mean(truth >= row[labels])) for row in limits]
 
 
 def _figures(

@@ -12,12 +12,13 @@ from pathlib import Path
 
 import numpy as np
 from bladewing.classify import Classifier
-from bladewing.classify.labels import CLASSES
+from bladewing.classify.inference import COVERAGES
+from bladewing.classify.labels import CLASSES, decide, decide_by_sets
 from bladewing.classify.predict import answer
 from bladewing.classify.recording import Recording, load_recording
 from bladewing.classify.track import CORRELATION, LONGER, fuse
 from bladewing.features.wingbeat import wingbeat
-from bladewing.models.calibration import expected_calibration_error, negative_log_likelihood
+from bladewing.models.calibration import conformal_thresholds, expected_calibration_error, negative_log_likelihood
 from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.dataset import KINDS, draw_radar
 
@@ -26,18 +27,22 @@ SNR_EDGES_DB = np.arange(-20, 33, 2)
 RECORDINGS = Path(__file__).parents[3] / "shared" / "recordings"
 
 
-def drawn(radars: list[Radar], count: int, kind: str | None = None) -> Iterator[tuple[np.ndarray, dict]]:
+def drawn(
+    radars: list[Radar], count: int, kind: str | None = None, purpose: str = "bench"
+) -> Iterator[tuple[np.ndarray, dict]]:
     """Records and truth of each radar in turn, `count` in all."""
     for number, radar in enumerate(radars):
         each = -(-count // len(radars))
-        records = draw_records(radar, each, 7, purpose="bench", start=number * each, kind=kind)
+        records = draw_records(radar, each, 7, purpose=purpose, start=number * each, kind=kind)
         yield records.iq, {"label": records.labels, **records.truth}
 
 
-def scored(classifier: Classifier, radars: list[Radar], count: int, kind: str | None = None) -> dict[str, np.ndarray]:
+def scored(
+    classifier: Classifier, radars: list[Radar], count: int, kind: str | None = None, purpose: str = "bench"
+) -> dict[str, np.ndarray]:
     """Probabilities of many records beside their truth."""
     parts = []
-    for radar, (iq, truth) in zip(radars, drawn(radars, count, kind), strict=True):
+    for radar, (iq, truth) in zip(radars, drawn(radars, count, kind, purpose), strict=True):
         given = classifier.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
         parts.append({"p": given.probabilities, "answer": given.labels, **truth})
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -132,8 +137,10 @@ def tracks(classifier: Classifier, count: int) -> None:
     print(f"balanced accuracy of the most probable class {np.mean(recalls):.3f} (goal 0.97)")
     named = every["final"] != "unknown"
     print(f"named {named.mean():.3f}, of these right {np.mean((every['final'] == truth)[named]):.3f}")
-    changed = (every["declared"] != "") & (every["declared"] != every["final"])
-    print(f"declared {np.mean(every['declared'] != ''):.3f}, of these not borne out at the end {changed.mean():.3f}")
+    spoke = every["declared"] != ""
+    open_, other = ((every["final"] == "unknown")[spoke], (every["final"] != every["declared"])[spoke])
+    print(f"declared {spoke.mean():.3f}, of these right {np.mean((every['declared'] == truth)[spoke]):.3f}", end="; ")
+    print(f"at the end unknown {open_.mean():.3f}, another class {np.mean(other & ~open_):.3f}")
     other = truth != "uav"
     for rule in ("first", "declared", "final"):
         print(f"birds and clutter named uav, {rule}: {np.mean(every[rule][other] == 'uav'):.4f}")
@@ -152,6 +159,31 @@ def tracks(classifier: Classifier, count: int) -> None:
         shares = [np.mean(every["best"][rows] == truth[rows])]
         shares += [np.mean(every["final"][rows] == name) for name in (*CLASSES, "unknown")]
         print(f"{kind:16s} {rows.sum():6d} " + " ".join(f"{share:8.3f}" for share in shares))
+
+
+def coverage(classifier: Classifier, count: int) -> None:
+    """Prediction sets against the acceptance thresholds, fitted on records of their own."""
+    parts = []
+    for purpose in ("calibrate", "bench"):
+        radars = [draw_radar(7, purpose, group) for group in range(count // 24)]
+        given = scored(classifier, radars, count, purpose=purpose)
+        parts.append((given["p"], np.array([CLASSES.index(name) for name in given["label"]])))
+    (known, known_truth), (p, truth) = parts
+    print(f"\nprediction sets on {len(p)} records of the whole envelope, fitted on {len(known)} others")
+    print("rule            covered: uav   bird clutter |  named   right | UAVs named  others named uav")
+
+    def row(name: str, labels: np.ndarray, covered: list[float]) -> None:
+        named, is_uav = labels != "unknown", labels == "uav"
+        right = np.mean((labels == np.asarray(CLASSES)[truth])[named])
+        true, false = is_uav[truth == 0].mean(), is_uav[truth != 0].mean()
+        shares = " ".join(f"{value:7.3f}" for value in covered)
+        print(f"{name:18s} {shares} | {named.mean():6.3f} {right:7.3f} | {true:10.3f} {false:16.4f}")
+
+    row("model's thresholds", decide(p, classifier.accept)[0], [np.nan] * 3)
+    for wanted in COVERAGES:
+        limits = conformal_thresholds(known, known_truth, wanted)
+        held = [float(np.mean(p[truth == index, index] >= limits[index])) for index in range(len(CLASSES))]
+        row(f"coverage {wanted:g}", decide_by_sets(p, limits, wanted)[0], held)
 
 
 def fusion(classifier: Classifier, count: int) -> None:
@@ -193,6 +225,7 @@ TABLES: dict[str, Callable[[Classifier, int], None]] = {
     "kinds": kinds,
     "tracks": tracks,
     "fusion": fusion,
+    "coverage": coverage,
     "recordings": recordings,
 }
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from bladewing.classify import Classifier
 from bladewing.classify.errors import BadInput
+from bladewing.classify.inference import COVERAGES
 from bladewing.classify.train import _figures, run_training
 from bladewing.classify.training_config import TrainingConfig, training_config
 from bladewing.simulate import Radar, draw_records
@@ -38,6 +39,14 @@ def test_trained_models_answer_through_the_classifier(trained, name):
     chosen = Classifier.load(out / f"{name}.onnx", max_false_alarm=0.1)  # 600 calibration records hold 400 others
     assert chosen.operating_point.false_alarm == 0.1
     assert chosen.accept[1:] == clf.accept[1:]
+    sets = json.loads(clf.metadata["prediction_sets"])
+    assert [row[0] for row in sets] == list(COVERAGES)
+    assert all(0 < limit < 1 for row in sets for limit in row[1:])  # 200 calibration records of a class hold 0.99
+    assert Classifier.load(out / f"{name}.onnx", coverage=0.9).coverage == 0.9
+    covered = account["models"][name]["test"]["coverage"]
+    for wanted, share in zip(COVERAGES, covered, strict=True):
+        # 200 records of a class on either side
+        assert abs(share - wanted) < 5 * np.sqrt(wanted * (1 - wanted) * 2 / 600) + 1 / 200
     radar = Radar(9.85e9, 25e3, 2000)
     loud = draw_records(radar, 90, 0, purpose="test", kind="quadcopter")
     answer = clf.predict(loud.iq[loud.truth["snr_db"] > 5], carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
