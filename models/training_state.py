@@ -89,10 +89,11 @@ class Work:
             It is not of a training with this network, these epochs and this kind of device.
         """
         columns = {name: values for name, values in snapshot.items() if name.startswith(_HISTORY)}
+        told = {_HISTORY + "validation_loss", _HISTORY + "seconds"} <= columns.keys()
         done = {values.shape for values in columns.values()}
         count = next(iter(done))[0] if len(done) == 1 and len(next(iter(done))) == 1 else 0
         best_epoch = snapshot.get(_BEST_EPOCH, np.array(-1))
-        if not (1 <= count <= epochs and best_epoch.shape == () and 0 <= best_epoch <= count):
+        if not (told and 1 <= count <= epochs and best_epoch.shape == () and 0 <= best_epoch <= count):
             raise ForeignSnapshot(f"the snapshot holds no history of 1 to {epochs} epochs")
         for parameter in self._net.parameters():  # as AdamW starts them itself at its first step
             averages = {name: torch.zeros_like(parameter) for name in ("exp_avg", "exp_avg_sq")}
