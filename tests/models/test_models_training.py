@@ -183,7 +183,7 @@ def test_training_stops_where_the_validation_loss_no_longer_falls():
         (lambda s: s | {"history/seconds": np.zeros(2)}, "no history of 1 to 2 epochs"),
         (lambda s: s | {"best_epoch": np.array(7)}, "no history of 1 to 2 epochs"),
         (lambda s: {k: v for k, v in s.items() if "head.0.bias" not in k}, r"best/head\.0\.bias is missing"),
-        (lambda s: s | {"generator/cuda": np.zeros(16, np.uint8)}, r"cuda is \(\(16,\), 'uint8'\) in it; .* none"),
+        (lambda s: s | {"generator/cuda": np.zeros(16, np.uint8)}, r"cuda is \(\(16,\), 'uint8'\); .* none"),
         (lambda s: s | {"network/head.0.bias": np.zeros(3, np.float32)}, r"head\.0\.bias is \(\(3,\)"),
         (lambda s: s | {"optimiser/0/step": np.array(1.0)}, "step is .*'float64'"),
     ],
