@@ -198,7 +198,7 @@ def train(
         typer.Option(metavar="DIR", help="Read the records from what `bladewing dataset` wrote, instead of drawing."),
     ] = None,
 ) -> None:
-    """Train all models on synthetic records and write them as ONNX."""
+    """Train all models on synthetic records and write them as ONNX; interrupted, the same command goes on."""
     from .train import run_training
 
     run_training(out, records=records, seed=seed, quick=quick, config=config, data=data, progress=True)

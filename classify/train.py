@@ -24,11 +24,15 @@ from .gather import Gathered, gather, gather_from
 from .inference import COVERAGES, CURVE_KEY, SETS_KEY
 from .labels import CLASSES
 from .ladder import COST_KEY, PULSES, RECORDS
+from .parts import Parts
 from .progress import Progress
 from .training_config import TrainingConfig, training_config
 
 #: Name of the account beside the models.
 ACCOUNT = "train.json"
+
+#: Folder of what is trained so far, beside the models while the run is not done.
+PARTS = "train-parts"
 
 OnFraction = Callable[[float], None]
 
@@ -55,6 +59,10 @@ def run_training(
 ) -> dict[str, Any]:
     """Train the models of the ladder on synthetic records and write them to a folder.
 
+    Interrupted, the same call goes on: with the models that are finished, and with a network from its last whole
+    epoch. The records are drawn again. On the same machine with the same number of threads the models have the bytes
+    of a run that nothing interrupted.
+
     Parameters
     ----------
     out : Path
@@ -74,7 +82,8 @@ def run_training(
     Raises
     ------
     BadInput
-        If a setting is wrong, the data set cannot be used, or the folder cannot be written.
+        If a setting is wrong, the data set cannot be used, what an interrupted run left is damaged, or the folder
+        cannot be written.
     """
     stored = None if data is None else DataSet(data)
     held = None if stored is None else {"records": stored.plan.records["train"], "seed": stored.plan.seed}
@@ -82,31 +91,43 @@ def run_training(
     if stored is not None and stored.plan != Plan.of(settings):
         raise BadInput(f"{data}: holds sets of {stored.plan.records}, a training takes {settings.sets}: write it again")
     result_folder(out)
+    versions = _versions()
+    parts = Parts(
+        out / PARTS,
+        {"settings": settings.model_dump(mode="json"), "schema_sha256": schema_hash(), "versions": versions},
+    )
     # Threads that spin while they wait make training several times slower beside another busy process.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     started = time.perf_counter()
+    resumed = parts.begun
+    for name in settings.models:  # what is damaged is told before any record is drawn
+        parts.arrays(name), parts.arrays(_epochs_of(name))
     with Progress(visible=progress) as bars:
+        if resumed:
+            bars.say(f"Going on with what an interrupted run left in {out / PARTS}")
         sets = _gather(settings, stored, bars)
         gathered_s = time.perf_counter() - started
         files: dict[str, bytes] = {}
         models: dict[str, dict[str, Any]] = {}
         for name in settings.models:
             with bars.phase(f"train {name}", 1) as on_fraction:
-                files[f"{name}.onnx"], models[name] = _train_one(name, settings, sets, on_fraction)
+                files[f"{name}.onnx"], models[name] = _take_or_train(name, settings, sets, on_fraction, parts)
     for name, cost in costs_ffts(files).items():
         models[name][COST_KEY] = round(cost, 1)
     account = {
         "format": 1,
         "settings": settings.model_dump(mode="json"),
         "records": settings.sets,
+        "resumed": resumed,  # then the seconds leave out what was done before the interruption
         "seconds": {"gather": round(gathered_s, 1), "all": round(time.perf_counter() - started, 1)},
         "false_alarm": settings.false_alarm,
         "models": models,
         "schema_sha256": schema_hash(),
-        "versions": _versions(),
+        "versions": versions,
     }
     files[ACCOUNT] = (json.dumps(account, indent=1, allow_nan=False) + "\n").encode()
     write_together(out, files)
+    parts.forget()
     if progress:
         _print_table(account, out)
     return account
@@ -157,8 +178,29 @@ def _gather(settings: TrainingConfig, stored: DataSet | None, bars: Progress) ->
     return Sets(**sets)
 
 
+def _epochs_of(name: str) -> str:
+    """Name of the part that holds a network's training up to its last whole epoch."""
+    return f"{name}-epochs"
+
+
+def _take_or_train(
+    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction, parts: Parts
+) -> tuple[bytes, dict[str, Any]]:
+    """Give a model as it was finished before an interruption, or train and keep it."""
+    kept = parts.arrays(name)
+    if kept is not None:
+        try:
+            return kept["model"].tobytes(), json.loads(kept["account"].tobytes())
+        except (KeyError, ValueError) as error:
+            raise parts.refusal(name, str(error)) from None
+    content, account = _train_one(name, settings, sets, on_fraction, parts)
+    text = json.dumps(account, allow_nan=False).encode()
+    parts.keep_arrays(name, {"model": np.frombuffer(content, np.uint8), "account": np.frombuffer(text, np.uint8)})
+    return content, account
+
+
 def _train_one(
-    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction
+    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction, parts: Parts | None = None
 ) -> tuple[bytes, dict[str, Any]]:
     """Train, calibrate, export and compare one model; give its sealed file and its account."""
     from bladewing.models.calibration import (
@@ -173,7 +215,9 @@ def _train_one(
 
     started = time.perf_counter()
     network = "cnn" in name
-    scores_of, export, detail = (_network if network else _tabular)(name, settings, sets, on_fraction)
+    scores_of, export, detail = (partial(_network, parts=parts) if network else _tabular)(
+        name, settings, sets, on_fraction
+    )
     calibration = fit_vector_scaling(scores_of(sets.calibrate), sets.calibrate.labels)
     calibrated = calibration.probabilities(scores_of(sets.calibrate))
     accept = acceptance_thresholds(calibrated, sets.calibrate.labels, settings.precision)
@@ -246,12 +290,13 @@ def _tabular(
 
 
 def _network(
-    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction
+    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction, parts: Parts | None
 ) -> tuple[ScoresOf, Callable[[Any], bytes], dict[str, Any]]:
     from bladewing.models.augment import VelocityMirror
     from bladewing.models.cnn import EvidenceNet, ImageNet, SpectrumNet
     from bladewing.models.export import export_network
     from bladewing.models.training import network_scores, train_network
+    from bladewing.models.training_state import ForeignSnapshot
 
     signal, evidence = LADDER[name]
     shapes = {key: INPUT_SHAPES[key] for key in (signal, evidence)}
@@ -264,25 +309,37 @@ def _network(
     def inputs(part: Gathered) -> dict[str, NDArray]:
         return {key: part.inputs[key] for key in shapes}
 
-    result = train_network(
-        net,
-        inputs(sets.train),
-        sets.train.labels,
-        (inputs(sets.validate), sets.validate.labels),
-        seed=settings.seed,
-        epochs=settings.epochs,
-        batch=settings.batch,
-        learning_rate=settings.learning_rate,
-        weight_decay=settings.weight_decay,
-        # no measurement is signed, so only the picture is mirrored
-        augment=VelocityMirror(axes={signal: {"spectrum": -1, "image": -2}[signal]}, odd={}),
-        on_epoch=lambda epoch, epochs, _: on_fraction(epoch / epochs),
-    )
+    snapshot = parts.arrays(_epochs_of(name)) if parts else None
+    try:
+        result = train_network(
+            net,
+            inputs(sets.train),
+            sets.train.labels,
+            (inputs(sets.validate), sets.validate.labels),
+            seed=settings.seed,
+            epochs=settings.epochs,
+            patience=settings.patience,
+            batch=settings.batch,
+            learning_rate=settings.learning_rate,
+            weight_decay=settings.weight_decay,
+            # no measurement is signed, so only the picture is mirrored
+            augment=VelocityMirror(axes={signal: {"spectrum": -1, "image": -2}[signal]}, odd={}),
+            snapshot=snapshot,
+            on_snapshot=partial(parts.keep_arrays, _epochs_of(name)) if parts else None,
+            on_epoch=lambda epoch, epochs, _: on_fraction(epoch / epochs),
+        )
+    except ForeignSnapshot as error:
+        assert parts
+        raise parts.refusal(_epochs_of(name), str(error)) from None
     net.compact()
     detail = {
         "device": result.device,
         "best_epoch": result.best_epoch,
-        "epochs": [{key: round(value, 4) for key, value in epoch.items()} for epoch in result.epochs],
+        "stopped_early": result.stopped_early,
+        "epochs": [
+            {key: float(f"{value:.3g}") if key == "learning_rate" else round(value, 4) for key, value in epoch.items()}
+            for epoch in result.epochs
+        ],
     }
     return (
         lambda part: network_scores(net, inputs(part)),
@@ -363,4 +420,6 @@ def _print_table(account: dict[str, Any], out: Path) -> None:
         "named     records not answered 'unknown'; right: how many of these are right\n"
         "ECE       expected calibration error of the probabilities"
     )
-    console.print(f"Models and {ACCOUNT} are in {out}; trained in {account['seconds']['all']:.0f} s.", soft_wrap=True)
+    since = " since the interruption" if account["resumed"] else ""
+    took = f"trained in {account['seconds']['all']:.0f} s{since}"
+    console.print(f"Models and {ACCOUNT} are in {out}; {took}.", soft_wrap=True)

@@ -21,6 +21,8 @@ class TrainingConfig(BaseModel):
     records: Annotated[int, Field(ge=600, le=10_000_000)] = 30_000
     seed: Annotated[int, Field(ge=0)] = 0
     epochs: Annotated[int, Field(ge=1, le=1000)] = 15
+    #: Epochs in a row without a lower validation loss after which a network stops; 0: never.
+    patience: Annotated[int, Field(ge=0, le=1000)] = 20
     batch: Annotated[int, Field(ge=2, le=8192)] = 256
     learning_rate: Annotated[float, Field(gt=0, le=1)] = 6e-3
     weight_decay: Annotated[float, Field(ge=0, le=10)] = 0.1

@@ -1,6 +1,5 @@
 """The loop that trains a network: one seed, one schedule, the best state kept."""
 
-import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from torch import Tensor, nn
 
 from ._checks import require_every_class, require_labels
 from .cnn import EvidenceNet
+from .training_state import Snapshot, Work
 
 Inputs = Mapping[str, NDArray[np.floating]]
 """Input name to array (n, *shape); float16 saves memory, every batch is cast to float32."""
@@ -21,6 +21,9 @@ Augment = Callable[[Mapping[str, Tensor], torch.Generator], Mapping[str, Tensor]
 
 OnEpoch = Callable[[int, int, dict[str, float]], None]
 """Called with the epoch just done (from 1), the number of epochs, and the metrics of the epoch."""
+
+OnSnapshot = Callable[[Snapshot], None]
+"""Called with the state after an epoch; the arrays are copies."""
 
 
 @dataclass(frozen=True)
@@ -36,14 +39,17 @@ class TrainingResult:
     seconds
         Wall time [s].
     epochs
-        One mapping an epoch: train_loss and validation_loss [nats], validation_accuracy (0 to 1), seconds (since the
-        start) [s].
+        One mapping an epoch: learning_rate (of its last step), train_loss and validation_loss [nats],
+        validation_accuracy (0 to 1), seconds (since the start) [s].
+    stopped_early
+        Whether epochs were left out because the validation loss no longer fell.
     """
 
     best_epoch: int
     device: str
     seconds: float
     epochs: tuple[dict[str, float], ...]
+    stopped_early: bool
 
 
 def train_network(
@@ -60,12 +66,16 @@ def train_network(
     label_smoothing: float = 0.02,
     device: str = "auto",
     augment: Augment | None = None,
+    patience: int = 0,
+    snapshot: Snapshot | None = None,
+    on_snapshot: OnSnapshot | None = None,
     on_epoch: OnEpoch | None = None,
 ) -> TrainingResult:
     """Train in place, and leave the network in its best state, on the CPU, ready for inference.
 
     Measures the standardisation of the inputs, then runs AdamW on a one-cycle schedule. The best state is that of the
-    least validation loss. On a CPU the outcome is a function of the seed, bit by bit, for a given number of threads.
+    least validation loss. On a CPU the outcome is a function of the seed, bit by bit, for a given number of threads,
+    also where the training was interrupted and goes on from a snapshot.
 
     Parameters
     ----------
@@ -93,6 +103,13 @@ def train_network(
         "auto" (a GPU where there is one), or any that torch knows: "cpu", "cuda", ...
     augment
         Changes each training batch.
+    patience
+        Epochs in a row without a lower validation loss after which the training stops; 0: never. The schedule is laid
+        out for all epochs: one that stops early has not seen its end.
+    snapshot
+        Where to go on: what `on_snapshot` was given by a training with the same arguments.
+    on_snapshot
+        Called after each epoch, before `on_epoch`, with all that the next epochs depend on.
     on_epoch
         Called after each epoch; what it raises ends the training.
 
@@ -105,6 +122,8 @@ def train_network(
     ------
     ValueError
         Where an array has the wrong shape or values, or a parameter is out of range.
+    ForeignSnapshot
+        Where the snapshot is of another training.
     FloatingPointError
         Where no epoch gave a finite validation loss.
     """
@@ -112,8 +131,8 @@ def train_network(
     require_labels(y, count, "y")
     require_every_class(y, "y")
     require_labels(validation[1], net.require(validation[0]), "validation labels")
-    if epochs < 1 or batch < 2:
-        raise ValueError(f"epochs is {epochs} and batch {batch}; they must be at least 1 and 2")
+    if epochs < 1 or batch < 2 or patience < 0:
+        raise ValueError(f"epochs is {epochs}, batch {batch}, patience {patience}; they must be at least 1, 2 and 0")
     started = time.perf_counter()
     place = torch.device(("cuda" if torch.cuda.is_available() else "cpu") if device == "auto" else device)
     batch = min(batch, count)
@@ -126,11 +145,13 @@ def train_network(
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, learning_rate, total_steps=epochs * steps, pct_start=0.2)
     criterion = nn.CrossEntropyLoss(label_smoothing=label_smoothing)
     rng = torch.Generator().manual_seed(seed)
-    best_loss, best_epoch, best_state = math.inf, 0, {}
-    history: list[dict[str, float]] = []
     with torch.random.fork_rng(devices=[place] if place.type == "cuda" else []):
         torch.manual_seed(seed)
-        for epoch in range(1, epochs + 1):
+        work = Work(net, optimiser, schedule, rng)
+        if snapshot is not None:
+            work.restore(snapshot, epochs=epochs, steps=steps)
+            started -= work.history[-1]["seconds"]
+        while len(work.history) < epochs and not 0 < patience <= len(work.history) - work.best_epoch:
             net.train()
             total = torch.zeros((), device=place)
             order = torch.randperm(count, generator=rng)[: steps * batch].to(place)
@@ -142,27 +163,29 @@ def train_network(
                 optimiser.zero_grad(set_to_none=True)
                 loss.backward()
                 optimiser.step()
+                rate = optimiser.param_groups[0]["lr"]
                 schedule.step()
                 total += loss.detach()
             scores = torch.from_numpy(network_scores(net, validation[0]))
             labels = torch.as_tensor(validation[1], dtype=torch.int64)
             metrics = {
+                "learning_rate": float(rate),
                 "train_loss": float(total) / steps,
                 "validation_loss": float(nn.functional.cross_entropy(scores, labels)),
                 "validation_accuracy": float((scores.argmax(1) == labels).float().mean()),
                 "seconds": time.perf_counter() - started,
             }
-            history.append(metrics)
-            if metrics["validation_loss"] < best_loss:
-                best_loss, best_epoch = metrics["validation_loss"], epoch
-                best_state = {name: value.detach().cpu().clone() for name, value in net.state_dict().items()}
+            work.add(metrics)
+            if on_snapshot:
+                on_snapshot(work.snapshot())
             if on_epoch:
-                on_epoch(epoch, epochs, metrics)
-    if not best_state:
+                on_epoch(len(work.history), epochs, metrics)
+    if not work.best:
         raise FloatingPointError(f"no epoch gave a finite validation loss; learning_rate {learning_rate} is too high")
-    net.to("cpu").load_state_dict(best_state)
+    net.to("cpu").load_state_dict(work.best)
     net.eval()
-    return TrainingResult(best_epoch, place.type, time.perf_counter() - started, tuple(history))
+    seconds = time.perf_counter() - started
+    return TrainingResult(work.best_epoch, place.type, seconds, tuple(work.history), len(work.history) < epochs)
 
 
 def network_scores(net: EvidenceNet, inputs: Inputs, batch: int = 1024) -> NDArray[np.float32]:

@@ -16,13 +16,13 @@ from bladewing.features.schema import INPUT_SHAPES
 from bladewing.simulate import Radar, draw_records
 from numpy.typing import NDArray
 
+from ..parts import Parts
 from . import choices, metrics
 from .bounds import detection_bounds
 from .choices import DWELLS_S, FEATURES, STORED_BINS, STORED_BITS, OnDone, Sets
 from .cost import BATCHES, in_turn
 from .memory import peak_bytes
 from .operations import counted_transforms, network_operations
-from .parts import Parts
 from .pictures import PICTURES
 from .scores import FALSE_ALARM_RATE, SNR_STEP_DB
 from .settings import ReportConfig

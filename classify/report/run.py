@@ -23,6 +23,7 @@ from ..errors import BadInput
 from ..files import read_bounded, result_folder, settle, write_together
 from ..inference import Classifier
 from ..labels import CLASSES
+from ..parts import Parts
 from ..progress import Progress
 from ..stability.run import worst_of_each
 from ..train import ACCOUNT
@@ -32,9 +33,11 @@ from .examples import OVERLAP, WINDOW, show_examples, show_stfts
 from .front import Given, measure_front
 from .machine import describe_machine
 from .page import SCHEMA_VERSION, draw_page
-from .parts import Parts
 from .series import LADDER
 from .settings import ReportConfig, report_config
+
+#: Folder of what is measured so far, beside the report's own files while it is being made.
+PARTS = "report-parts"
 
 # The paper's measured radar: X band, PRF 20 to 30 kHz, 80 ms.
 REFERENCE = Radar(carrier_hz=9.85e9, prf_hz=25e3, pulses=2000)
@@ -270,7 +273,7 @@ def run_report(
         Classifier(content, source=name)  # what cannot be used is told before anything is measured
     out = result_folder(out)
     stability = worst_of_each(out)
-    parts = Parts(out, _of(settings, found))
+    parts = Parts(out / PARTS, _of(settings, found))
     started, clock = datetime.now(UTC), time.perf_counter()
     with Progress(visible=progress) as bars:
         body = measure(found, settings, parts=parts, progress=bars, account=account)

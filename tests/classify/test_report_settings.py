@@ -2,7 +2,6 @@ from pathlib import Path
 
 import pytest
 from bladewing.classify import BadInput
-from bladewing.classify.report.parts import PARTS, Parts
 from bladewing.classify.report.settings import QUICK, report_config
 
 
@@ -30,29 +29,3 @@ def test_a_wrong_settings_file_is_one_clear_line(tmp_path: Path, text: str, said
         report_config(file)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
-
-
-def test_parts_are_measured_once_and_only_for_the_same_report(tmp_path: Path) -> None:
-    made: list[int] = []
-
-    def measure() -> list[int]:
-        made.append(len(made))
-        return [len(made)]
-
-    parts = Parts(tmp_path, {"seed": 0})
-    assert not parts.have("one")
-    assert parts.take("one", measure) == [1]
-    assert Parts(tmp_path, {"seed": 0}).take("one", measure) == [1]
-    assert Parts(tmp_path, {"seed": 1}).take("one", measure) == [2]
-    parts.forget()
-    assert not (tmp_path / PARTS).exists()
-
-
-def test_an_interrupted_part_is_not_taken_for_a_finished_one(tmp_path: Path) -> None:
-    def interrupt() -> None:
-        raise KeyboardInterrupt
-
-    parts = Parts(tmp_path, {})
-    with pytest.raises(KeyboardInterrupt):
-        parts.take("one", interrupt)
-    assert not parts.have("one")

@@ -1,12 +1,20 @@
 import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
-from bladewing.classify import Classifier
+from bladewing.classify import Classifier, train
 from bladewing.classify.errors import BadInput
+from bladewing.classify.gather import Gathered
 from bladewing.classify.inference import COVERAGES
 from bladewing.classify.train import _figures, run_training
 from bladewing.classify.training_config import TrainingConfig, training_config
+from bladewing.features import INPUT_SHAPES
+from bladewing.models import tabular, training
 from bladewing.simulate import Radar, draw_records
 
 
@@ -59,7 +67,6 @@ def test_trained_models_answer_through_the_classifier(trained, name):
 def test_an_interrupted_training_leaves_the_old_files(trained, tmp_path, monkeypatch):
     for name in ("features-linear.onnx", "train.json"):
         (tmp_path / name).write_bytes(b"old")
-    from bladewing.models import tabular
 
     def interrupted(*_, **__):
         raise KeyboardInterrupt
@@ -71,7 +78,117 @@ def test_an_interrupted_training_leaves_the_old_files(trained, tmp_path, monkeyp
         run_training(tmp_path, config=config, progress=False)
     assert (tmp_path / "features-linear.onnx").read_bytes() == b"old"
     assert (tmp_path / "train.json").read_bytes() == b"old"
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["features-linear.onnx", "tiny.toml", "train.json"]
+    left = ["features-linear.onnx", "tiny.toml", "train-parts", "train.json"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == left
+    (kept,) = (tmp_path / "train-parts").glob("*/*")
+    assert kept.name == "features-linear.npz"
+
+
+SETTINGS = TrainingConfig(
+    records=600, epochs=3, batch=64, precision=0.5, false_alarm=0.1, models=("features-linear", "spectrum-cnn")
+)
+
+
+def _few_sets(*_):
+    """Inputs that cost nothing to draw, shifted by class."""
+    rng = np.random.default_rng(0)
+
+    def gathered(count):
+        labels = np.arange(count) % 3
+        inputs = {}
+        for name in ("features", "spectrum"):
+            values = rng.normal(size=(count, *INPUT_SHAPES[name]))
+            inputs[name] = (values + 0.3 * labels.reshape(-1, *[1] * (values.ndim - 1))).astype(np.float32)
+        return Gathered(inputs, labels, {})
+
+    return train.Sets(gathered(192), gathered(96), gathered(300), gathered(300))
+
+
+def _run(out, *, after=None, then=None, **changed):
+    """Train on few sets; after an epoch of a network do what is asked for."""
+    real = training.train_network
+
+    def train_network(*args, on_epoch, **options):
+        return real(*args, on_epoch=lambda epoch, *_: then() if epoch == after else None, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(train, "_gather", _few_sets)
+        patch.setattr(train, "costs_ffts", lambda files: {})
+        patch.setattr(train, "training_config", lambda *_, **__: SETTINGS.model_copy(update=changed))
+        patch.setattr(training, "train_network", train_network)
+        return run_training(out, progress=False)
+
+
+def _interrupt():
+    raise KeyboardInterrupt
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Models of a training that nothing interrupts."""
+    out = tmp_path_factory.mktemp("whole")
+    assert not _run(out)["resumed"]
+    assert sorted(path.name for path in out.iterdir()) == ["features-linear.onnx", "spectrum-cnn.onnx", "train.json"]
+    return out
+
+
+def test_a_killed_and_interrupted_training_goes_on_to_the_same_files(whole, tmp_path, monkeypatch):
+    code = (
+        "import sys, time; from pathlib import Path; from tests.classify.test_train import _run;"
+        "_run(Path(sys.argv[1]), after=1, then=lambda: time.sleep(300))"
+    )
+    root = Path(__file__).parents[2]
+    with subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], cwd=root) as process:
+        while process.poll() is None and not list(tmp_path.glob("train-parts/*/spectrum-cnn-epochs.npz")):
+            time.sleep(0.01)
+        process.kill()
+    assert process.returncode == -signal.SIGKILL
+    assert [path.name for path in tmp_path.iterdir()] == ["train-parts"]
+    monkeypatch.setattr(tabular, "train_linear", lambda *_, **__: pytest.fail("what was trained is trained again"))
+    for after in (2, 3):  # the first epoch is not done again, else it would be the third that never comes
+        with pytest.raises(KeyboardInterrupt):
+            _run(tmp_path, after=after, then=_interrupt)
+    account = _run(tmp_path)
+    assert account["resumed"]
+    for path in whole.glob("*.onnx"):
+        assert (tmp_path / path.name).read_bytes() == path.read_bytes(), path.name
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in whole.iterdir()}
+    straight = json.loads((whole / "train.json").read_text())
+    first, second = (one["models"]["spectrum-cnn"]["epochs"] for one in (straight, account))
+    figures = ("learning_rate", "train_loss", "validation_loss", "validation_accuracy")
+    assert len(first) == 3
+    assert [[epoch[name] for name in figures] for epoch in first] == [[e[name] for name in figures] for e in second]
+
+
+def test_other_settings_do_not_take_what_was_kept(tmp_path):
+    with pytest.raises(KeyboardInterrupt):
+        _run(tmp_path, after=2, then=_interrupt, seed=1)
+    for after in (1, 2):
+        with pytest.raises(KeyboardInterrupt):  # its first epoch comes, so nothing of the other was taken
+            _run(tmp_path, after=after, then=_interrupt)
+    assert len(list(tmp_path.glob("train-parts/*/spectrum-cnn-epochs.npz"))) == 2
+
+
+@pytest.mark.parametrize("name", ["features-linear", "spectrum-cnn-epochs"])
+def test_what_is_damaged_or_foreign_is_refused_in_one_line(tmp_path, name):
+    with pytest.raises(KeyboardInterrupt):
+        _run(tmp_path, after=1, then=_interrupt)
+    (file,) = tmp_path.glob(f"train-parts/*/{name}.npz")
+    kept = file.read_bytes()
+    file.write_bytes(kept[: len(kept) // 2])
+    with pytest.raises(BadInput, match=rf"{name}\.npz: not what this run kept: .*: remove it and start again$"):
+        _run(tmp_path)
+    np.savez(file, of_another=np.arange(3))
+    with pytest.raises(BadInput, match=rf"{name}\.npz: not what this run kept"):
+        _run(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["train-parts"]
+
+
+def test_a_network_that_no_longer_gains_stops_and_says_so():
+    settings = SETTINGS.model_copy(update={"epochs": 60, "patience": 1})
+    _, _, detail = train._network("spectrum-cnn", settings, _few_sets(), lambda _: None, None)
+    assert detail["stopped_early"]
+    assert len(detail["epochs"]) == detail["best_epoch"] + 1 < 60
 
 
 def test_figures_against_brute_force():

@@ -7,6 +7,7 @@ from bladewing.models.augment import VelocityMirror
 from bladewing.models.cnn import ImageNet, SpectrumNet, Standardise
 from bladewing.models.tabular import tabular_scores, train_boosted, train_linear
 from bladewing.models.training import network_scores, train_network
+from bladewing.models.training_state import ForeignSnapshot
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -84,6 +85,113 @@ def test_training_is_the_same_to_the_bit_for_a_seed_and_differs_for_another():
     for name, values in first.state_dict().items():
         assert torch.equal(values, second.state_dict()[name]), name
     assert not torch.equal(first.head[0].weight, other.head[0].weight)
+
+
+def _interrupted(after, **options):
+    """Train until an interruption after an epoch; what was kept last."""
+    kept = []
+
+    def stop(epoch, epochs, metrics):
+        if epoch == after:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        _trained(on_snapshot=kept.append, on_epoch=stop, **options)
+    return kept[-1]
+
+
+def _without_seconds(result):
+    return [{name: value for name, value in epoch.items() if name != "seconds"} for epoch in result.epochs]
+
+
+@pytest.mark.parametrize("after", [1, 2, 3, 4])
+def test_an_interrupted_training_goes_on_to_the_same_bits(after):
+    options = {"seed": 5, "epochs": 4, "augment": VelocityMirror(axes={"spectrum": 2}, odd={"features": [0]})}
+    whole, result = _trained(**options)
+    snapshot = _interrupted(after, **options)
+    torch.manual_seed(99)
+    later = []
+    net, resumed = _trained(snapshot=snapshot, on_snapshot=later.append, **options)
+    assert len(later) == 4 - after
+    assert _without_seconds(resumed) == _without_seconds(result)
+    assert resumed.best_epoch == result.best_epoch
+    seconds = [epoch["seconds"] for epoch in resumed.epochs]
+    assert seconds == sorted(seconds)
+    for name, values in whole.state_dict().items():
+        assert torch.equal(values, net.state_dict()[name]), name
+
+
+def test_an_interruption_after_each_epoch_changes_nothing():
+    snapshot = None
+    for after in (1, 2, 3):
+        snapshot = _interrupted(after, epochs=4, snapshot=snapshot)
+    whole, _ = _trained(epochs=4)
+    net, _ = _trained(epochs=4, snapshot=snapshot)
+    for name, values in whole.state_dict().items():
+        assert torch.equal(values, net.state_dict()[name]), name
+
+
+def test_a_snapshot_is_left_alone_by_the_epochs_after_it():
+    kept = []
+    _trained(epochs=3, on_snapshot=lambda snapshot: kept.append((snapshot, {k: v.copy() for k, v in snapshot.items()})))
+    for snapshot, copy in kept:
+        for name, values in snapshot.items():
+            np.testing.assert_array_equal(values, copy[name])
+            assert values.dtype.kind in "fiu", name
+
+
+def test_the_learning_rate_of_each_epoch_is_that_of_the_schedule():
+    _, result = _trained(epochs=5, learning_rate=0.01)
+    rates = [epoch["learning_rate"] for epoch in result.epochs]
+    assert max(rates) == rates[0] > 0.009  # a fifth of the steps up to the peak, then down to nothing
+    assert rates == sorted(rates, reverse=True)
+    assert 0 < rates[-1] < 1e-6
+
+
+def test_training_stops_where_the_validation_loss_no_longer_falls():
+    def worsen(epoch, epochs, metrics):
+        if epoch >= 2:
+            with torch.no_grad():
+                net.head[-1].weight.mul_(-10.0)
+
+    net = SpectrumNet((2, BINS), FEATURES, seed=0)
+    inputs, y = _spectra(300, 1)
+    snapshots = []
+    options = {"seed": 0, "epochs": 9, "batch": 64, "on_epoch": worsen, "on_snapshot": snapshots.append}
+    result = train_network(net, inputs, y, _spectra(100, 2), patience=3, **options)
+    assert result.stopped_early
+    assert len(result.epochs) == result.best_epoch + 3 < 9
+    losses = [epoch["validation_loss"] for epoch in result.epochs]
+    assert min(losses) == losses[result.best_epoch - 1]
+    # interrupted just then, it has nothing left to do
+    again = SpectrumNet((2, BINS), FEATURES, seed=0)
+    stopped = train_network(again, inputs, y, _spectra(100, 2), patience=3, snapshot=snapshots[-1], **options)
+    assert stopped.stopped_early
+    assert _without_seconds(stopped) == _without_seconds(result)
+    for name, values in net.state_dict().items():
+        assert torch.equal(values, again.state_dict()[name]), name
+    _, never = _trained(epochs=4, patience=0)
+    assert len(never.epochs) == 4
+    assert not never.stopped_early
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda s: {}, "no history of 1 to 2 epochs"),
+        (lambda s: {k: v for k, v in s.items() if k != "history/seconds"}, "no history of 1 to 2 epochs"),
+        (lambda s: s | {"history/seconds": np.zeros(2)}, "no history of 1 to 2 epochs"),
+        (lambda s: s | {"best_epoch": np.array(7)}, "no history of 1 to 2 epochs"),
+        (lambda s: {k: v for k, v in s.items() if "head.0.bias" not in k}, r"best/head\.0\.bias is missing"),
+        (lambda s: s | {"generator/cuda": np.zeros(16, np.uint8)}, r"cuda is \(\(16,\), 'uint8'\); .* none"),
+        (lambda s: s | {"network/head.0.bias": np.zeros(3, np.float32)}, r"head\.0\.bias is \(\(3,\)"),
+        (lambda s: s | {"optimiser/0/step": np.array(1.0)}, "step is .*'float64'"),
+    ],
+)
+def test_a_snapshot_of_another_training_is_refused(change, message):
+    snapshot = _interrupted(1)
+    with pytest.raises(ForeignSnapshot, match=message):
+        _trained(snapshot=change(dict(snapshot)))
 
 
 def test_the_best_state_is_kept_when_the_last_epochs_are_ruined():
