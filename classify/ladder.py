@@ -12,6 +12,7 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import fft
 
 from .errors import BadInput
@@ -92,10 +93,14 @@ def by_budget(budget_us: float, account: Mapping[str, Mapping[str, Any]], fft_us
     return affordable[-1]
 
 
+def timed_records() -> NDArray[np.complex64]:
+    """What costs are measured on: noise, shape (RECORDS, PULSES)."""
+    return np.random.default_rng(0).standard_normal((RECORDS, 2 * PULSES), np.float32).view(np.complex64)
+
+
 def measured_fft_us() -> float:
     """Time of a record's bare FFT in a batch on this machine [us]: the shortest of some rounds."""
-    parts = np.random.default_rng(0).standard_normal((RECORDS, 2 * PULSES), np.float32)
-    iq = parts.view(np.complex64)
+    iq = timed_records()
     taken = []
     for _ in range(_ROUNDS):
         start = time.perf_counter()

@@ -23,7 +23,7 @@ from .files import result_folder, write_together
 from .gather import Gathered, gather, gather_from
 from .inference import COVERAGES, CURVE_KEY, SETS_KEY
 from .labels import CLASSES
-from .ladder import COST_KEY, PULSES, RECORDS
+from .ladder import COST_KEY, timed_records
 from .parts import Parts
 from .progress import Progress
 from .training_config import TrainingConfig, training_config
@@ -146,8 +146,7 @@ def costs_ffts(files: Mapping[str, bytes]) -> dict[str, float]:
     from .inference import Classifier
     from .report.timing import quote, time_in_turns
 
-    parts = np.random.default_rng(0).standard_normal((RECORDS, 2 * PULSES), np.float32)
-    iq = parts.view(np.complex64)
+    iq = timed_records()
     works: dict[str, Callable[[], object]] = {"": lambda: fft.fft(iq)}
     for file, content in files.items():
         classifier = Classifier(content, source=file)
