@@ -159,7 +159,7 @@ def costs_ffts(files: Mapping[str, bytes]) -> dict[str, float]:
 
 def _gather(settings: TrainingConfig, stored: DataSet | None, bars: Progress) -> Sets:
     """Draw or read the four sets, with only the inputs that the chosen models read."""
-    names = tuple(name for name in INPUT_SHAPES if any(name in LADDER[model] for model in settings.models))
+    names = tuple(name for name in INPUT_SHAPES if any(name in LADDER[model].inputs for model in settings.models))
     total, done = sum(settings.sets.values()), 0
     sets = {}
     with bars.phase(f"{'draw' if stored is None else 'read'} {total} records", total) as on_done:
@@ -213,7 +213,7 @@ def _train_one(
     from bladewing.models.seal import seal
 
     started = time.perf_counter()
-    network = "cnn" in name
+    network = LADDER[name].learner == "network"
     scores_of, export, detail = (partial(_network, parts=parts) if network else _tabular)(
         name, settings, sets, on_fraction
     )
@@ -231,7 +231,7 @@ def _train_one(
     )
     labels = sets.test.labels
     account = {
-        "inputs": list(LADDER[name]),
+        "inputs": list(LADDER[name].inputs),
         "test": _figures(probabilities, labels, accept, settings.false_alarm)
         | {"expected_calibration_error": round(expected_calibration_error(probabilities, labels), 4)}
         | {"coverage": [round(share, 4) for share in _covered(probabilities, labels, limits)]},
@@ -247,7 +247,7 @@ def _train_one(
         "name": name,
         "version": version("bladewing"),
         "classes": json.dumps(CLASSES),
-        "inputs": json.dumps({key: INPUT_SHAPES[key] for key in LADDER[name]}),
+        "inputs": json.dumps({key: INPUT_SHAPES[key] for key in LADDER[name].inputs}),
         "schema_sha256": schema_hash(),
         "envelope": Envelope().to_json(),
         "calibration": json.dumps(account["calibration"]),
@@ -269,13 +269,13 @@ def _tabular(
     from bladewing.models.export import export_tabular
     from bladewing.models.tabular import tabular_scores, train_boosted, train_linear
 
-    (column,) = LADDER[name]
+    (column,) = LADDER[name].inputs
 
     def on_step(done: int, total: int) -> None:
         on_fraction(done / total)
 
     x, y = sets.train.inputs[column], sets.train.labels
-    if name.endswith("linear"):
+    if LADDER[name].learner == "linear":
         model = train_linear(x, y, seed=settings.seed, progress=on_step)
     else:
         model = train_boosted(
@@ -297,13 +297,14 @@ def _network(
     from bladewing.models.training import network_scores, train_network
     from bladewing.models.training_state import ForeignSnapshot
 
-    signal, evidence = LADDER[name]
-    shapes = {key: INPUT_SHAPES[key] for key in (signal, evidence)}
+    shapes = {key: INPUT_SHAPES[key] for key in LADDER[name].inputs}
+    signal, *evidence = LADDER[name].inputs
+    numbers = shapes[evidence[0]][0] if evidence else 0
     networks: dict[str, Callable[..., EvidenceNet]] = {
-        "spectrum": partial(SpectrumNet, widen=1 + name.endswith("wide")),
+        "spectrum": partial(SpectrumNet, widen=LADDER[name].widen),
         "image": ImageNet,
     }
-    net = networks[signal](shapes[signal], shapes[evidence][0], seed=settings.seed)
+    net = networks[signal](shapes[signal], numbers, seed=settings.seed)
 
     def inputs(part: Gathered) -> dict[str, NDArray]:
         return {key: part.inputs[key] for key in shapes}

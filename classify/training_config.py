@@ -33,6 +33,7 @@ class TrainingConfig(BaseModel):
     models: Annotated[tuple[str, ...], Field(min_length=1)] = (
         "features-linear",
         "features-boosted",
+        "spectrum-cnn-fast",
         "spectrum-cnn",
         "joint-boosted",
         "image-cnn",

@@ -1,14 +1,14 @@
 """Models: arrays in, scores and self-contained ONNX bytes out; nothing here knows a radar or a file.
 
-Six models stand on a ladder from a few microseconds to a few tens of microseconds a record, so that a report
-can say what each step buys (`LADDER`). Their outputs are always in the order uav, bird, clutter.
+The models stand on a ladder from tens of microseconds a record upwards, so that a report can say what each step buys
+(`LADDER`). Their outputs are always in the order uav, bird, clutter.
 
 Modules
 -------
 tabular
     Logistic regression and boosted trees on a vector of measurements.
 cnn
-    Small convolutional networks on the velocity spectrum or on the joint image, each beside its vector of measurements.
+    Small convolutional networks on the velocity spectrum or on the joint image, most beside a vector of measurements.
 training, augment
     The loop that trains a network, and the mirrored radial velocity it may train on.
 calibration
@@ -19,15 +19,39 @@ export, seal
 Importing this package or `seal` imports no training library.
 """
 
-LADDER: dict[str, tuple[str, ...]] = {
-    "features-linear": ("features",),
-    "features-boosted": ("features",),
-    "spectrum-cnn": ("spectrum", "features"),
-    "spectrum-cnn-wide": ("spectrum", "features"),
-    "joint-boosted": ("joint_features",),
-    "image-cnn": ("image", "joint_features"),
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A model of the ladder.
+
+    Parameters
+    ----------
+    learner
+        What is trained: logistic regression, boosted trees or a convolutional network.
+    inputs
+        Names of what it reads; a network's signal first.
+    widen
+        Factor on the channels of a network.
+    """
+
+    learner: Literal["linear", "boosted", "network"]
+    inputs: tuple[str, ...]
+    widen: float = 1.0
+
+
+LADDER: dict[str, Rung] = {
+    "features-linear": Rung("linear", ("features",)),
+    "features-boosted": Rung("boosted", ("features",)),
+    "spectrum-cnn-fast": Rung("network", ("spectrum",)),
+    "spectrum-cnn": Rung("network", ("spectrum", "features")),
+    "spectrum-cnn-wide": Rung("network", ("spectrum", "features"), widen=2),
+    "joint-boosted": Rung("boosted", ("joint_features",)),
+    "image-cnn": Rung("network", ("image", "joint_features")),
 }
-"""Model names (the stem of the file) and the inputs that each one reads."""
+"""Name of a model (the stem of its file) to what it is."""
 
 DEFAULT_MODEL = "spectrum-cnn"
 """The model that is used where none is named."""

@@ -1,7 +1,8 @@
-"""Two small convolutional networks, each reading a signal beside a vector of measurements.
+"""Two small convolutional networks, each reading a signal, most often beside a vector of measurements.
 
 Both have the same anatomy: strided convolutions over the signal, their mean and their maximum along the axes (how much
-there is of a pattern, and whether it is there at all), a small dense branch over the measurements, and a common head.
+there is of a pattern, and whether it is there at all), a small dense branch over the measurements where there are any,
+and a common head.
 The inputs are standardised inside, by buffers that `EvidenceNet.measure` fills: the exported model eats raw inputs.
 """
 
@@ -97,7 +98,7 @@ class EvidenceNet(nn.Module):
     Parameters
     ----------
     shapes
-        The two inputs, name to shape of one record: the signal (C, ...) first, then the measurements (F,).
+        The inputs, name to shape of one record: the signal (C, ...) first, then the measurements (F,), if any.
     trunk
         From (n, C, H, W) to (n, width, h, w).
     width
@@ -107,15 +108,16 @@ class EvidenceNet(nn.Module):
     def __init__(self, shapes: Mapping[str, tuple[int, ...]], trunk: nn.Module, width: int) -> None:
         super().__init__()
         self.input_shapes = dict(shapes)
-        (signal, evidence) = self.input_shapes.values()
+        signal, *evidence = self.input_shapes.values()
         self.standardise = nn.ModuleDict(
             {name: Standardise(shape[0], len(shape) - 1) for name, shape in self.input_shapes.items()}
         )
         self.flat = len(signal) == 2  # one axis: a height of 1 is put in, since 2-D convolutions run faster than 1-D
         self.trunk = trunk
-        self.branch = nn.Sequential(nn.Linear(evidence[0], _BRANCH), nn.ReLU())
+        self.branch = nn.Sequential(nn.Linear(evidence[0][0], _BRANCH), nn.ReLU()) if evidence else None
+        seen = 2 * width + (_BRANCH if evidence else 0)
         self.head = nn.Sequential(
-            nn.Linear(2 * width + _BRANCH, _HEAD), nn.ReLU(), nn.Dropout(_DROPOUT), nn.Linear(_HEAD, CLASS_COUNT)
+            nn.Linear(seen, _HEAD), nn.ReLU(), nn.Dropout(_DROPOUT), nn.Linear(_HEAD, CLASS_COUNT)
         )
 
     def measure(self, inputs: Mapping[str, NDArray[np.floating]]) -> None:
@@ -186,7 +188,7 @@ class EvidenceNet(nn.Module):
             for weights in self.parameters():
                 weights.copy_(weights.half().float())
 
-    def forward(self, signal: Tensor, evidence: Tensor) -> Tensor:
+    def forward(self, signal: Tensor, evidence: Tensor | None = None) -> Tensor:
         """Return the scores.
 
         Parameters
@@ -194,39 +196,43 @@ class EvidenceNet(nn.Module):
         signal
             First input, raw, shape (n, C, B) or (n, C, H, W).
         evidence
-            Second input, raw, shape (n, F).
+            Second input, raw, shape (n, F), if the network reads one.
 
         Returns
         -------
         Tensor
             Shape (n, 3), in the order uav, bird, clutter.
         """
-        signal_name, evidence_name = self.input_shapes
+        signal_name, *evidence_name = self.input_shapes
         planes = self.standardise[signal_name](signal)
         maps = self.trunk(planes.unsqueeze(2) if self.flat else planes)
-        seen = self.branch(self.standardise[evidence_name](evidence))
-        return self.head(torch.cat([maps.mean((2, 3)), maps.amax((2, 3)), seen], dim=1))
+        seen = [maps.mean((2, 3)), maps.amax((2, 3))]
+        if self.branch is not None:
+            assert evidence is not None
+            seen.append(self.branch(self.standardise[evidence_name[0]](evidence)))
+        return self.head(torch.cat(seen, dim=1))
 
 
 class SpectrumNet(EvidenceNet):
-    """1-D network over the velocity spectrum ("spectrum") beside its measurements ("features").
+    """1-D network over the velocity spectrum ("spectrum"), beside its measurements ("features") or alone.
 
-    About 39 000 parameters and 0.8 million multiplications a record of 3 x 256; twice as wide, 134 000 and 2.8 million.
+    About 39 000 parameters and 0.8 million multiplications a record of 3 x 256; twice as wide, 134 000 and 2.8 million;
+    half as wide and alone, 11 000 and 0.2 million.
 
     Parameters
     ----------
     spectrum_shape
         Channels and velocity bins (C, B).
     feature_count
-        Number of measurements F.
+        Number of measurements F; 0: the network reads the spectrum alone.
     seed
         Draws the first weights; the global generator of torch is left as it was.
     widen
-        Factor on the channels of every layer, 1 or 2.
+        Factor on the channels of every layer, 0.5, 1 or 2.
     """
 
-    def __init__(self, spectrum_shape: tuple[int, int], feature_count: int, *, seed: int, widen: int = 1) -> None:
-        first, second, third, last = (widen * channels for channels in (16, 24, 32, 48))
+    def __init__(self, spectrum_shape: tuple[int, int], feature_count: int, *, seed: int, widen: float = 1) -> None:
+        first, second, third, last = (round(widen * channels) for channels in (16, 24, 32, 48))
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             trunk = nn.Sequential(
@@ -237,7 +243,8 @@ class SpectrumNet(EvidenceNet):
                 _Convolution(third, last, (1, 5), (1, 2)),
                 _Residual(last, (1, 5)),
             )
-            super().__init__({"spectrum": spectrum_shape, "features": (feature_count,)}, trunk, last)
+            beside = {"features": (feature_count,)} if feature_count else {}
+            super().__init__({"spectrum": spectrum_shape, **beside}, trunk, last)
 
 
 class ImageNet(EvidenceNet):

@@ -41,7 +41,7 @@ def trained(name: str, settings: TrainingConfig, sets: Sets, test: Gathered) -> 
     """Probabilities and labels that a model of these sets gives the test records."""
     sealed, account = _train_one(name, settings, sets, lambda _: None)
     session = onnxruntime.InferenceSession(sealed, providers=["CPUExecutionProvider"])
-    feed = {key: test.inputs[key].astype(np.float32) for key in LADDER[name]}
+    feed = {key: test.inputs[key].astype(np.float32) for key in LADDER[name].inputs}
     probabilities = session.run(["probabilities"], feed)[0]
     return probabilities, decide(probabilities, account["accept"])[0]
 
@@ -66,10 +66,11 @@ def main() -> None:
     """Write the table to the terminal."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--records", type=int, default=30_000, help="training records before a family is taken out")
-    parser.add_argument("--model", choices=[m for m in LADDER if LADDER[m][0] != "image"], default="features-boosted")
+    choices = [name for name, rung in LADDER.items() if "image" not in rung.inputs]
+    parser.add_argument("--model", choices=choices, default="features-boosted")
     options = parser.parse_args()
     settings = TrainingConfig(records=options.records, seed=3, epochs=8)  # eight networks are trained
-    names = LADDER[options.model]
+    names = LADDER[options.model].inputs
     counts = {"train": options.records, "validate": settings.held_out, "calibrate": settings.held_out}
     sets = {purpose: gather(3, purpose, count, names=names) for purpose, count in counts.items()}
     test = gather(3, "bench", options.records, names=names)

@@ -25,7 +25,7 @@ from onnx import helper
 
 CALIBRATION = Calibration(0.7, (0.3, -0.5, 0.2))
 FEATURES = 6
-KINDS = ("features-linear", "features-boosted", "spectrum-cnn", "image-cnn")
+KINDS = ("features-linear", "features-boosted", "spectrum-cnn-fast", "spectrum-cnn", "image-cnn")
 
 
 def _tabular(train, name):
@@ -52,6 +52,7 @@ def exported():
     return {
         "features-linear": _tabular(train_linear, "features"),
         "features-boosted": _tabular(train_boosted, "joint_features"),
+        "spectrum-cnn-fast": _network(SpectrumNet((3, 64), 0, seed=0)),
         "spectrum-cnn": _network(SpectrumNet((3, 64), FEATURES, seed=0)),
         "image-cnn": _network(ImageNet((1, 32, 16), FEATURES, seed=0)),
     }

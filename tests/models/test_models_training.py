@@ -48,6 +48,7 @@ def _trained(seed=0, epochs=2, **options):
     ("draw", "make"),
     [
         (_spectra, lambda: SpectrumNet((2, BINS), FEATURES, seed=0)),
+        (_spectra, lambda: SpectrumNet((2, BINS), 0, seed=0)),
         (_images, lambda: ImageNet((1, 16, 16), FEATURES, seed=0)),
     ],
 )
