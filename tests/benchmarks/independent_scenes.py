@@ -7,81 +7,13 @@ only knows the product's own drawings shows it here. Radar at the origin, x to t
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
-LIGHT_MPS = 299_792_458.0
+from . import independent_clutter as clutter
+from .independent_echo import Radar, Scene, across, echo, level, phasor, unit
+
 BLADE_LAWS = ("line", "points", "tip", "asymmetric")
-
-
-@dataclass(frozen=True)
-class Radar:
-    """A pulse-Doppler or FMCW radar that keeps one range cell."""
-
-    carrier_hz: float
-    prf_hz: float
-    pulses: int
-
-    @property
-    def wavelength_m(self) -> float:
-        return LIGHT_MPS / self.carrier_hz
-
-    @property
-    def time_s(self) -> np.ndarray:
-        return np.arange(self.pulses) / self.prf_hz
-
-    @property
-    def name(self) -> str:
-        return f"{self.carrier_hz / 1e9:g} GHz {self.prf_hz / 1e3:g} kHz {1e3 * self.pulses / self.prf_hz:.0f} ms"
-
-
-@dataclass(frozen=True)
-class Scene:
-    """Echoes without noise: the body (all that moves as a whole) and the micro-motion (blades, wings, limbs, wheels).
-
-    A process without parts (ground, sea, rain) is all micro-motion; a glider and noise have none.
-    """
-
-    body: np.ndarray
-    micro: np.ndarray
-
-
-# ---------------------------------------------------------------------------------------------------------- scatterers
-
-
-def phasor(range_m: np.ndarray, radar: Radar) -> np.ndarray:
-    """Two-way phase of a range, complex64."""
-    cycles = range_m * (-2 / radar.wavelength_m)
-    cycles -= np.rint(cycles)
-    angle = (2 * np.pi * cycles).astype(np.float32)
-    out = np.empty(angle.shape, np.complex64)
-    np.cos(angle, out=out.real)
-    np.sin(angle, out=out.imag)
-    return out
-
-
-def echo(place_m: np.ndarray, radar: Radar, amplitude: np.ndarray | float = 1.0) -> np.ndarray:
-    """Sum over scatterers at `place_m` (scatterers, pulses, 3), of amplitudes that fit (scatterers, pulses)."""
-    parts = phasor(np.sqrt(np.sum(place_m**2, axis=-1)), radar)
-    return np.sum(parts * np.asarray(amplitude, np.float32), axis=0)
-
-
-def unit(vector: np.ndarray) -> np.ndarray:
-    """The direction of vectors along the last axis."""
-    return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
-
-
-def across(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two directions that stand on an axis and on each other."""
-    first = unit(np.cross(axis, [0.31, 0.95, 0.05]))
-    return first, np.cross(axis, first)
-
-
-def level(echoes: np.ndarray, power_db: float) -> np.ndarray:
-    """Bring a series to a mean power [dB]; silence stays silent."""
-    power = np.mean(np.abs(echoes) ** 2)
-    return echoes if power == 0 else echoes * np.sqrt(10 ** (power_db / 10) / power)
 
 
 def rotor(
@@ -139,9 +71,6 @@ def tilted(rng: np.random.Generator, most_deg: float) -> np.ndarray:
     return np.array([np.sin(tilt) * np.cos(towards), np.sin(tilt) * np.sin(towards), np.cos(tilt)])
 
 
-# ---------------------------------------------------------------------------------------------------------------- UAVs
-
-
 def multicopter(
     rng: np.random.Generator,
     radar: Radar,
@@ -181,7 +110,7 @@ def quadcopter(rng: np.random.Generator, radar: Radar) -> Scene:
 def quadcopter_over_ground(rng: np.random.Generator, radar: Radar) -> Scene:
     """The same with ground in its cell, 0 to 25 dB over its body."""
     scene = multicopter(rng, radar)
-    return Scene(scene.body + level(ground(rng, radar).micro, rng.uniform(0, 25)), scene.micro)
+    return Scene(scene.body + level(clutter.ground(rng, radar).micro, rng.uniform(0, 25)), scene.micro)
 
 
 def hexacopter(rng: np.random.Generator, radar: Radar) -> Scene:
@@ -231,8 +160,6 @@ def fixed_wing(
     body = echo(places, radar, rng.rayleigh(1, (8, 1)))
     return Scene(level(body, 0), level(propeller, rng.uniform(-25, -8) if blades_db is None else blades_db))
 
-
-# --------------------------------------------------------------------------------------------------------------- birds
 
 # wingbeat [Hz] and span [m]: swan, gull, goose, crow, pigeon, swallow, starling, siskin
 BIRDS = (
@@ -327,140 +254,6 @@ def flock(rng: np.random.Generator, radar: Radar) -> Scene:
     return Scene(sum(b.body for b in birds), sum(b.micro for b in birds))
 
 
-# ------------------------------------------------------------------------------------------------------------- clutter
-
-
-def white(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Complex Gaussian noise of unit power."""
-    return rng.normal(0, np.sqrt(0.5), (count, 2)).astype(np.float32).view(np.complex64)[:, 0]
-
-
-def process(rng: np.random.Generator, radar: Radar, density: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """A Gaussian process of this density over radial velocity [m/s], folded into the span, unit power."""
-    count = 4 * radar.pulses  # cut from a longer one, whose ends meet
-    span = radar.wavelength_m * radar.prf_hz / 2
-    velocity = -np.fft.fftfreq(count) * span
-    power = sum(density(velocity + fold * span) for fold in range(-3, 4))
-    series = np.fft.ifft(np.sqrt(power) * white(rng, count))[: radar.pulses]
-    return level(series, 0).astype(np.complex64)
-
-
-def ground(rng: np.random.Generator, radar: Radar, wind_mph: float | None = None) -> Scene:
-    """Billingsley: a steady part and an exponential one (his a and b), wind 2 to 30 mph."""
-    wind = rng.uniform(2, 30) if wind_mph is None else wind_mph
-    ratio = 489.8 * wind**-1.55 * (radar.carrier_hz / 1e9) ** -1.21
-    slope = 1 / (0.1048 * (np.log10(wind) + 0.4147))
-    moving = process(rng, radar, lambda v: np.exp(-slope * np.abs(v)))
-    steady = np.exp(2j * np.pi * rng.uniform()) * np.sqrt(ratio)
-    return Scene(np.zeros(radar.pulses, np.complex64), level(moving + steady, 0).astype(np.complex64))
-
-
-def rain(rng: np.random.Generator, radar: Radar) -> Scene:
-    """A Gaussian of 0.5 to 3 m/s about the wind's radial velocity."""
-    mean, width = rng.uniform(-12, 12), rng.uniform(0.5, 3)
-    echoes = process(rng, radar, lambda v: np.exp(-((v - mean) ** 2) / (2 * width**2)))
-    return Scene(np.zeros_like(echoes), echoes)
-
-
-def sea(rng: np.random.Generator, radar: Radar) -> Scene:
-    """Bragg lines, wind-driven and breaking waves, each of a K-distributed texture that hardly moves in a dwell."""
-    bragg = np.sqrt(9.81 * radar.wavelength_m / (4 * np.pi)) + 0.1
-    wind = rng.uniform(3, 15) * np.cos(rng.uniform(0, np.pi))
-    shape = rng.uniform(0.3, 8)
-    out = np.zeros(radar.pulses, np.complex64)
-    for mean, width, power_db in (
-        (bragg + 0.02 * wind, 0.25, 0.0),
-        (-bragg + 0.02 * wind, 0.25, rng.uniform(-15, 0)),
-        (0.13 * wind, rng.uniform(0.4, 1.0), rng.uniform(-10, 10)),
-        (0.25 * wind, rng.uniform(0.6, 1.5), rng.uniform(-20, 3)),
-    ):
-        texture = rng.gamma(shape, 1 / shape)
-        out += np.sqrt(texture) * level(
-            process(rng, radar, lambda v, m=mean, w=width: np.exp(-((v - m) ** 2) / (2 * w**2))), power_db
-        )
-    return Scene(np.zeros_like(out), out)
-
-
-def person(rng: np.random.Generator, radar: Radar) -> Scene:
-    """A walker: trunk and head, and limbs of two segments that swing (after Chen and Boulic, much simplified)."""
-    speed, height = rng.uniform(0.8, 2.0), rng.uniform(1.6, 1.9)
-    heading, start = rng.uniform(0, 2 * np.pi), rng.uniform(20, 400)
-    ahead = np.array([np.cos(heading), np.sin(heading), 0])
-    side, up = np.array([-ahead[1], ahead[0], 0]), np.array([0.0, 0.0, 1.0])
-    phase = 2 * np.pi * 0.75 * np.sqrt(speed) * radar.time_s + rng.uniform(0, 2 * np.pi)
-    hip = np.array([start, 0, 0.5 * height]) + (speed * radar.time_s + 0.02 * np.sin(2 * phase))[:, None] * ahead
-    hip = hip + (0.02 * np.cos(2 * phase))[:, None] * up
-    trunk = np.stack([hip + share * height * up for share in (0.05, 0.15, 0.25, 0.42)])
-    body = echo(trunk, radar, np.array([1.0, 1.2, 1.0, 0.4])[:, None])
-    swing = np.deg2rad(18 * (0.6 + 0.4 * speed))
-    micro = np.zeros(radar.pulses, np.complex64)
-    for hand in (-1, 1):
-        for root, upper, lower, gain, sign, bend in (
-            (0.0, 0.245 * height, 0.246 * height, 0.35, hand, -0.5),
-            (0.3 * height, 0.17 * height, 0.16 * height, 0.2, -hand, 0.4),
-        ):
-            angle = swing * sign * np.sin(phase)
-            joint = hip + root * up + hand * 0.1 * height * side
-            knee = angle + bend * (1 + np.sin(phase * 1.0 + sign * 1.2)) * 0.6
-            for length, lean in ((upper, angle), (lower, knee)):
-                axis = np.sin(lean)[:, None] * ahead - np.cos(lean)[:, None] * up
-                middles = (np.arange(4) + 0.5) / 4 * length
-                micro += gain / 4 * echo(joint + middles[:, None, None] * axis, radar)
-                joint = joint + length * axis
-    return Scene(body, micro)
-
-
-def vehicle(rng: np.random.Generator, radar: Radar) -> Scene:
-    """A car: a rigid cloud of scatterers, and four wheels whose rims turn (0 to twice its speed)."""
-    speed, gain = rng.uniform(3, 35), rng.uniform(-1.5, 1.5)
-    heading, start = rng.uniform(0, 2 * np.pi), rng.uniform(30, 800)
-    ahead = np.array([np.cos(heading), np.sin(heading), 0])
-    side, up = np.array([-ahead[1], ahead[0], 0]), np.array([0.0, 0.0, 1.0])
-    gone = speed * radar.time_s + gain / 2 * radar.time_s**2
-    middle = np.array([start, 0, -2.0]) + gone[:, None] * ahead
-    offset = rng.uniform(-1, 1, (10, 3)) @ np.array([2.2 * ahead, 0.9 * side, 0.6 * up])
-    body = echo(middle + offset[:, None], radar, rng.rayleigh(1, (10, 1)))
-    radius = 0.32
-    micro = np.zeros(radar.pulses, np.complex64)
-    for front in (-1.3, 1.3):
-        for hand in (-0.8, 0.8):
-            angle = gone / radius + rng.uniform(0, 2 * np.pi) + np.arange(10)[:, None] * 2 * np.pi / 10
-            rim = radius * (np.cos(angle)[..., None] * ahead - np.sin(angle)[..., None] * up)
-            micro += echo(middle + front * ahead + hand * side - 0.3 * up + rim, radar, rng.rayleigh(1, (10, 1)))
-    return Scene(level(body, 0), level(micro, rng.uniform(-30, -12)))
-
-
-def wind_turbine(
-    rng: np.random.Generator, radar: Radar, points: int = 150, tower_db: float | None = None, law: str | None = None
-) -> Scene:
-    """A tower and three blades of 25 to 60 m; a "cloud" of points over the chord, or a row of "points"."""
-    law = law or str(rng.choice(["cloud", "points"]))
-    length, tip_mps = rng.uniform(25, 60), rng.uniform(40, 85)
-    start = np.array([rng.uniform(800, 6000), 0, rng.uniform(20, 90)])
-    yaw = rng.uniform(0, 2 * np.pi)
-    axis = np.array([np.cos(yaw), np.sin(yaw), 0.05])
-    first, second = across(unit(axis))
-    turn = tip_mps / length * radar.time_s + rng.uniform(0, 2 * np.pi)
-    micro = np.zeros(radar.pulses, np.complex64)
-    for blade in range(3):
-        angle = turn + 2 * np.pi * blade / 3
-        direction = np.cos(angle)[:, None] * first + np.sin(angle)[:, None] * second
-        chordwise = -np.sin(angle)[:, None] * first + np.cos(angle)[:, None] * second
-        along = np.sort(rng.uniform(2, length, points)) if law == "cloud" else np.linspace(2, length, points)
-        chord = rng.uniform(-1, 1, points) * (law == "cloud")
-        for part in np.array_split(np.arange(points), 8):
-            place = along[part, None, None] * direction + chord[part, None, None] * chordwise
-            micro += echo(start + place, radar)
-    tower = np.full(radar.pulses, np.exp(2j * np.pi * rng.uniform()), np.complex64)
-    return Scene(level(tower, rng.uniform(0, 25) if tower_db is None else tower_db), level(micro, 0))
-
-
-def noise(rng: np.random.Generator, radar: Radar) -> Scene:
-    """Nothing but the receiver."""
-    silence = np.zeros(radar.pulses, np.complex64)
-    return Scene(silence, silence)
-
-
 KINDS: dict[str, tuple[str, Callable[[np.random.Generator, Radar], Scene]]] = {
     "quadcopter": ("uav", quadcopter),
     "quad_over_ground": ("uav", quadcopter_over_ground),
@@ -470,37 +263,12 @@ KINDS: dict[str, tuple[str, Callable[[np.random.Generator, Radar], Scene]]] = {
     "flapping_bird": ("bird", flapping_bird),
     "gliding_bird": ("bird", gliding_bird),
     "flock": ("bird", flock),
-    "ground": ("clutter", ground),
-    "rain": ("clutter", rain),
-    "sea": ("clutter", sea),
-    "person": ("clutter", person),
-    "vehicle": ("clutter", vehicle),
-    "wind_turbine": ("clutter", wind_turbine),
-    "noise": ("clutter", noise),
+    "ground": ("clutter", clutter.ground),
+    "rain": ("clutter", clutter.rain),
+    "sea": ("clutter", clutter.sea),
+    "person": ("clutter", clutter.person),
+    "vehicle": ("clutter", clutter.vehicle),
+    "wind_turbine": ("clutter", clutter.wind_turbine),
+    "noise": ("clutter", clutter.noise),
 }
 """What a kind should be called, and what makes one of it."""
-
-
-# ------------------------------------------------------------------------------------------------------------ receiver
-
-
-def noise_power(scene: Scene, snr_db: float, of: str) -> float:
-    """Noise power a sample: `snr_db` under the whole target ("total"), or under its micro-motion ("micro") if any."""
-    whole = np.mean(np.abs(scene.body + scene.micro) ** 2)
-    moving = np.mean(np.abs(scene.micro) ** 2)
-    power = moving if of == "micro" and moving > 0 else whole
-    return float(power / 10 ** (snr_db / 10)) or 1.0
-
-
-def received(scene: Scene, power: float, rng: np.random.Generator) -> np.ndarray:
-    """The scene in white noise of this power a sample."""
-    samples = scene.body + scene.micro + np.sqrt(power) * white(rng, len(scene.body))
-    return samples.astype(np.complex64)
-
-
-def visible(scene: Scene, power: float) -> bool:
-    """Whether a spectrum shows the micro-motion: four bins of it at 10 dB over the noise and not under the body's."""
-    window = np.blackman(len(scene.body))
-    window /= np.sqrt(np.sum(window**2))
-    body, micro = (np.abs(np.fft.fft(window * part)) ** 2 for part in (scene.body, scene.micro))
-    return bool(np.count_nonzero((micro >= 10 * power) & (micro >= body)) >= 4)

@@ -1,19 +1,16 @@
 """What the shipped models call scenes of a simulator that is not theirs.
 
-Run: python tests/benchmarks/independent_table.py [--scenes N] [--seed S] [--model NAME ...] [--kind NAME ...]
+Run: python -m tests.benchmarks.independent_table [--scenes N] [--seed S] [--model NAME ...] [--kind NAME ...]
 """
 
 import argparse
-import sys
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 from bladewing.classify import Classifier
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from independent_scenes import KINDS, Radar, noise_power, received, visible
+from .independent_echo import Radar, noise_power, received, visible
+from .independent_scenes import KINDS
 
 RADARS = (
     Radar(9.85e9, 35e3, 3000),
