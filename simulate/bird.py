@@ -13,7 +13,7 @@ from .target import Target
 MAX_WINGBEAT_HZ = 18.0
 
 #: Most birds that a flock brings into one range cell.
-MAX_FLOCK = 5
+MAX_FLOCK = 20
 
 _GRAVITY_MPS2 = 9.81
 _AIR_KG_M3 = 1.225
@@ -161,7 +161,8 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
     radar : Radar
         The radar that looks.
     kind : {"flapping_bird", "gliding_bird", "flock"}
-        Steady flapping; flap and glide (the pause may fall into the dwell, wholly or in part); 2 to 5 birds.
+        Steady flapping; flap and glide (the pause may fall into the dwell, wholly or in part); 2 to `MAX_FLOCK`
+        birds.
 
     Returns
     -------
@@ -178,15 +179,15 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
     )
     # The radar sees the bird's speed along the line of sight; flying at it (forward > 0) closes the range.
     velocity = -draws.value("bird_speed_mps") * sight[:, 0]
-    acceleration = draws.value("bird_acceleration_mps2")
+    acceleration = draws.acceleration_mps2("bird_acceleration_mps2")
     scale = draws.value("stroke_scale")
     down, feather = draws.value("down_stroke"), draws.value("feather_weight")
-    extra = 1 + np.floor((MAX_FLOCK - 1) * draws.uniform()).astype(int)
-    members = 1 + extra if kind == "flock" else np.ones(records, int)
+    flock = np.floor(draws.value("members")).astype(int)
+    members = np.minimum(flock, MAX_FLOCK) if kind == "flock" else np.ones(records, int)
     bob = 0.02 * span * draws.uniform()
 
     # One column a member, drawn for all records alike: what a record draws must not depend on its batch.
-    spread = draws.value("flock_velocity_mps", MAX_FLOCK)
+    spread = draws.value("flock_velocity_mps", MAX_FLOCK) * draws.value("flock_spread")[:, None]
     rate = beat[:, None] * (1 + 0.1 * (draws.uniform(MAX_FLOCK) - 0.5))
     phase = draws.value("phase_rad", MAX_FLOCK)
     level = np.exp(0.4 * draws.normal(MAX_FLOCK) + 1j * draws.value("phase_rad", MAX_FLOCK)).astype(np.complex64)

@@ -4,6 +4,7 @@ Each is a handful of scatterers on known paths; they are the hard confusers, bec
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .airframe import body_echo
 from .laws import Draws
@@ -23,8 +24,11 @@ LIMBS = (
 )
 
 
-#: Scatterers of a vehicle's body and of its wheels.
-BODY_POINTS, WHEEL_POINTS = 9, 8
+#: Scatterers of a vehicle's body, and at most of its wheels together.
+BODY_POINTS, MAX_WHEEL_POINTS = 9, 40
+
+#: Most scatterers of a wind turbine's blade.
+MAX_BLADE_POINTS = 30
 
 
 def draw_person(draws: Draws, radar: Radar) -> Target:
@@ -56,8 +60,7 @@ def draw_person(draws: Draws, radar: Radar) -> Target:
 def draw_vehicle(draws: Draws, radar: Radar) -> Target:
     """Draw a road vehicle: several body scatterers of slightly unlike radial speed, and wheels from 0 to 2 v."""
     speed = draws.value("vehicle_mps") * draws.sign()
-    # half of them drive steadily
-    acceleration = draws.change("vehicle_acceleration_mps2", radar.dwell_s) * np.where(draws.chance(0.5), 0.05, 1.0)
+    acceleration = draws.acceleration_mps2("vehicle_acceleration_mps2", radar.dwell_s)
     spread = draws.value("aspect_spread")  # close to the road each part has its own aspect
     body = np.zeros((len(draws), radar.pulses), np.complex64)
     for _ in range(BODY_POINTS):
@@ -65,51 +68,83 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
         level, phase = np.exp(0.6 * draws.normal()), draws.value("phase_rad")
         path = {"velocity_mps": own, "acceleration_mps2": acceleration}
         body_echo(radar, len(draws), **path, phase_rad=phase, amplitude=level, out=body)
-    radius = draws.value("wheel_radius_m")
-    turn = speed / (TWO_PI * radius)
-    wheels = np.zeros_like(body)
-    for _ in range(WHEEL_POINTS):
-        # a scatterer on the rim rolls: its speed along the road runs from 0 at the ground to 2 v at the top
-        rim = radius * (0.5 + 0.5 * draws.uniform())
-        phase = draws.value("phase_rad")
-        rim_rad = -2 * TWO_PI / radar.wavelength_m * rim
-        level = np.exp(0.4 * draws.normal())
-        body_echo(
-            radar,
-            len(draws),
-            velocity_mps=speed,
-            acceleration_mps2=acceleration,
-            phase_rad=draws.value("phase_rad") - rim_rad * np.sin(phase),
-            vibration_rad=rim_rad,
-            vibration_hz=turn,
-            vibration_phase_rad=phase,
-            amplitude=level,
-            out=wheels,
-        )
+    wheels, turn = _wheels(draws, radar, speed, acceleration)
     truth = {"velocity_mps": speed, "acceleration_mps2": acceleration, "rotation_hz": np.abs(turn)}
     return Target(wheels, body, -draws.value("wheel_db"), truth=truth)
+
+
+def _wheels(
+    draws: Draws, radar: Radar, speed_mps: NDArray[np.float64], acceleration_mps2: NDArray[np.float64]
+) -> tuple[NDArray[np.complex64], NDArray[np.float64]]:
+    """Echo of a vehicle's wheels and their rotation rate [Hz].
+
+    A point on the rim rolls: its radial speed runs from 0 at the ground to twice the vehicle's at the top, at the rate
+    of the speed along the road. Half of the wheels have even spokes that echo alike, whose lines are those of a rotor;
+    the others' points lie and echo as they will.
+    """
+    records = len(draws)
+    cosine = np.cos(draws.value("wheel_aspect_rad"))
+    radius = draws.value("wheel_radius_m")
+    turn = speed_mps / cosine / (TWO_PI * radius)
+    wheels, spokes = (np.floor(draws.value(law)).astype(int) for law in ("wheels", "spokes"))
+    points, own_phase = wheels * spokes, draws.value("phase_rad", 4)
+    even, rim_only = draws.chance(0.5), draws.chance(0.5)
+    depth, angle, echo = (draws.uniform(MAX_WHEEL_POINTS) for _ in range(3))
+    level = np.exp(0.4 * draws.normal(MAX_WHEEL_POINTS))
+    out = np.zeros((records, radar.pulses), np.complex64)
+    for point in range(int(points.max(initial=0))):
+        rows = np.flatnonzero(points > point)
+        wheel = point % wheels[rows]
+        alike = even[rows]
+        at = TWO_PI * np.where(alike, (point // wheels[rows]) / spokes[rows], angle[rows, point])
+        at += own_phase[rows, wheel]
+        deep = np.where(rim_only[rows], 0.03, 0.5) * depth[rows, np.where(alike, wheel, point)]
+        rim = radius[rows] * (1 - deep) * cosine[rows]
+        out[rows] += body_echo(
+            radar,
+            len(rows),
+            velocity_mps=speed_mps[rows],
+            acceleration_mps2=acceleration_mps2[rows],
+            phase_rad=TWO_PI * echo[rows, np.where(alike, wheel, point)],
+            vibration_rad=-2 * TWO_PI / radar.wavelength_m * rim,
+            vibration_hz=turn[rows],
+            vibration_phase_rad=at,
+            amplitude=np.where(alike, 1.0, level[rows, point]),
+        )
+    return out, turn
 
 
 def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
     """Draw a wind turbine: three long blades of which the range cell holds a part, and its tower at rest.
 
-    The blade is rough on the scale of the wavelength, so it is a row of scatterers of random strength, not a mirror.
+    A blade is rough on the scale of the wavelength: a row of scatterers, few or many, equal or of random strength, each
+    somewhere on the chord; it is no mirror.
     """
-    t = radar.times_s
+    t, records = radar.times_s, len(draws)
     length, tip = draws.value("turbine_length_m"), draws.value("turbine_tip_mps")
     turn = tip / (TWO_PI * length) * draws.sign()
     cell = np.minimum(draws.value("cell_m"), length)
     start = (length - cell) * draws.uniform()
     cos_beta = np.cos(np.deg2rad(85) * draws.uniform())
     first = draws.value("phase_rad")
-    micro = np.zeros((len(draws), radar.pulses), np.complex64)
+    points, chord = np.floor(draws.value("turbine_points")).astype(int), draws.value("chord_m")
+    equal = draws.chance(0.5)
+    micro = np.zeros((records, radar.pulses), np.complex64)
     for blade in range(3):
         angle = TWO_PI * (turn[:, None] * t + blade / 3) + first[:, None]
-        towards = np.cos(angle) - np.cos(angle[:, :1])
-        for _ in range(8):
-            r = (start + cell * draws.uniform()) * cos_beta
-            level = (draws.uniform() ** 2 * np.exp(1j * draws.value("phase_rad"))).astype(np.complex64)
-            micro += level[:, None] * range_phasor(-r[:, None] * towards, radar.wavelength_m)
+        towards, across = np.cos(angle), np.sin(angle)
+        towards -= towards[:, :1].copy()
+        across -= across[:, :1].copy()
+        along, aside = start[:, None] + cell[:, None] * draws.uniform(MAX_BLADE_POINTS), draws.uniform(MAX_BLADE_POINTS)
+        strength, phase = draws.uniform(MAX_BLADE_POINTS), draws.value("phase_rad", MAX_BLADE_POINTS)
+        level = (np.where(equal[:, None], 1.0, strength**2) * np.exp(1j * phase)).astype(np.complex64)
+        r = along * cos_beta[:, None]
+        # the chord tapers to the tip
+        c = chord[:, None] * (2 * aside - 1) * (1 - along / length[:, None]) * cos_beta[:, None]
+        for point in range(int(points.max(initial=0))):
+            rows = np.flatnonzero(points > point)
+            nearer = r[rows, point, None] * towards[rows] + c[rows, point, None] * across[rows]
+            micro[rows] += level[rows, point, None] * range_phasor(-nearer, radar.wavelength_m)
     body = np.exp(1j * draws.value("phase_rad")).astype(np.complex64)[:, None] * np.ones(
         (1, radar.pulses), np.complex64
     )
@@ -117,8 +152,8 @@ def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
         "rotation_hz": np.abs(turn),
         "blade_length_m": length,
         "tip_mps": tip * cos_beta,
-        "blades": np.full(len(draws), 3.0),
-        "velocity_mps": np.zeros(len(draws)),
+        "blades": np.full(records, 3.0),
+        "velocity_mps": np.zeros(records),
     }
     return Target(micro, body, 45 * draws.uniform() - 5, truth=truth)
 
@@ -126,7 +161,7 @@ def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
 def draw_mover(draws: Draws, radar: Radar) -> Target:
     """Draw a featureless moving reflector: a far vehicle, a boat, a balloon. A line alone is no drone."""
     speed = draws.value("mover_mps")
-    acceleration = draws.value("bird_acceleration_mps2") * np.where(draws.chance(0.7), 0.05, 1.0)
+    acceleration = draws.acceleration_mps2("bird_acceleration_mps2")
     path = straight_path(radar.times_s, speed, acceleration)
     turn = np.exp(1j * draws.value("phase_rad")).astype(np.complex64)[:, None]
     truth = {"velocity_mps": speed, "acceleration_mps2": acceleration}

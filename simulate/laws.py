@@ -9,8 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Uniform numbers a record owns; the widest target (an octocopter) uses about two thirds of them.
-WIDTH = 224
+#: Uniform numbers a record owns; the widest targets (a wind turbine, a vehicle) use about nine tenths of them.
+WIDTH = 448
+
+#: What a steady body's acceleration is of a manoeuvring one's. Half of all bodies are steady, whatever they are: if one
+#: class alone accelerated, a line that bends would be all there is to learn of it.
+STEADY = 0.05
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,9 @@ LAWS: dict[str, Law] = {
     "bird_body_db": Law("uniform", -12.0, 15.0, "dB", "body over wing power"),
     "down_stroke": Law("uniform", 0.0, 0.7, "1", "down-stroke stronger than up-stroke"),
     "feather_weight": Law("log", 0.05, 2.0, "1", "wrist and tip scatterers against the wing's line"),
-    "flock_velocity_mps": Law("uniform", -2.5, 2.5, "m/s", "spread of a flock about its mean"),
+    "flock_velocity_mps": Law("uniform", -2.5, 2.5, "m/s", "spread of a loose flock about its mean"),
+    "flock_spread": Law("uniform", 0.1, 1.0, "1", "a close flock's spread over a loose one's"),
+    "members": Law("log", 2.0, 21.0, "1", "birds that a flock brings into one range cell"),
     # clutter
     "rain_velocity_mps": Law("uniform", -12.0, 12.0, "m/s", "wind and fall along the line of sight"),
     "rain_width_mps": Law("log", 0.4, 2.5, "m/s", "1-4 m/s wide overall"),
@@ -95,15 +101,20 @@ LAWS: dict[str, Law] = {
     "texture_hz": Law("log", 0.2, 2.5, "Hz", "swells and gusts; decorrelation 0.1-1 s"),
     "person_mps": Law("uniform", -2.5, 2.5, "m/s", "walking to running"),
     "gait_hz": Law("uniform", 0.8, 2.2, "Hz", "1-2 Hz"),
-    "vehicle_mps": Law("log", 1.0, 40.0, "m/s", "roads; sign drawn apart"),
+    "vehicle_mps": Law("uniform", 0.5, 40.0, "m/s", "along the line of sight, towns to motorways; sign drawn apart"),
     "vehicle_acceleration_mps2": Law("uniform", -10.0, 10.0, "m/s^2", "with the change of aspect close to the road"),
     "mover_mps": Law("uniform", -60.0, 60.0, "m/s", "boats, balloons, far vehicles, aircraft on a slant path"),
     "wheel_radius_m": Law("log", 0.2, 0.55, "m", "motorcycle to lorry"),
     "aspect_spread": Law("log", 0.005, 0.7, "1", "share of its speed that a near vehicle's far end shows less"),
     "wheel_db": Law("uniform", -35.0, -5.0, "dB", "wheels under the body"),
+    "wheels": Law("uniform", 1.0, 5.0, "1", "wheels that the radar sees"),
+    "spokes": Law("log", 1.0, 11.0, "1", "echoes on each: a valve to ten spokes"),
+    "wheel_aspect_rad": Law("uniform", 0.0, np.deg2rad(75.0), "rad", "road against the line of sight"),
     "turbine_length_m": Law("log", 15.0, 60.0, "m", "small to large wind turbines"),
-    "turbine_tip_mps": Law("uniform", 40.0, 90.0, "m/s", "tips 60-90 m/s at rated wind, less below"),
-    "cell_m": Law("log", 3.0, 60.0, "m", "part of a blade inside the range cell"),
+    "turbine_tip_mps": Law("uniform", 15.0, 90.0, "m/s", "tips 60-90 m/s at rated wind, less below"),
+    "cell_m": Law("log", 3.0, 200.0, "m", "part of a blade inside the range cell, often the whole"),
+    "turbine_points": Law("log", 3.0, 31.0, "1", "echoes along a blade"),
+    "chord_m": Law("log", 0.05, 2.0, "m", "half the blade's chord: how far its echoes lie off its axis"),
     # receivers
     "gain_db": Law("uniform", -80.0, 80.0, "dB", "no gain is special"),
     "phase_noise_rad": Law(
@@ -162,6 +173,10 @@ class Draws:
         """Draw a rate of change that adds up to no more over a dwell above 1 s than the law's end does in 1 s."""
         most = max(abs(LAWS[law].low), abs(LAWS[law].high)) / max(1.0, dwell_s)
         return np.clip(self.value(law), -most, most)
+
+    def acceleration_mps2(self, law: str, dwell_s: float = 0.0) -> NDArray[np.float64]:
+        """Draw an acceleration as `change` does; half of the records hardly have one."""
+        return self.change(law, dwell_s) * np.where(self.chance(0.5), STEADY, 1.0)
 
     def chance(self, probability: float) -> NDArray[np.bool_]:
         """Draw True with that probability: shape (records,)."""

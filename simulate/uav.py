@@ -39,7 +39,7 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
     rotors = ROTORS[kind]
     beta = draws.value("uav_beta_rad")
     velocity = np.where(draws.chance(0.3), 0.0, draws.value("uav_velocity_mps"))
-    acceleration = np.where(draws.chance(0.5), 0.0, draws.value("uav_acceleration_mps2"))
+    acceleration = draws.acceleration_mps2("uav_acceleration_mps2")
     length = draws.value("main_length_m" if kind == "helicopter" else "blade_length_m")
     rotation = draws.value("tip_mps") / (TWO_PI * length)
     blades = np.where(draws.chance(0.65), 2, np.where(draws.chance(0.75), 3, 4))

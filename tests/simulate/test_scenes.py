@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from bladewing.simulate import Radar
+from bladewing.simulate.bird import draw_bird
 from bladewing.simulate.discretes import draw_discrete
-from bladewing.simulate.laws import WIDTH, Draws
+from bladewing.simulate.laws import STEADY, WIDTH, Draws
 from bladewing.simulate.uav import ROTORS, draw_uav
 
 RADAR = Radar(9.85e9, 40e3, 4000)
@@ -51,10 +52,38 @@ def test_wheels_run_from_rest_to_twice_the_vehicle():
     target = draw_discrete(draws(40, 4), RADAR, "vehicle")
     power, velocity = spectrum(target.micro)
     speed, acceleration = target.truth["velocity_mps"], target.truth["acceleration_mps2"]
-    margin = abs(acceleration) * RADAR.dwell_s + 0.8
+    line_mps = target.truth["rotation_hz"] * RADAR.wavelength_m / 2
+    # lines of order n beyond the rim's phase deviation fall off over its cube root
+    margin = abs(acceleration) * RADAR.dwell_s + 0.8 + 2 * line_mps * np.cbrt(abs(speed) / line_mps)
     along = velocity[None, :] * np.sign(speed)[:, None]
     inside = (along > -margin[:, None]) & (along < (2 * abs(speed) + margin)[:, None])
     assert (np.where(inside, power, 0).sum(axis=1) / power.sum(axis=1)).min() > 0.999
+
+
+def test_steady_and_manoeuvring_bodies_are_as_frequent_in_every_class():
+    for kind, draw in (("quadcopter", draw_uav), ("flapping_bird", draw_bird), ("vehicle", draw_discrete)):
+        acceleration = abs(draw(draws(600, 6), RADAR, kind).truth["acceleration_mps2"])
+        most = acceleration.max()
+        # a steady one has at most a twentieth, and so has one in twenty of the others
+        assert np.mean(acceleration <= STEADY * most) == pytest.approx(0.525, abs=4 * np.sqrt(0.25 / 600))
+
+
+def test_even_spokes_show_only_lines_of_their_own_rate():
+    radar = Radar(9.85e9, 10e3, 5000)
+    target = draw_discrete(draws(1200, 7), radar, "vehicle")
+    turn = target.truth["rotation_hz"]
+    unfolded = 2 * abs(target.truth["velocity_mps"]) < 0.9 * radar.unambiguous_mps
+    chosen = np.flatnonzero((turn > 25) & (abs(target.truth["acceleration_mps2"]) < 0.3) & unfolded)
+    power = abs(np.fft.fft(target.micro * np.kaiser(radar.pulses, 12.5), axis=-1)) ** 2
+    frequency_hz = np.fft.fftfreq(radar.pulses, 1 / radar.prf_hz)
+    shares = []
+    for row in chosen:
+        turns = (frequency_hz + 2 * target.truth["velocity_mps"][row] / radar.wavelength_m) / turn[row]
+        combs = [abs(turns - n * np.rint(turns / n)) * turn[row] < 16 for n in range(2, 11)]
+        shares.append(max(power[row, comb].sum() for comb in combs) / power[row].sum())
+    assert len(chosen) > 30
+    # half of those that have two spokes or more
+    assert 0.15 < np.mean(np.array(shares) > 0.98) < 0.75
 
 
 def test_turbine_blades_stay_below_their_tip_and_the_tower_rests():
