@@ -15,10 +15,11 @@ KNEE_MPS = 4.0
 #: Outer edge of the axis [m/s], beyond the fastest tips (below Mach 0.6).
 LIMIT_MPS = 200.0
 
-#: Spectra of up to so many bins to one of the axis are averaged by matrices; longer sums are faster one by one.
-COARSE = 4
+#: From so many spectra on they are averaged by matrices; of fewer the sums are faster one by one.
+MATRIX_ROWS = 4
 
-_RUN = 32
+#: From so many on by small matrices, which multiply fewer zeros, but there are more of them.
+_SMALL_MATRIX_ROWS = 64
 
 #: Level of a bin outside the radar's unambiguous span [dB]: lower than any noise, so "not seen" differs from "empty".
 UNSEEN_DB = LOWEST_DB / 2
@@ -84,9 +85,12 @@ class Pooling:
         if len(self.starts) < self.bins:
             out[..., : self.seen.start] = out[..., self.seen.stop :] = max(UNSEEN_DB, lowest_db)
         seen = out[..., self.seen]
-        if power.shape[-1] <= COARSE * self.bins:
-            for bins, axis_bins, shares in self._matrices:
-                np.matmul(power[..., bins], shares, out=seen[..., axis_bins])
+        rows = power.size // power.shape[-1]
+        if rows >= MATRIX_ROWS:
+            # all spectra under one another: one product of matrices instead of one for each record
+            flat, means = power.reshape(rows, -1), out.reshape(rows, -1)[:, self.seen]
+            for bins, axis_bins, shares in self._small if rows >= _SMALL_MATRIX_ROWS else self._large:
+                np.matmul(flat[:, bins], shares, out=means[:, axis_bins])
         else:
             np.multiply(self._pooled(np.add, power)[..., ::-1], self._shares, out=seen)
         if per_unit is not None:
@@ -108,15 +112,22 @@ class Pooling:
         return np.ascontiguousarray(1 / self.counts[::-1])
 
     @cached_property
-    def _matrices(self) -> list[tuple[slice, slice, NDArray[np.float32]]]:
+    def _small(self) -> list[tuple[slice, slice, NDArray[np.float32]]]:
+        return self._matrices(16)
+
+    @cached_property
+    def _large(self) -> list[tuple[slice, slice, NDArray[np.float32]]]:
+        return self._matrices(48)
+
+    def _matrices(self, run: int) -> list[tuple[slice, slice, NDArray[np.float32]]]:
         """The pooling as matrices: which spectrum bins each takes, which seen axis bins it gives, and the shares.
 
-        A run of `_RUN` axis bins needs few spectrum bins, so the zeros that are multiplied too do not matter.
+        A run of axis bins needs few spectrum bins, so the zeros that are multiplied too do not matter.
         """
         stops = self.starts + self.counts.astype(np.intp)
         out = []
-        for first in range(0, len(self.starts), _RUN):
-            starts, ends = self.starts[first : first + _RUN], stops[first : first + _RUN]
+        for first in range(0, len(self.starts), run):
+            starts, ends = self.starts[first : first + run], stops[first : first + run]
             low, high = int(starts[0]), int(ends.max())
             position = np.arange(low, high)[:, None]
             inside = (position >= starts) & (position < ends)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axis import pooling
-from .spectrum import Spectrum, centred_power, per_floor, scaled, sums
+from .spectrum import Spectrum, centred_power, per_floor, scaled, sums, windows
 
 #: Parts of a dwell, half overlapping, each a quarter of it long.
 PARTS = 7
@@ -31,8 +31,7 @@ def frames(iq: NDArray[np.complex64], length: int, count: int) -> NDArray[np.com
     """
     starts, hop = _frame_starts(iq.shape[-1], length, count)
     if hop:
-        shape, strides = (*iq.shape[:-1], count, length), (*iq.strides[:-1], hop * iq.strides[-1], iq.strides[-1])
-        return np.lib.stride_tricks.as_strided(iq, shape, strides, writeable=False)
+        return windows(iq, (count, length), (hop, 1))
     return np.lib.stride_tricks.sliding_window_view(iq, length, axis=-1)[..., starts, :]
 
 

@@ -3,6 +3,7 @@ import pytest
 from bladewing.features import axis as axis_module
 from bladewing.features import doppler_spectrum
 from bladewing.features.axis import LIMIT_MPS, UNSEEN_DB, axis_edges_mps, axis_velocities_mps, pooling
+from bladewing.features.spectrum import LOWEST_DB
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -68,18 +69,19 @@ def test_noise_lies_at_zero_db_in_mean_and_peak():
     assert abs(10 * np.log10(np.median(peak))) < 1.0
 
 
-@pytest.mark.parametrize(("bins", "prf_hz"), [(65, 2e3), (500, 25e3), (512, 25e3), (1024, 90e3)])
-def test_matrices_and_plain_sums_pool_alike(monkeypatch, bins, prf_hz):
-    power = np.random.default_rng(bins).exponential(size=(3, 2, bins)).astype(np.float32) * np.logspace(0, 8, bins)
+@pytest.mark.parametrize("rows", [2, 30])
+@pytest.mark.parametrize(("bins", "prf_hz"), [(65, 2e3), (500, 25e3), (512, 25e3), (1024, 90e3), (5000, 25e3)])
+def test_matrices_and_plain_sums_pool_alike(monkeypatch, bins, prf_hz, rows):
+    power = np.random.default_rng(bins).exponential(size=(3, rows, bins)).astype(np.float32) * np.logspace(0, 8, bins)
     pool = pooling(bins, 10e9, prf_hz, 256)
     unit = np.float32([[[2.0]], [[3.0]], [[1.0]]])
     fast = pool.mean_db(power.astype(np.float32), 1 / unit, from_floor=True)
-    monkeypatch.setattr(axis_module, "COARSE", 0)
+    monkeypatch.setattr(axis_module, "MATRIX_ROWS", 1000)
     plain = pool.mean_db((power / unit).astype(np.float32))
-    assert fast.shape == (3, 2, 256)
+    assert fast.shape == (3, rows, 256)
     np.testing.assert_allclose(fast, np.maximum(plain, 0), atol=1e-4)
     rows = [
         np.mean((power / unit)[..., s : s + int(n)], axis=-1) for s, n in zip(pool.starts, pool.counts, strict=True)
     ]
-    expected = 10 * np.log10(np.stack(rows[::-1], axis=-1))
+    expected = np.maximum(10 * np.log10(np.stack(rows[::-1], axis=-1)), LOWEST_DB)
     np.testing.assert_allclose(plain[..., pool.seen], expected, atol=1e-4)
