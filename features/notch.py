@@ -84,7 +84,8 @@ def parabola_offset(
 def notch_mask(spectrum: Spectrum, body: Body, notch_mps: float = NOTCH_MPS) -> NDArray[np.bool_]:
     """True outside the notches about the body line and about velocity zero, shape (..., bins).
 
-    Distances are taken around the circle of the unambiguous velocities.
+    Distances are taken around the circle of the unambiguous velocities. The bin at half the PRF does not count: it is
+    on neither side, and what is measured shall not depend on the sign of the velocity.
 
     Parameters
     ----------
@@ -116,7 +117,9 @@ def _notches(bins: int, half: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]
     position = np.arange(2 * bins)
     distance = position % bins
     far = np.minimum(distance, bins - distance) > half
-    return np.abs(position[:bins] - bins // 2) > half, np.lib.stride_tricks.sliding_window_view(far, bins)
+    keep = np.abs(position[:bins] - bins // 2) > half
+    keep[: (bins + 1) % 2] = False
+    return keep, np.lib.stride_tricks.sliding_window_view(far, bins)
 
 
 def weights(mask: Mask) -> NDArray[np.float32]:

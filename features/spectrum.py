@@ -117,11 +117,12 @@ def sums(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.vecdot(values, ones(values.shape[-1]))
 
 
-def windows(values: NDArray, shape: tuple[int, ...], steps: tuple[int, ...]) -> NDArray:
-    """View of the last axis as one of several axes, shape (..., *shape), with so many elements from one to the next."""
+def windows(values: NDArray, shape: tuple[int, ...], steps: tuple[int, ...], first: int = 0) -> NDArray:
+    """The last axis from an element on seen as axes of so many elements and steps, shape (..., *shape), to be read."""
     values = np.ascontiguousarray(values)
     strides = (*values.strides[:-1], *(step * values.itemsize for step in steps))
-    return np.ndarray((*values.shape[:-1], *shape), values.dtype, values, strides=strides)
+    # a sixth of the time of `as_strided`
+    return np.ndarray((*values.shape[:-1], *shape), values.dtype, values, first * values.itemsize, strides)
 
 
 @lru_cache(maxsize=64)
@@ -250,9 +251,10 @@ def noise_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
         return power.mean(axis=-1)
     size = max(1, half // _FLOOR_BLOCKS)
     blocks = half // size
-    # the two sides, each in its blocks
-    steps = (power.shape[-1] - blocks * size, size, 1)
-    means = np.matmul(windows(power, (2, blocks, size), steps), ones(size))
+    # two sides alike, each in its blocks, without the bin at half the PRF, which has no mirror
+    lower = (power.shape[-1] + 1) % 2
+    sides = windows(power, (2, blocks, size), (power.shape[-1] - lower - blocks * size, size, 1), lower)
+    means = np.matmul(sides, ones(size))
     rank = round(_FLOOR_QUANTILE * (blocks - 1))
     means.partition(rank, axis=-1)
     one, other = means[..., 0, rank], means[..., 1, rank]

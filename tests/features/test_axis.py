@@ -45,9 +45,15 @@ def test_a_line_lands_on_its_velocity_for_every_radar(carrier_hz, span_mps, puls
 def test_every_group_is_within_the_spectrum_and_in_order(bins, carrier_hz, prf_hz):
     pool = pooling(bins, carrier_hz, prf_hz, 256)
     assert (np.diff(pool.starts) >= 0).all()
-    assert 0 <= pool.starts[0] <= pool.starts[-1] < pool.stop <= bins
-    assert len(pool.starts) == len(pool.counts) == pool.seen.stop - pool.seen.start
-    assert (pool.counts >= 1).all()
+    first, counts = pool.spans
+    assert len(first) == len(counts) == pool.seen.stop - pool.seen.start == 2 * len(pool.starts)
+    assert (counts >= 1).all()
+    assert (first >= 0).all()
+    assert (first + counts <= bins).all()
+    # every bin of frequency below the limits of radar and axis is in one of a side at least
+    held = {bin_ for a, n in zip(first, counts, strict=True) for bin_ in range(a, a + n)}
+    assert held == set(range(min(held), max(held) + 1))
+    assert min(held) + max(held) == 2 * (bins // 2)
 
 
 def test_bins_beyond_the_unambiguous_span_are_marked_unseen():
@@ -80,8 +86,16 @@ def test_matrices_and_plain_sums_pool_alike(monkeypatch, bins, prf_hz, rows):
     plain = pool.mean_db((power / unit).astype(np.float32))
     assert fast.shape == (3, rows, 256)
     np.testing.assert_allclose(fast, np.maximum(plain, 0), atol=1e-4)
-    rows = [
-        np.mean((power / unit)[..., s : s + int(n)], axis=-1) for s, n in zip(pool.starts, pool.counts, strict=True)
-    ]
-    expected = np.maximum(10 * np.log10(np.stack(rows[::-1], axis=-1)), LOWEST_DB)
+    rows = [np.mean((power / unit)[..., s : s + int(n)], axis=-1) for s, n in zip(*pool.spans, strict=True)]
+    expected = np.maximum(10 * np.log10(np.stack(rows, axis=-1)), LOWEST_DB)
     np.testing.assert_allclose(plain[..., pool.seen], expected, atol=1e-4)
+
+
+@settings(max_examples=60, deadline=None)
+@given(bins=st.integers(16, 3000), carrier_hz=st.floats(2e9, 100e9), prf_hz=st.floats(1e3, 1e5), rows=st.integers(1, 5))
+def test_a_mirrored_spectrum_is_mirrored_on_the_axis(bins, carrier_hz, prf_hz, rows):
+    power = np.random.default_rng(bins).exponential(size=(rows, bins)).astype(np.float32)
+    mirrored = power[:, (2 * (bins // 2) - np.arange(bins)) % bins]
+    pool = pooling(bins, carrier_hz, prf_hz, 256)
+    np.testing.assert_allclose(pool.mean_db(mirrored), pool.mean_db(power)[:, ::-1], atol=1e-4)
+    np.testing.assert_array_equal(pool.peak_db(mirrored), pool.peak_db(power)[:, ::-1])
