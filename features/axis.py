@@ -14,11 +14,12 @@ KNEE_MPS = 4.0
 #: Outer edge of the axis [m/s], beyond the fastest tips (below Mach 0.6).
 LIMIT_MPS = 200.0
 
-#: From so many spectra on they are averaged by matrices; of fewer the sums are faster one by one.
-MATRIX_ROWS = 4
+#: Spectra of up to so many bins to one of the axis are averaged by matrices; longer sums are faster one by one.
+COARSE = 4
 
-#: From so many on by small matrices, which multiply fewer zeros, but there are more of them.
-_SMALL_MATRIX_ROWS = 64
+#: Most axis bins and spectrum bins of a matrix. Larger products are cut into parts by how many spectra there are, and a
+#: record would then be summed in another order among others than alone.
+_RUN, _LONGEST_SUM = 16, 256
 
 #: Level of a bin outside the radar's unambiguous span [dB]: lower than any noise, so "not seen" differs from "empty".
 UNSEEN_DB = LOWEST_DB / 2
@@ -82,11 +83,15 @@ class Pooling:
         """
         out, seen = self._blank(power.shape[:-1])
         rows = power.size // power.shape[-1]
-        if rows >= MATRIX_ROWS:
+        if power.shape[-1] <= COARSE * self.bins and rows > 1:
             # all spectra under one another: one product of matrices instead of one for each record
             flat, means = power.reshape(rows, -1), out.reshape(rows, -1)[:, self.seen]
-            for bins, axis_bins, shares in self._small if rows >= _SMALL_MATRIX_ROWS else self._large:
+            for bins, axis_bins, shares in self._matrices:
                 np.matmul(flat[:, bins], shares, out=means[:, axis_bins])
+        elif power.shape[-1] <= COARSE * self.bins:
+            # a product of a single row would be summed in another order than the row is among others
+            twice = np.repeat(power.reshape(1, -1), 2, axis=0)
+            return self.mean_db(twice, per_unit, from_floor=from_floor)[0].reshape(out.shape)
         else:
             self._pooled(np.add, power, seen)
             seen *= self._shares
@@ -128,14 +133,7 @@ class Pooling:
         return (1 / self.spans[1]).astype(np.float32)
 
     @cached_property
-    def _small(self) -> list[tuple[slice, slice, NDArray[np.float32]]]:
-        return self._matrices(16)
-
-    @cached_property
-    def _large(self) -> list[tuple[slice, slice, NDArray[np.float32]]]:
-        return self._matrices(48)
-
-    def _matrices(self, run: int) -> list[tuple[slice, slice, NDArray[np.float32]]]:
+    def _matrices(self) -> list[tuple[slice, slice, NDArray[np.float32]]]:
         """The pooling as matrices: which spectrum bins each takes, which seen axis bins it gives, and the shares.
 
         A run of axis bins needs few spectrum bins, so the zeros that are multiplied too do not matter.
@@ -143,8 +141,14 @@ class Pooling:
         starts, counts = self.spans
         stops = starts + counts
         out = []
-        for first in range(0, len(starts), run):
-            axis_bins = slice(first, min(first + run, len(starts)))
+        stop = 0
+        while stop < len(starts):
+            first, stop = stop, min(stop + _RUN, len(starts))
+            while stop > first + 2 and stops[first:stop].max() - starts[first:stop].min() > _LONGEST_SUM:
+                stop -= 1
+            if len(starts) - stop == 1:  # a single column would be summed in another order
+                stop -= 1
+            axis_bins = slice(first, stop)
             low, high = int(starts[axis_bins].min()), int(stops[axis_bins].max())
             position = np.arange(low, high)[:, None]
             inside = (position >= starts[axis_bins]) & (position < stops[axis_bins])

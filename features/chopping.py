@@ -30,6 +30,7 @@ CLIP_DB = 30.0
 
 _LEAST = np.float32(1e-30)  # divides in the stead of 0
 _BLOCK = 32
+_BEFORE = np.triu(np.ones((_BLOCK, _BLOCK), np.float32), 1)
 
 _NEIGHBOURS = np.array([[-1], [0], [1]])
 _DIVISORS = np.array([[2], [3], [4]])
@@ -139,22 +140,14 @@ def prominence(heights: NDArray[np.float32]) -> NDArray[np.float32]:
 def _sums_before(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Sum of all values before each, shape (..., some more than values), the sum of all at their number.
 
-    Within blocks and over the blocks by products with triangles of ones: a third of the time of a running sum, and no
-    long chain of roundings.
+    Within blocks by a product with a triangle of ones: half the time of a running sum, and no long chain of roundings.
     """
     count = values.shape[-1]
     padded = np.zeros((*values.shape[:-1], count // _BLOCK + 1, _BLOCK), np.float32)
     padded.reshape(*values.shape[:-1], -1)[..., :count] = values
-    flat = padded.reshape(-1, _BLOCK)
-    out = (flat @ _triangle(_BLOCK)).reshape(padded.shape)
-    out += (sums(padded) @ _triangle(padded.shape[-2]))[..., None]
+    out = padded @ _BEFORE
+    out[..., 1:, :] += np.add.accumulate(sums(padded[..., :-1, :]), axis=-1)[..., None]
     return out.reshape(*values.shape[:-1], -1)
-
-
-@lru_cache(maxsize=64)
-def _triangle(count: int) -> NDArray[np.float32]:
-    """Ones where the row is before the column."""
-    return np.triu(np.ones((count, count), np.float32), 1)
 
 
 @lru_cache(maxsize=64)

@@ -82,7 +82,7 @@ def test_matrices_and_plain_sums_pool_alike(monkeypatch, bins, prf_hz, rows):
     pool = pooling(bins, 10e9, prf_hz, 256)
     unit = np.float32([[[2.0]], [[3.0]], [[1.0]]])
     fast = pool.mean_db(power.astype(np.float32), 1 / unit, from_floor=True)
-    monkeypatch.setattr(axis_module, "MATRIX_ROWS", 1000)
+    monkeypatch.setattr(axis_module, "COARSE", 0)
     plain = pool.mean_db((power / unit).astype(np.float32))
     assert fast.shape == (3, rows, 256)
     np.testing.assert_allclose(fast, np.maximum(plain, 0), atol=1e-4)

@@ -64,6 +64,16 @@ def test_a_target_120_db_over_the_noise_overflows_nothing():
     assert 1 < named["frame_kurtosis"] < 40
 
 
+@pytest.mark.parametrize("pulses", [16, 77, 500, 1000, 2048, 3000])
+def test_batch_equals_loop_bit_for_bit(pulses):
+    iq = np.stack([scene(seed)[:pulses] for seed in range(40)])
+    batch = model_inputs(iq, **RADAR)
+    for i in range(len(iq)):
+        one = model_inputs(iq[i], **RADAR)
+        for name in batch:
+            np.testing.assert_array_equal(batch[name][i], one[name])
+
+
 def test_batch_equals_loop():
     iq = np.stack([scene(seed) * 10.0**seed for seed in range(5)])
     batch = model_inputs(iq, **RADAR, names=ALL)
