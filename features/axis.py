@@ -5,7 +5,6 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from .spectrum import LOWEST_DB, NOISE_BANDWIDTH_BINS, SPEED_OF_LIGHT_MPS, to_db
 
@@ -18,7 +17,9 @@ LIMIT_MPS = 200.0
 #: Spectra of up to so many bins to one of the axis are averaged by matrices; longer sums are faster one by one.
 COARSE = 4
 
-_RUN = 32
+#: Most axis bins and spectrum bins of a matrix. Larger products are cut into parts by how many spectra there are, and a
+#: record would then be summed in another order among others than alone.
+_RUN, _LONGEST_SUM = 16, 256
 
 #: Level of a bin outside the radar's unambiguous span [dB]: lower than any noise, so "not seen" differs from "empty".
 UNSEEN_DB = LOWEST_DB / 2
@@ -38,16 +39,17 @@ def axis_velocities_mps(bins: int) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Pooling:
-    """How one radar's bins fall onto the shared axis.
+    """How one radar's bins fall onto the shared axis: on both sides alike, so a mirrored spectrum is mirrored there.
 
     Parameters
     ----------
-    starts : ndarray of int, shape (seen,)
-        First spectrum bin of each axis bin that the radar sees, in rising frequency.
-    stop : int
-        End of the last axis bin in the spectrum.
-    counts : ndarray of float32, shape (seen,)
+    starts : ndarray of int, shape (seen / 2,)
+        First spectrum bin of each axis bin of a side, from frequency 0 outwards; both sides hold frequency 0. The bin
+        at half the PRF, which has no mirror, is on neither.
+    counts : ndarray of int, shape (seen / 2,)
         Spectrum bins in each, at least 1: where the axis is finer than the spectrum the nearest bin is repeated.
+    spectrum_bins : int
+        Length of the spectrum.
     seen : slice
         The axis bins (rising velocity) within the unambiguous span.
     bins : int
@@ -55,8 +57,8 @@ class Pooling:
     """
 
     starts: NDArray[np.intp]
-    stop: int
-    counts: NDArray[np.float32]
+    counts: NDArray[np.intp]
+    spectrum_bins: int
     seen: slice
     bins: int
 
@@ -79,84 +81,98 @@ class Pooling:
         ndarray of float32, shape (..., bins)
             [dB]
         """
-        lowest_db = 0.0 if from_floor else LOWEST_DB
-        out = np.empty((*power.shape[:-1], self.bins), np.float32)
-        if len(self.starts) < self.bins:
-            out[..., : self.seen.start] = out[..., self.seen.stop :] = max(UNSEEN_DB, lowest_db)
-        seen = out[..., self.seen]
-        if power.shape[-1] <= COARSE * self.bins:
+        out, seen = self._blank(power.shape[:-1])
+        rows = power.size // power.shape[-1]
+        if power.shape[-1] <= COARSE * self.bins and rows > 1:
+            # all spectra under one another: one product of matrices instead of one for each record
+            flat, means = power.reshape(rows, -1), out.reshape(rows, -1)[:, self.seen]
             for bins, axis_bins, shares in self._matrices:
-                np.matmul(power[..., bins], shares, out=seen[..., axis_bins])
+                np.matmul(flat[:, bins], shares, out=means[:, axis_bins])
+        elif power.shape[-1] <= COARSE * self.bins:
+            # a product of a single row would be summed in another order than the row is among others
+            twice = np.repeat(power.reshape(1, -1), 2, axis=0)
+            return self.mean_db(twice, per_unit, from_floor=from_floor)[0].reshape(out.shape)
         else:
-            np.multiply(self._pooled(np.add, power)[..., ::-1], self._shares, out=seen)
+            self._pooled(np.add, power, seen)
+            seen *= self._shares
         if per_unit is not None:
-            seen *= per_unit
-        to_db(seen, lowest_db, out=seen)
-        return out
+            out *= per_unit
+        return self._levels(out, 0.0 if from_floor else LOWEST_DB)
 
     def peak_db(self, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
         """Largest level of each axis bin over that of noise in as many bins [dB], shape (..., bins)."""
-        peak = self._pooled(np.maximum, relative_power)
-        peak /= self.expected_peak
-        out = np.full((*peak.shape[:-1], self.bins), UNSEEN_DB, np.float32)
-        to_db(peak[..., ::-1], out=out[..., self.seen])
+        out, seen = self._blank(relative_power.shape[:-1])
+        self._pooled(np.maximum, relative_power, seen)
+        seen *= self._per_expected_peak
+        return self._levels(out, LOWEST_DB)
+
+    def _blank(self, shape: tuple[int, ...]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Room for the axis with 0 where nothing is seen, and the part of it that is to be filled."""
+        out = np.empty((*shape, self.bins), np.float32)
+        if self.seen.start:
+            out[..., : self.seen.start] = out[..., self.seen.stop :] = 0
+        return out, out[..., self.seen]
+
+    def _levels(self, out: NDArray[np.float32], lowest_db: float) -> NDArray[np.float32]:
+        """Power to level in place: of the whole axis, which lies in one piece and so takes half the time."""
+        to_db(out, lowest_db, out=out)
+        if self.seen.start and lowest_db < UNSEEN_DB:
+            out[..., : self.seen.start] = out[..., self.seen.stop :] = UNSEEN_DB
         return out
 
     @cached_property
+    def spans(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """First spectrum bin of each seen axis bin, in rising velocity, and how many it holds, shape (seen,) each."""
+        middle = self.spectrum_bins // 2
+        receding, approaching = middle + 1 - self.starts - self.counts, middle + self.starts  # Doppler falls, and rises
+        return np.concatenate([approaching[::-1], receding]), np.concatenate([self.counts[::-1], self.counts])
+
+    @cached_property
     def _shares(self) -> NDArray[np.float32]:
-        """One over the number of spectrum bins in each, in rising velocity, which is falling frequency."""
-        return np.ascontiguousarray(1 / self.counts[::-1])
+        """One over the number of spectrum bins in each."""
+        return (1 / self.spans[1]).astype(np.float32)
 
     @cached_property
     def _matrices(self) -> list[tuple[slice, slice, NDArray[np.float32]]]:
         """The pooling as matrices: which spectrum bins each takes, which seen axis bins it gives, and the shares.
 
-        A run of `_RUN` axis bins needs few spectrum bins, so the zeros that are multiplied too do not matter.
+        A run of axis bins needs few spectrum bins, so the zeros that are multiplied too do not matter.
         """
-        stops = self.starts + self.counts.astype(np.intp)
+        starts, counts = self.spans
+        stops = starts + counts
         out = []
-        for first in range(0, len(self.starts), _RUN):
-            starts, ends = self.starts[first : first + _RUN], stops[first : first + _RUN]
-            low, high = int(starts[0]), int(ends.max())
+        stop = 0
+        while stop < len(starts):
+            first, stop = stop, min(stop + _RUN, len(starts))
+            while stop > first + 2 and stops[first:stop].max() - starts[first:stop].min() > _LONGEST_SUM:
+                stop -= 1
+            if len(starts) - stop == 1:  # a single column would be summed in another order
+                stop -= 1
+            axis_bins = slice(first, stop)
+            low, high = int(starts[axis_bins].min()), int(stops[axis_bins].max())
             position = np.arange(low, high)[:, None]
-            inside = (position >= starts) & (position < ends)
-            shares = np.ascontiguousarray((inside / (ends - starts))[:, ::-1], np.float32)
-            stop = len(self.starts) - first
-            out.append((slice(low, high), slice(stop - len(starts), stop), shares))
+            inside = (position >= starts[axis_bins]) & (position < stops[axis_bins])
+            shares = np.ascontiguousarray(inside * self._shares[axis_bins], np.float32)
+            out.append((slice(low, high), axis_bins, shares))
         return out
 
     @cached_property
     def expected_peak(self) -> NDArray[np.float32]:
-        """Mean of the largest of so many exponentials."""
-        independent = np.maximum(self.counts / np.float32(NOISE_BANDWIDTH_BINS), 1)
+        """Mean of the largest of so many exponentials, in rising velocity."""
+        independent = np.maximum(self.spans[1] / NOISE_BANDWIDTH_BINS, 1)
         return np.maximum(np.log(independent) + np.euler_gamma, 1).astype(np.float32)
 
     @cached_property
-    def _single(self) -> slice:
-        """The longest run of axis bins about the middle that hold one spectrum bin each."""
-        single = self.counts == 1
-        single[-1] &= self.starts[-1] + 1 == self.stop
-        middle = len(single) // 2
-        below, above = np.flatnonzero(~single[:middle]), np.flatnonzero(~single[middle:])
-        first = int(below[-1]) + 1 if len(below) else 0
-        return slice(first, max(first, middle + int(above[0]) if len(above) else len(single)))
+    def _per_expected_peak(self) -> NDArray[np.float32]:
+        return np.reciprocal(self.expected_peak)
 
-    def _pooled(self, operation: np.ufunc, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Sum or largest of the spectrum bins of each seen axis bin, in rising frequency."""
-        single, starts = self._single, self.starts
-        out = np.empty((*relative_power.shape[:-1], len(starts)), np.float32)
-        # most bins of the axis hold a single one of a coarse spectrum: no need to reduce those
-        np.take(relative_power, starts[single], axis=-1, out=out[..., single], mode="clip")
-        if single.start > 0:
-            stop = starts[single.start] if single.start < len(starts) else self.stop
-            operation.reduceat(
-                relative_power[..., :stop], starts[: single.start], axis=-1, out=out[..., : single.start]
-            )
-        if single.stop < len(starts):
-            operation.reduceat(
-                relative_power[..., : self.stop], starts[single.stop :], axis=-1, out=out[..., single.stop :]
-            )
-        return out
+    def _pooled(self, operation: np.ufunc, relative_power: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+        """Write the sum or the largest of the spectrum bins of each seen axis bin, in rising velocity."""
+        side, middle, reach = len(self.starts), self.spectrum_bins // 2, int(self.starts[-1] + self.counts[-1])
+        rising = relative_power[..., middle : middle + reach]
+        falling = relative_power[..., middle + 1 - reach : middle + 1][..., ::-1]
+        operation.reduceat(rising, self.starts, axis=-1, out=out[..., :side][..., ::-1])
+        operation.reduceat(falling, self.starts, axis=-1, out=out[..., side:])
 
 
 @lru_cache(maxsize=64)
@@ -176,21 +192,16 @@ def pooling(spectrum_bins: int, carrier_hz: float, prf_hz: float, bins: int) -> 
     -------
     Pooling
     """
-    wavelength = SPEED_OF_LIGHT_MPS / carrier_hz
-    frequency = fft.fftshift(fft.fftfreq(spectrum_bins, 1 / prf_hz))
-    step = prf_hz / spectrum_bins
-    edges = -axis_edges_mps(bins)[::-1] * 2 / wavelength  # Doppler [Hz], rising
-    low, high = edges[:-1], edges[1:]
-    centre = (low + high) / 2
-    within = np.abs(centre) <= prf_hz / 2
-    within[bins // 2 - 1 : bins // 2 + 1] = True  # the innermost bins hold frequency 0, however slow the radar
-    inside = np.flatnonzero(within)
-    first = np.searchsorted(frequency, low[inside])
-    stop = np.searchsorted(frequency, high[inside])
-    nearest = np.clip(np.rint((centre[inside] - frequency[0]) / step).astype(np.intp), 0, spectrum_bins - 1)
-    starts = np.minimum(np.where(stop > first, first, nearest), spectrum_bins - 1)
+    step_mps = prf_hz / spectrum_bins * SPEED_OF_LIGHT_MPS / carrier_hz / 2
+    edges = axis_edges_mps(bins)[bins // 2 :] / step_mps  # of one side, in bins of the spectrum
+    centre = (edges[:-1] + edges[1:]) / 2
+    within = centre <= spectrum_bins / 2
+    within[0] = True  # the innermost bins hold frequency 0, however slow the radar
+    side, reach = np.count_nonzero(within), (spectrum_bins + 1) // 2
+    first = np.minimum(np.ceil(edges[: side + 1]).astype(np.intp), reach)
+    nearest = np.rint(centre[:side]).astype(np.intp)
+    starts = np.minimum(np.where(first[1:] > first[:-1], first[:-1], nearest), reach - 1)
     starts = np.maximum.accumulate(starts)
-    end = max(int(stop[-1]), int(starts[-1]) + 1)
-    counts = np.maximum(np.diff(starts, append=end), 1).astype(np.float32)
-    seen = slice(bins - 1 - int(inside[-1]), bins - int(inside[0]))
-    return Pooling(starts, end, counts, seen, bins)
+    end = max(int(first[-1]), int(starts[-1]) + 1)
+    counts = np.maximum(np.diff(starts, append=end), 1)
+    return Pooling(starts, counts, spectrum_bins, slice(bins // 2 - side, bins // 2 + side), bins)

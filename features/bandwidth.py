@@ -16,6 +16,7 @@ _BLOCK = 32
 _TAILS = np.array([[TAIL_SHARE], [1 - TAIL_SHARE]])
 
 
+@lru_cache(maxsize=64)
 def noise_threshold_db(bins: int, false_alarm: float = 1e-2) -> float:
     """Level that noise alone exceeds in any of so many bins with that probability [dB over the floor]."""
     return float(10 * np.log10(np.log(bins / false_alarm)))

@@ -6,10 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axis import pooling
-from .spectrum import Spectrum, centred_power, per_floor, scaled, sums
+from .spectrum import Spectrum, at_least, centred_power, per_floor, scaled, sums, windows
 
 #: Parts of a dwell, half overlapping, each a quarter of it long.
 PARTS = 7
+
+#: Products with these give the mean of the parts, and each less that mean: half the time of sums over the parts.
+_MEAN = np.full(PARTS, 1 / PARTS, np.float32)
+_LESS_MEAN = (np.eye(PARTS) - 1 / PARTS).astype(np.float32)
 
 
 def part_length(pulses: int) -> int:
@@ -31,8 +35,7 @@ def frames(iq: NDArray[np.complex64], length: int, count: int) -> NDArray[np.com
     """
     starts, hop = _frame_starts(iq.shape[-1], length, count)
     if hop:
-        shape, strides = (*iq.shape[:-1], count, length), (*iq.strides[:-1], hop * iq.strides[-1], iq.strides[-1])
-        return np.lib.stride_tricks.as_strided(iq, shape, strides, writeable=False)
+        return windows(iq, (count, length), (hop, 1))
     return np.lib.stride_tricks.sliding_window_view(iq, length, axis=-1)[..., starts, :]
 
 
@@ -83,19 +86,17 @@ def parts_db(iq: NDArray[np.complex64], spectrum: Spectrum, axis_bins: int) -> N
 
 def change_db(parts: NDArray[np.float32]) -> NDArray[np.float32]:
     """Standard deviation of the level over the parts, on the shared axis [dB], shape (..., axis bins)."""
-    share = np.float32(1 / PARTS)
     # not the difference of squares: that is mostly rounding where it is small
-    away = parts - np.add.reduce(parts, axis=-2, keepdims=True) * share
+    away = np.matmul(_LESS_MEAN, parts)
     away *= away
-    out = np.add.reduce(away, axis=-2)
-    out *= share
+    out = np.matmul(_MEAN, away)
     return np.sqrt(out, out=out)
 
 
 def centroid_mps(parts: NDArray[np.float32], axis_mps: NDArray[np.float32]) -> NDArray[np.float32]:
     """Centroid of the level over the velocity in each part [m/s], shape (..., PARTS); 0 where nothing is seen."""
-    weight = parts - np.float32(6)
-    np.maximum(weight, np.float32(0), out=weight)
+    weight = at_least(parts, 6)
+    weight -= np.float32(6)
     return np.vecdot(weight, axis_mps) / np.maximum(sums(weight), np.float32(1e-6))
 
 

@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .spectrum import Spectrum, sums
+from .spectrum import Spectrum, at_least, sums, to_db
 
 #: Half width of the notch [m/s]. Set in velocity, not in Hz: a wingbeat of 18 Hz is not a Doppler of 18 Hz, and a
 #: bird's body with its heave stays within this of its mean at every carrier.
@@ -21,6 +21,8 @@ EQUAL_SHARE = np.float32(1 - 1e-5)
 
 #: A top that curves less than this, relative to its height, is flat.
 LEAST_CURVE = np.float32(1e-5)
+
+_AROUND = np.array([-1, 0, 1])
 
 #: True, or 1, where a spectrum counts.
 Mask = NDArray[np.bool_] | NDArray[np.float32]
@@ -60,12 +62,11 @@ def body_line(spectrum: Spectrum) -> Body:
     -------
     Body
     """
-    power = spectrum.relative_power
+    power, bins = spectrum.relative_power, spectrum.bins
     index = (power >= np.maximum.reduce(power, axis=-1, keepdims=True) * EQUAL_SHARE).argmax(axis=-1)
-    bins = spectrum.bins
-    first = np.arange(0, index.size * bins, bins).reshape(index.shape)  # of each spectrum, one behind the other
-    level = spectrum.level_db.reshape(-1)
-    left, middle, right = (level[first + (index + shift) % bins] for shift in (-1, 0, 1))
+    around = (index + _AROUND.reshape(-1, *([1] * index.ndim))) % bins
+    around += np.arange(0, index.size * bins, bins).reshape(index.shape)  # each spectrum's first: one behind the other
+    left, middle, right = to_db(power.reshape(-1)[around])
     step = spectrum.prf_hz / bins * spectrum.wavelength_m / 2
     velocity = spectrum.velocity_mps[index] - parabola_offset(left, middle, right) * step
     return Body(index, velocity.astype(np.float32), middle)
@@ -84,7 +85,8 @@ def parabola_offset(
 def notch_mask(spectrum: Spectrum, body: Body, notch_mps: float = NOTCH_MPS) -> NDArray[np.bool_]:
     """True outside the notches about the body line and about velocity zero, shape (..., bins).
 
-    Distances are taken around the circle of the unambiguous velocities.
+    Distances are taken around the circle of the unambiguous velocities. The bin at half the PRF does not count: it is
+    on neither side, and what is measured shall not depend on the sign of the velocity.
 
     Parameters
     ----------
@@ -116,7 +118,9 @@ def _notches(bins: int, half: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]
     position = np.arange(2 * bins)
     distance = position % bins
     far = np.minimum(distance, bins - distance) > half
-    return np.abs(position[:bins] - bins // 2) > half, np.lib.stride_tricks.sliding_window_view(far, bins)
+    keep = np.abs(position[:bins] - bins // 2) > half
+    keep[: (bins + 1) % 2] = False
+    return keep, np.lib.stride_tricks.sliding_window_view(far, bins)
 
 
 def weights(mask: Mask) -> NDArray[np.float32]:
@@ -126,8 +130,8 @@ def weights(mask: Mask) -> NDArray[np.float32]:
 
 def residual(spectrum: Spectrum, mask: Mask | None = None) -> NDArray[np.float32]:
     """Power over the floor outside the notches (if any), in units of the floor, shape (..., bins); 0 below noise."""
-    excess = spectrum.relative_power - np.float32(1)
-    np.maximum(excess, np.float32(0), out=excess)
+    excess = at_least(spectrum.relative_power, 1)
+    excess -= np.float32(1)
     if mask is not None:
         excess *= weights(mask)
     return excess

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .axis import axis_velocities_mps
 from .notch import Body, Mask, weights
-from .spectrum import Spectrum, sums
+from .spectrum import Spectrum, at_least, sums
 
 #: Edges of the speed bands [m/s]: body and bird speeds below, limbs and wing tips between, blade tips above.
 SPEED_BANDS_MPS = (0.0, 0.8, 2.5, 6.0, 12.0, 22.0, 40.0, 70.0, 110.0, 200.0)
@@ -49,14 +49,13 @@ def _band_shares(bins: int) -> NDArray[np.float32]:
 
 def entropy(energy: NDArray[np.float32]) -> NDArray[np.float32]:
     """Entropy of the energy's distribution over the bins, 0 (one bin) to 1 (even), shape (...); 1 without energy."""
-    peak = np.maximum.reduce(energy, axis=-1, keepdims=True)
-    share = energy * np.reciprocal(np.maximum(peak, np.float32(1e-30)))
-    logs = np.maximum(share, np.float32(1e-12))
+    logs = at_least(energy, 1e-30)
     np.log(logs, out=logs)
-    total = np.maximum(sums(share), np.float32(1e-30))  # 1 or more, or nothing
-    # the mean of -log(share / total)
-    bits = (np.log(total) - np.vecdot(share, logs) / total) / np.float32(math.log(energy.shape[-1]))
-    return np.minimum(np.maximum(bits, 0) + (total < 0.5), np.float32(1))
+    total = sums(energy)
+    some = np.maximum(total, np.float32(1e-30))
+    # the mean of -log(share), the share being energy / total
+    bits = (np.log(some) - np.vecdot(energy, logs) / some) / np.float32(math.log(energy.shape[-1]))
+    return np.minimum(np.maximum(bits, 0) + (total <= 0), np.float32(1))
 
 
 def ripple_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:

@@ -120,32 +120,34 @@ def feature_vector(
     low_hz, high_hz = threshold_band_hz(spectrum, noise_threshold_db(spectrum.bins), mask)
     width_hz = high_hz - low_hz
     low, high, occupancy = energy_band_mps(spectrum, energy)
-    rising = np.abs(high) >= np.abs(low)
 
     axis_mps, change_shares = _axis_plan(axis_db.shape[-1])
     change = change_db(parts) if change is None else change
     changes = (change_shares @ change[..., None])[..., 0]
     centroid = centroid_mps(parts, axis_mps)
-    half = spectrum.bins // 2
+    half, side = spectrum.bins // 2, (spectrum.bins - 1) // 2  # without the bin at half the PRF, which has no mirror
     power = spectrum.relative_power
-    side = [np.maximum(sums(part), np.float32(1e-2 * half)) for part in (power[..., :half], power[..., -half:])]
+    left, right = sums(power[..., half - side : half]), sums(power[..., half + 1 : half + 1 + side])
+    emptiest = np.float32(1e-2 * side)
     peak = np.maximum.reduce(excess, axis=-1)
     chopping_hz = np.maximum(chopping.frequency_hz, np.float32(1))
     half_wavelength_m = np.float32(spectrum.wavelength_m / 2)
     dwell_s = np.float32(spectrum.pulses / spectrum.prf_hz)
 
+    speed_mps = np.abs(body.velocity_mps)  # refined from the bin at half the PRF it may lie beyond: folded back
+
     columns: dict[str, ArrayLike] = {
         **radar_columns(spectrum),
         "body_level_db": body.level_db,
-        "body_speed_mps": np.abs(body.velocity_mps),
+        "body_speed_mps": np.minimum(speed_mps, np.float32(spectrum.prf_hz * spectrum.wavelength_m / 2) - speed_mps),
         "rest_level_db": np.maximum.reduce(spectrum.level_db[..., half - 1 : half + 2], axis=-1),
         "notch_residual_db": residual_db,
         "notch_residual_share": sums(excess) / np.maximum(total, np.float32(1e-30)),
         "bandwidth_log": np.log10(np.maximum(width_hz, np.float32(1))),
         "bandwidth_speed_mps": width_hz * half_wavelength_m,
         "span_share": width_hz * np.float32(1 / spectrum.prf_hz),
-        "energy_speed_high_mps": np.where(rising, high, -low),
-        "energy_speed_low_mps": np.where(rising, low, -high),
+        "energy_speed_high_mps": np.maximum(high, -low),
+        "energy_speed_low_mps": np.maximum(low, -high),
         "energy_width_mps": high - low,
         "occupancy": occupancy,
         "entropy": entropy(energy),
@@ -165,7 +167,7 @@ def feature_vector(
         "centroid_swing_mps": swing(centroid),
         "centroid_drift_mps": np.abs(centroid[..., -1] - centroid[..., 0]),
         "busy_swing_db": swing(busy_db(parts)),
-        "empty_side_db": np.abs(np.log10(side[0] / side[1])) * np.float32(10),
+        "empty_side_db": np.abs(np.log10(np.maximum(left, emptiest) / np.maximum(right, emptiest))) * np.float32(10),
     }
     for names, levels in zip(_BANDS, band_levels_db(axis_db), strict=True):
         columns.update(zip(names, levels.reshape(-1, len(names)).T, strict=True))

@@ -108,25 +108,27 @@ def _feature_vector(radar: Spectrum, relative_power: Value, axis_db: Value, part
     residual_db = 10.0 * log10(((relative_power * kept).sum() / kept.sum().at_least(1.0)).at_least(1e-2))
     width_hz = threshold_width_hz(radar, relative_power, kept)
     low, high, occupancy = energy_band(radar, energy)
-    faster_positive = high.apply("Abs") >= low.apply("Abs")
     changes = change_levels_db(change, AXIS_BINS)
     centroid = centroid_mps(parts_db, AXIS_BINS)
     strong, weak = band_levels_db(axis_db, AXIS_BINS)
-    half = bins // 2
-    left, right = relative_power.slice(0, half).mean(), relative_power.slice(bins - half, bins).mean()
+    half, side = bins // 2, (bins - 1) // 2
+    left = relative_power.slice(half - side, half).mean()
+    right = relative_power.slice(half + 1, half + 1 + side).mean()
+
+    speed_mps = body.velocity_mps.apply("Abs")
 
     columns: dict[str, Value | float] = {
         **radar_columns(radar),
         "body_level_db": body.level_db,
-        "body_speed_mps": body.velocity_mps.apply("Abs"),
+        "body_speed_mps": speed_mps.at_most(radar.prf_hz * radar.wavelength_m / 2 - speed_mps),
         "rest_level_db": level_db.slice(half - 1, half + 2).max(),
         "notch_residual_db": residual_db,
         "notch_residual_share": ratio(excess.sum(), over.sum()),
         "bandwidth_log": log10(width_hz.at_least(1.0)),
         "bandwidth_speed_mps": width_hz * (radar.wavelength_m / 2),
         "span_share": width_hz / radar.prf_hz,
-        "energy_speed_high_mps": graph.where(faster_positive, high, -low),
-        "energy_speed_low_mps": graph.where(faster_positive, low, -high),
+        "energy_speed_high_mps": high.at_least(-low),
+        "energy_speed_low_mps": low.at_least(-high),
         "energy_width_mps": high - low,
         "occupancy": occupancy,
         "entropy": entropy(energy, bins),

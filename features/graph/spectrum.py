@@ -74,13 +74,13 @@ def unit_scale(largest: Value) -> Value:
 
 def noise_floor(power: Value, bins: int) -> Value:
     """As `spectrum.noise_floor`, shape (n, 1)."""
-    half = bins // 2
+    half, lower = bins // 2, (bins + 1) % 2
     size = max(1, half // definition._FLOOR_BLOCKS)
     blocks = half // size
     rank = round(definition._FLOOR_QUANTILE * (blocks - 1))
     sides = [
         side.reshape(-1, blocks, size).sum(keep=False) / size
-        for side in (power.slice(0, blocks * size), power.slice(bins - blocks * size, bins))
+        for side in (power.slice(lower, lower + blocks * size), power.slice(bins - blocks * size, bins))
     ]
     one, other = (side.ranked(rank) for side in sides)
     least, most = one.at_most(other), one.at_least(other)
@@ -97,18 +97,17 @@ def to_db(relative_power: Value) -> Value:
 
 def pooled(relative_power: Value, pool: Pooling) -> tuple[Value, Value]:
     """As `Pooling.mean_db` and `Pooling.peak_db`, shape (n, axis bins) each."""
-    counts = pool.counts[::-1].astype(np.int64)  # rising velocity: falling frequency
+    starts, counts = pool.spans
     place = np.arange(counts.max())
-    gathered = relative_power.take(pool.starts[::-1, None] + np.minimum(place, counts[:, None] - 1))
+    gathered = relative_power.take(starts[:, None] + np.minimum(place, counts[:, None] - 1))
     share = ((place < counts[:, None]) / counts[:, None]).astype(np.float32)
     mean = (gathered * share).sum(keep=False)
-    return _place(mean, pool), _place(gathered.max(keep=False) / pool.expected_peak[::-1], pool)
+    return _place(mean, pool), _place(gathered.max(keep=False) / pool.expected_peak, pool)
 
 
 def pooled_mean(relative_power: Value, pool: Pooling) -> Value:
     """As `Pooling.mean_db` where levels far under the strongest need not be exact."""
-    counts = pool.counts[::-1].astype(np.int64)
-    starts = pool.starts[::-1]
+    starts, counts = pool.spans
     upto = relative_power.cumsum().pad(1, 0)
     total = upto.take(starts + counts) - upto.take(starts)
     return _place((total / counts.astype(np.float64)).to(np.float32), pool)

@@ -3,6 +3,7 @@ import pytest
 from bladewing.features import axis as axis_module
 from bladewing.features import doppler_spectrum
 from bladewing.features.axis import LIMIT_MPS, UNSEEN_DB, axis_edges_mps, axis_velocities_mps, pooling
+from bladewing.features.spectrum import LOWEST_DB
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -44,9 +45,15 @@ def test_a_line_lands_on_its_velocity_for_every_radar(carrier_hz, span_mps, puls
 def test_every_group_is_within_the_spectrum_and_in_order(bins, carrier_hz, prf_hz):
     pool = pooling(bins, carrier_hz, prf_hz, 256)
     assert (np.diff(pool.starts) >= 0).all()
-    assert 0 <= pool.starts[0] <= pool.starts[-1] < pool.stop <= bins
-    assert len(pool.starts) == len(pool.counts) == pool.seen.stop - pool.seen.start
-    assert (pool.counts >= 1).all()
+    first, counts = pool.spans
+    assert len(first) == len(counts) == pool.seen.stop - pool.seen.start == 2 * len(pool.starts)
+    assert (counts >= 1).all()
+    assert (first >= 0).all()
+    assert (first + counts <= bins).all()
+    # every bin of frequency below the limits of radar and axis is in one of a side at least
+    held = {bin_ for a, n in zip(first, counts, strict=True) for bin_ in range(a, a + n)}
+    assert held == set(range(min(held), max(held) + 1))
+    assert min(held) + max(held) == 2 * (bins // 2)
 
 
 def test_bins_beyond_the_unambiguous_span_are_marked_unseen():
@@ -68,18 +75,27 @@ def test_noise_lies_at_zero_db_in_mean_and_peak():
     assert abs(10 * np.log10(np.median(peak))) < 1.0
 
 
-@pytest.mark.parametrize(("bins", "prf_hz"), [(65, 2e3), (500, 25e3), (512, 25e3), (1024, 90e3)])
-def test_matrices_and_plain_sums_pool_alike(monkeypatch, bins, prf_hz):
-    power = np.random.default_rng(bins).exponential(size=(3, 2, bins)).astype(np.float32) * np.logspace(0, 8, bins)
+@pytest.mark.parametrize("rows", [2, 30])
+@pytest.mark.parametrize(("bins", "prf_hz"), [(65, 2e3), (500, 25e3), (512, 25e3), (1024, 90e3), (5000, 25e3)])
+def test_matrices_and_plain_sums_pool_alike(monkeypatch, bins, prf_hz, rows):
+    power = np.random.default_rng(bins).exponential(size=(3, rows, bins)).astype(np.float32) * np.logspace(0, 8, bins)
     pool = pooling(bins, 10e9, prf_hz, 256)
     unit = np.float32([[[2.0]], [[3.0]], [[1.0]]])
     fast = pool.mean_db(power.astype(np.float32), 1 / unit, from_floor=True)
     monkeypatch.setattr(axis_module, "COARSE", 0)
     plain = pool.mean_db((power / unit).astype(np.float32))
-    assert fast.shape == (3, 2, 256)
+    assert fast.shape == (3, rows, 256)
     np.testing.assert_allclose(fast, np.maximum(plain, 0), atol=1e-4)
-    rows = [
-        np.mean((power / unit)[..., s : s + int(n)], axis=-1) for s, n in zip(pool.starts, pool.counts, strict=True)
-    ]
-    expected = 10 * np.log10(np.stack(rows[::-1], axis=-1))
+    rows = [np.mean((power / unit)[..., s : s + int(n)], axis=-1) for s, n in zip(*pool.spans, strict=True)]
+    expected = np.maximum(10 * np.log10(np.stack(rows, axis=-1)), LOWEST_DB)
     np.testing.assert_allclose(plain[..., pool.seen], expected, atol=1e-4)
+
+
+@settings(max_examples=60, deadline=None)
+@given(bins=st.integers(16, 3000), carrier_hz=st.floats(2e9, 100e9), prf_hz=st.floats(1e3, 1e5), rows=st.integers(1, 5))
+def test_a_mirrored_spectrum_is_mirrored_on_the_axis(bins, carrier_hz, prf_hz, rows):
+    power = np.random.default_rng(bins).exponential(size=(rows, bins)).astype(np.float32)
+    mirrored = power[:, (2 * (bins // 2) - np.arange(bins)) % bins]
+    pool = pooling(bins, carrier_hz, prf_hz, 256)
+    np.testing.assert_allclose(pool.mean_db(mirrored), pool.mean_db(power)[:, ::-1], atol=1e-4)
+    np.testing.assert_array_equal(pool.peak_db(mirrored), pool.peak_db(power)[:, ::-1])

@@ -222,8 +222,10 @@ def test_longer_looks_keep_what_is_not_about_resolution():
     for pulses in (1024, 4096):
         values = features(white(rng, 60, pulses))
         rows.append({name: np.median(value) for name, value in values.items()})
-    for name in ("notch_residual_db", "ripple_db", "empty_side_db", "strong_6_12_db", "weak_40_70_db"):
+    for name in ("notch_residual_db", "ripple_db", "empty_side_db", "strong_6_12_db"):
         assert rows[0][name] == pytest.approx(rows[1][name], abs=0.8), name
+    # a mean of levels in dB lies the lower the fewer bins each is a mean of: of 600 records by 1.07 dB here
+    assert rows[0]["weak_40_70_db"] == pytest.approx(rows[1]["weak_40_70_db"] - 1.07, abs=0.8)
     for name in ("bandwidth_speed_mps", "span_share"):
         assert rows[0][name] == rows[1][name] == 0
     assert rows[0]["chopping_strength"] == pytest.approx(rows[1]["chopping_strength"], abs=0.8)
