@@ -192,13 +192,13 @@ def _take_or_train(
             return kept["model"].tobytes(), json.loads(kept["account"].tobytes())
         except (KeyError, ValueError) as error:
             raise parts.refusal(name, str(error)) from None
-    content, account = _train_one(name, settings, sets, on_fraction, parts)
+    content, account = train_one(name, settings, sets, on_fraction, parts)
     text = json.dumps(account, allow_nan=False).encode()
     parts.keep_arrays(name, {"model": np.frombuffer(content, np.uint8), "account": np.frombuffer(text, np.uint8)})
     return content, account
 
 
-def _train_one(
+def train_one(
     name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction, parts: Parts | None = None
 ) -> tuple[bytes, dict[str, Any]]:
     """Train, calibrate, export and compare one model; give its sealed file and its account."""

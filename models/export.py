@@ -5,9 +5,11 @@ Every graph reads float32 inputs whose first axis is the batch, the only one tha
 """
 
 import logging
+import tempfile
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -158,6 +160,44 @@ def attach_metadata(onnx_bytes: bytes, metadata: Mapping[str, str]) -> bytes:
     model = onnx.load_model_from_string(onnx_bytes)
     helper.set_model_props(model, {**metadata, SEAL_KEY: PLACEHOLDER})
     return model.SerializeToString(deterministic=True)
+
+
+def in_eight_bits(onnx_bytes: bytes) -> bytes:
+    """Give a network with its weights and products in eight bits, to be weighed against the one it was made of.
+
+    Parameters
+    ----------
+    onnx_bytes
+        A serialised network, as `export_network` or `attach_metadata` gave it.
+
+    Returns
+    -------
+    bytes
+        The network with the same inputs, outputs and metadata, but for the seal, which is to be set again. Weights of
+        8 bits are scaled by tensor, activations by record batch as they come (onnxruntime's dynamic quantisation).
+    """
+    from onnxruntime.quantization import QuantType, quantize_dynamic
+
+    model = onnx.load_model_from_string(onnx_bytes)
+    graph = model.graph
+    halved = {one.name: one for one in graph.initializer if one.data_type == TensorProto.FLOAT16}
+    for node in [node for node in graph.node if node.op_type == "Cast" and node.input[0] in halved]:
+        whole = numpy_helper.to_array(halved[node.input[0]]).astype(np.float32)
+        graph.initializer.append(numpy_helper.from_array(whole, node.output[0]))
+        graph.initializer.remove(halved[node.input[0]])
+        graph.node.remove(node)
+    metadata = {entry.key: entry.value for entry in model.metadata_props}
+    level = logging.root.level
+    logging.root.setLevel(logging.ERROR)  # its advice to optimise first is not for here
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            small = Path(folder) / "small.onnx"
+            quantize_dynamic(
+                model, small, weight_type=QuantType.QUInt8, op_types_to_quantize=["Conv", "MatMul", "Gemm"]
+            )
+            return attach_metadata(small.read_bytes(), {key: metadata[key] for key in metadata if key != SEAL_KEY})
+    finally:
+        logging.root.setLevel(level)
 
 
 def check_export(

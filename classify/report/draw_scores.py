@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, PercentFormatter
 
 from .series import looks
-from .svg import MUTED, NARROW_IN, Panel, drawing, panel
+from .svg import MUTED, NARROW_IN, SERIES, Panel, drawing, panel
 from .words import percent, spoken
 
 GROUPS = ("all", "uav", "bird", "clutter")
@@ -180,6 +180,34 @@ def _called_uav(report: Mapping[str, Any], slug: str, title: str, *, wanted: boo
         axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
         axes.set_xlabel("called UAV")
         return panel(figure, name=f"kinds-{slug}", title=title, alt=f"{title}. {' '.join(words)}")
+
+
+def families(report: Mapping[str, Any]) -> list[Panel]:
+    """Accuracy on each family by a model that was trained on it and by one that was not."""
+    rows = report["families"]["families"]
+    kept, gone = SERIES[2], SERIES[3]
+    title = "Accuracy on a family, with and without it in the training"
+    words = []
+    with drawing(height_in=1.0 + 0.34 * len(rows)) as (figure, axes):
+        for y, row in enumerate(rows):
+            ends = []
+            for key, colour, marker, shift in (("kept", kept, "o", -0.12), ("left_out", gone, "D", 0.12)):
+                one = row[key]["accuracy"]
+                if one["value"] is None:
+                    continue
+                axes.plot([one["low"], one["high"]], [y + shift] * 2, color=colour, linewidth=0.9)
+                axes.plot([one["value"]], [y + shift], color=colour, marker=marker, markersize=4)
+                ends.append(percent(one["value"]))
+            words.append(f"{row['name']}: {' with, '.join(ends)} without.")
+        for line in range(1, len(rows)):
+            axes.axhline(line - 0.5, color=MUTED, linewidth=0.3)
+        axes.grid(visible=False, axis="y")
+        axes.set_ylim(len(rows) - 0.5, -0.5)
+        axes.set_yticks(range(len(rows)), [row["name"] for row in rows])
+        axes.tick_params(axis="y", length=0)
+        axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+        axes.set_xlabel("balanced accuracy")
+        return [panel(figure, name="families", title=title, alt=f"{title}. {' '.join(words)}")]
 
 
 def _slug(name: str) -> str:

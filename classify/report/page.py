@@ -13,7 +13,7 @@ from ..errors import BadInput
 from . import draw_cost, draw_examples, draw_front, draw_scores, summary, words
 from .series import Look, choice_looks, looks
 
-SCHEMA_VERSION = "2"
+SCHEMA_VERSION = "3"
 
 # Marker outlines on a 14 x 14 field, in the order of `svg.MARKERS`.
 _OUTLINES = (
@@ -25,6 +25,8 @@ _OUTLINES = (
     '<path d="M5 1.5h4V5h3.5v4H9v3.5H5V9H1.5V5H5z"/>',
     '<path d="M4.2 1.5 7 4.3l2.8-2.8 2.7 2.7L9.7 7l2.8 2.8-2.7 2.7L7 9.7l-2.8 2.8-2.7-2.7L4.3 7 1.5 4.2z"/>',
     '<path d="M7 1l1.7 4h4.2L9.5 7.6 10.8 12 7 9.4 3.2 12l1.3-4.4L1.1 5h4.2z"/>',
+    '<path d="M2 7 11.6 1.7v10.6z"/>',
+    '<path d="M12 7 2.4 1.7v10.6z"/>',
 )
 
 
@@ -84,6 +86,7 @@ def draw_page(report: Mapping[str, Any]) -> str:
             "dwell": draw_scores.accuracy_by_dwell(report),
             "reliability": draw_scores.reliability(report),
             "kinds": draw_scores.called_uav(report),
+            "families": draw_scores.families(report),
             "choices": draw_front.time_front(report),
             "dwells": draw_front.by_dwell(report),
             "bound": draw_front.by_snr(report),

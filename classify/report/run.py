@@ -7,6 +7,7 @@ import json
 import re
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib import metadata, resources
 from pathlib import Path
@@ -15,6 +16,8 @@ from typing import Any
 import numpy as np
 from bladewing.features.inputs import model_inputs
 from bladewing.features.schema import INPUT_SHAPES, schema_hash
+from bladewing.models import DEFAULT_MODEL
+from bladewing.models.seal import seal
 from bladewing.simulate import Radar, Records, draw_records
 from numpy.typing import NDArray
 
@@ -27,9 +30,11 @@ from ..parts import Parts
 from ..progress import Progress
 from ..stability.run import worst_of_each
 from ..train import ACCOUNT
+from ..training_config import TrainingConfig
 from . import cost, evaluate, scores, stft, storage, trade
 from .card import model_card
 from .examples import OVERLAP, WINDOW, show_examples, show_stfts
+from .families import left_out
 from .front import Given, measure_front
 from .machine import describe_machine
 from .page import SCHEMA_VERSION, draw_page
@@ -110,6 +115,10 @@ def measure(
         with progress.phase("Making the paper's tables", 1.0):
             return make_tables(config.seed)
 
+    def families() -> dict[str, Any]:
+        with progress.phase("Leaving families out", 1.0) as done:
+            return left_out(TrainingConfig(records=config.family_train, seed=config.seed), on_share=done)
+
     machine = parts.take("machine", describe_machine)
     seen = parts.take("scores", scored)
     reference = draw_records(REFERENCE, config.reference_records, config.seed, purpose=REFERENCE_PURPOSE)
@@ -119,6 +128,7 @@ def measure(
         name: Given(content, classifiers[name].inputs, trained.get(name, {}).get("seconds"))
         for name, content in models.items()
     }
+    given |= _in_eight_bits(given)
     compared = measure_front(given, config, REFERENCE, parts=parts, phase=progress.phase)
     return {
         "config": config.model_dump(mode="json"),
@@ -129,6 +139,7 @@ def measure(
         "scores": seen["scores"],
         "reference": {"carrier_hz": REFERENCE.carrier_hz, "prf_hz": REFERENCE.prf_hz, "pulses": REFERENCE.pulses},
         "cost": {"threads": 1, "batches": chain},
+        "families": parts.take("families", families),
         "trade": trade.weigh_up(seen["scores"], chain),
         "front": compared,
         "fft_against_stft": against["against"],
@@ -139,6 +150,16 @@ def measure(
         "tables": parts.take("tables", tables),
         "training": _training(account),
     }
+
+
+def _in_eight_bits(given: Mapping[str, Given]) -> dict[str, Given]:
+    """The default model with its products in eight bits, where it is among those given: only for the front."""
+    from bladewing.models.export import in_eight_bits
+
+    if DEFAULT_MODEL not in given:
+        return {}
+    whole = given[DEFAULT_MODEL]
+    return {f"{DEFAULT_MODEL}-int8": replace(whole, content=seal(in_eight_bits(whole.content)))}
 
 
 def _forms(reference: Records) -> dict[str, NDArray[np.generic]]:

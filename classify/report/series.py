@@ -33,7 +33,7 @@ class Look:
 
 
 def looks(models: Sequence[str]) -> dict[str, Look]:
-    """Give each model its look; strangers take the looks after the known ones, in order, over and over.
+    """Give each model its look; strangers share the last marker and take the colours after the known ones, in turn.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def looks(models: Sequence[str]) -> dict[str, Look]:
     number = {
         name: LADDER.index(name) if name in LADDER else len(LADDER) + strangers.index(name) % spare for name in models
     }
-    return {name: Look(number[name], number[name]) for name in models}
+    return {name: Look(number[name], number[name] if name in LADDER else len(MARKERS) - 1) for name in models}
 
 
 def choice_looks(choices: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], Look]:
@@ -77,7 +77,7 @@ def choice_looks(choices: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], 
             place = families.index(family)
             number = (len(SERIES) - 1 - place) % len(SERIES)
             # a lone one takes a marker that no model has: its colour may be a model's
-            spare = len(LADDER) + place % (len(MARKERS) - len(LADDER))
+            spare = len(LADDER) + place % (len(MARKERS) - 1 - len(LADDER))
             outline = spare if len(among) == 1 else among.index(row["name"]) % len(MARKERS)
             found[row["name"], row["kind"]] = Look(number, outline)
     return found

@@ -21,6 +21,7 @@ QUICK: dict[str, Any] = {
     "front_test": 300,
     "front_epochs": 6,
     "front_s": 0.5,
+    "family_train": 3000,
 }
 
 Seconds = Annotated[float, Field(gt=0, le=3600)]
@@ -53,6 +54,8 @@ class ReportConfig(BaseModel):
     front_epochs: Annotated[int, Field(ge=1, le=1000)] = 12
     #: Time to spend on the timings of each dwell of the front and batch size [s].
     front_s: Seconds = 5.0
+    #: Records that the model is trained on out of which each family is left in turn; as many test it.
+    family_train: Annotated[int, Field(ge=600, le=10_000_000)] = 24_000
 
 
 def report_config(file: Path | None = None, *, seed: int | None = None, quick: bool = False) -> ReportConfig:

@@ -23,7 +23,7 @@ SERIES = tuple(f"#0a00{number:02x}" for number in range(8))
 _CSS = {INK: "currentColor", GRID: "var(--grid)", MUTED: "var(--muted)", PAPER: "var(--paper)"} | {
     colour: f"var(--s{number})" for number, colour in enumerate(SERIES)
 }
-MARKERS = ("o", "s", "D", "^", "v", "P", "X", "*")
+MARKERS = ("o", "s", "D", "^", "v", "P", "X", "*", "<", ">")
 
 # 96 CSS pixels an inch. One wide panel fills a phone and three fill a desk's width; four narrow ones do.
 WIDE_IN, NARROW_IN = 3.75, 3.0

@@ -1,10 +1,7 @@
 """Stages of the models: network in float32, int8 and ONNX against float64, softmax against mpmath."""
 
 import copy
-import logging
-import tempfile
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -13,7 +10,7 @@ import torch
 from bladewing.features import INPUT_SHAPES, model_inputs
 from bladewing.models.calibration import Calibration, softmax
 from bladewing.models.cnn import EvidenceNet, ImageNet, SpectrumNet
-from bladewing.models.export import export_network
+from bladewing.models.export import export_network, in_eight_bits
 from bladewing.models.training import network_scores
 from bladewing.simulate import Radar, draw_records
 from numpy.typing import NDArray
@@ -83,7 +80,7 @@ def _network(signal: str, evidence: str) -> Iterator[Cell]:
         "float32": (1e-4, lambda given: softmax(network_scores(net, given))),
         "ONNX": (1e-4, _runner(onnx_bytes)),
         # coarse by design: eight bits of weights and activations
-        "int8": (0.1, _runner(_int8(onnx_bytes))),
+        "int8": (0.1, _runner(in_eight_bits(onnx_bytes))),
     }
     for form, (limit, run) in forms.items():
         yield from _forms(f"{signal} network, {form}", limit, run, reference, inputs)
@@ -127,21 +124,3 @@ def _runner(onnx_bytes: bytes) -> Callable[[Inputs], NDArray[np.float32]]:
     options.intra_op_num_threads = 1
     session = onnxruntime.InferenceSession(onnx_bytes, options, providers=["CPUExecutionProvider"])
     return lambda given: session.run(["probabilities"], given)[0]
-
-
-def _int8(onnx_bytes: bytes) -> bytes:
-    """The same network with its products in eight bits."""
-    from onnxruntime.quantization import QuantType, quantize_dynamic
-
-    level = logging.root.level
-    logging.root.setLevel(logging.ERROR)  # its advice to optimise first is not for here
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            plain, small = Path(folder) / "plain.onnx", Path(folder) / "small.onnx"
-            plain.write_bytes(onnx_bytes)
-            quantize_dynamic(
-                plain, small, weight_type=QuantType.QUInt8, op_types_to_quantize=["Conv", "MatMul", "Gemm"]
-            )
-            return small.read_bytes()
-    finally:
-        logging.root.setLevel(level)

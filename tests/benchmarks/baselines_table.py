@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from bladewing.classify import Classifier
 from bladewing.classify.gather import Gathered
-from bladewing.classify.train import Sets, _train_one
+from bladewing.classify.train import Sets, train_one
 from bladewing.classify.training_config import TrainingConfig
 from bladewing.features import model_inputs
 from bladewing.models import LADDER
@@ -90,7 +90,7 @@ def main() -> None:
     answers: dict[str, Callable[[NDArray[np.complex64]], object]] = {}
     for name in OURS:
         start = time.process_time()
-        sealed, _ = _train_one(name, settings, sets, lambda _: None)
+        sealed, _ = train_one(name, settings, sets, lambda _: None)
         spent = time.process_time() - start
         classifier = Classifier(sealed, source=name)
         feed = {key: sets.test.inputs[key] for key in LADDER[name].inputs}

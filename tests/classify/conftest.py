@@ -25,6 +25,7 @@ front_train = 210
 front_test = 6
 front_epochs = 1
 front_s = 1e-3
+family_train = 600
 """
 
 
@@ -127,8 +128,8 @@ def linear_bytes(net: Any) -> bytes:
 
 
 def few_choices(patch: pytest.MonkeyPatch) -> None:
-    """Let a report compare little: two pictures, three dwells, two numbers of bins; no process of its own."""
-    from bladewing.classify.report import choices, front, pictures
+    """Let a report compare little: two pictures, dwells, numbers of bins and families; no process of its own."""
+    from bladewing.classify.report import choices, families, front, pictures
 
     few = {name: pictures.PICTURES[name] for name in ("spectrum", "stft-80-90")}
     dwells_s, bins = (0.005, 0.02, 0.08), (64, 1024)
@@ -136,6 +137,7 @@ def few_choices(patch: pytest.MonkeyPatch) -> None:
         patch.setattr(module, "PICTURES", few)
         patch.setattr(module, "DWELLS_S", dwells_s)
         patch.setattr(module, "STORED_BINS", bins)
+    patch.setattr(families, "FAMILIES", {name: families.FAMILIES[name] for name in ("sea", "band 18-40 GHz")})
     patch.setattr(choices, "network_bytes", linear_bytes)
     patch.setattr(front, "peak_bytes", lambda *_: 1_000_000)
 

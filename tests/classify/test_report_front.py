@@ -195,7 +195,8 @@ def test_a_ratio_lies_within_its_spread() -> None:
 
 def test_the_front_holds_every_choice_at_every_dwell(report: dict[str, Any]) -> None:
     rows = report["front"]["choices"]
-    assert [row["name"] for row in rows] == ["spectrum", "stft-80-90", "features", "spectrum-cnn", "always-uav"]
+    models = ["spectrum-cnn", "always-uav", "spectrum-cnn-int8"]
+    assert [row["name"] for row in rows] == ["spectrum", "stft-80-90", "features", *models]
     for row in rows:
         assert [point["dwell_s"] for point in row["dwells"]] == report["front"]["dwells_s"]
         assert row["stored_bytes_per_million"] == 1_000_000 * row["stored_bytes"]
@@ -214,7 +215,8 @@ def test_no_two_choices_look_alike() -> None:
     from bladewing.models import LADDER
 
     rows = [{"name": name, "kind": "picture"} for name in pictures.PICTURES]
-    rows += [{"name": "features", "kind": "features"}, *({"name": name, "kind": "model"} for name in LADDER)]
+    names = (*LADDER, "spectrum-cnn-int8")
+    rows += [{"name": "features", "kind": "features"}, *({"name": name, "kind": "model"} for name in names)]
     assert len(set(choice_looks(rows).values())) == len(rows)
 
 

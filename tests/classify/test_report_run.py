@@ -35,7 +35,7 @@ def test_report_holds_the_data_of_every_figure(report: dict[str, Any]) -> None:
     assert set(report) == {
         *("schema_version", "made", "machine", "classes", "records", "models", "scores", "reference", "cost"),
         *("trade", "front", "fft_against_stft", "time_law", "storage", "examples", "stft_pictures", "tables"),
-        *("training", "config"),
+        *("training", "config", "families"),
     }
     assert [model["name"] for model in report["models"]] == ["spectrum-cnn", "always-uav"]
     for found in report["scores"].values():
@@ -50,6 +50,11 @@ def test_report_holds_the_data_of_every_figure(report: dict[str, Any]) -> None:
         }
         assert all(row["ratio_to_fft"] > 0 for row in part["stages"])
         assert part["stages"][0]["ratio_to_fft"] == 1.0
+    for row in report["families"]["families"]:
+        assert 0 < row["records"] < report["families"]["test_records"] == 600
+        for said in (row["kept"], row["left_out"]):
+            assert said["unknown"]["count"] == said["wrong"]["count"] == row["records"]
+            assert 0 <= said["unknown"]["value"] + said["wrong"]["value"] <= 1
     assert [part["pulses"] for part in report["fft_against_stft"]] == [2000, 10_000]
     assert [one["class"] for one in report["examples"]] == report["classes"]
     assert {"cpu", "cores", "python", "packages"} <= set(report["machine"])

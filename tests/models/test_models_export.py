@@ -17,6 +17,7 @@ from bladewing.models.export import (
     check_export,
     export_network,
     export_tabular,
+    in_eight_bits,
 )
 from bladewing.models.seal import seal, verify
 from bladewing.models.tabular import tabular_scores, train_boosted, train_linear
@@ -164,3 +165,16 @@ def test_a_converter_that_frees_or_fixes_the_wrong_axis_is_caught(dims):
     graph = helper.make_graph([], "g", [value], [])
     with pytest.raises(ValueError, match="only the batch free"):
         export_module._require_free_batch(graph, {"features": (4,)})
+
+
+@pytest.mark.parametrize("kind", ["spectrum-cnn-fast", "spectrum-cnn", "image-cnn"])
+def test_a_network_in_eight_bits_is_smaller_and_says_much_the_same(exported, kind):
+    onnx_bytes, inputs, scores, _ = exported[kind]
+    told = attach_metadata(onnx_bytes, {"name": kind})
+    small = in_eight_bits(told)
+    assert len(small) < 0.75 * len(told)  # half-precision weights become single bytes, the graph itself stays
+    assert {entry.key: entry.value for entry in onnx.load_model_from_string(small).metadata_props}["name"] == kind
+    kinds = {one.data_type for one in onnx.load_model_from_string(small).graph.initializer}
+    assert onnx.TensorProto.UINT8 in kinds
+    found = _session(small).run(["probabilities"], inputs)[0]
+    assert 0 < np.abs(found - CALIBRATION.probabilities(scores)).max() < 0.1
