@@ -27,6 +27,10 @@ BLADE_CHOICES = (1, 2, 3, 4, 5)
 #: Rates nearer than this at an order [bins] have one line there.
 MERGED_BINS = 1.0
 
+#: About the orders of several rotors
+
+AROUND_SHARE, AROUND_LEAK = 0.1, 0.02
+
 #: Edges found in two ways agree within so many standard deviations.
 AGREED_DEVIATIONS = 3.0
 
@@ -220,7 +224,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     comb, out["reason"] = find_comb(data)
     prf_hz, wavelength_m = data.prf_hz, data.wavelength_m
     if comb is not None:
-        edge, edge_std = _edge(data, [comb.fit], comb.rest, comb.per_turn, blades or 2)
+        edge, edge_std = _edge(data, [comb.fit], comb.rest, comb.per_turn, blades)
         edge_mps = edge * prf_hz * wavelength_m / 2
         if edge_mps < LEAST_REACH_MPS:
             comb, out["reason"] = (
@@ -246,11 +250,11 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
         out["chopping_hz"] = float(rotors.rates.mean()) * prf_hz
         out["chopping_hz_std"] = float(np.sqrt((rotors.stds**2).sum())) / count * prf_hz
-        edge, edge_std = _edge(data, rotors.fits, rotors.rest, 1, blades or 2)
+        edge, edge_std = _edge(data, rotors.fits, rotors.rest, 1, blades)
     if not rotors.resolved:  # the mean lies anywhere within what the unresolved rates span
         out["chopping_hz_std"] = float(np.hypot(out["chopping_hz_std"], rotors.spread * prf_hz / np.sqrt(12)))
     if count > 1 or not rotors.resolved:
-        edge, edge_std = _agreed((edge, edge_std), _edge_around(data, comb, rotors, blades or 2))
+        edge, edge_std = _agreed((edge, edge_std), _edge_around(data, comb, rotors, blades))
     for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):
         padded = np.full(MAX_ROTORS, np.nan)
         padded[:count] = values * prf_hz
@@ -301,7 +305,7 @@ def _body(data: Periodogram, comb: Comb | None) -> dict[str, float]:
 
 
 def _edge(
-    data: Periodogram, fits: list[CombFit], rest: NDArray[np.complex128], per_turn: int, blades: int
+    data: Periodogram, fits: list[CombFit], rest: NDArray[np.complex128], per_turn: int, blades: int | None
 ) -> tuple[float, float]:
     """Edge of the line family and its standard deviation [cycles a sample from the body], both sides together.
 
@@ -311,20 +315,23 @@ def _edge(
     spacings = np.array([fit.spacing * per_turn for fit in fits])
     fastest = float(spacings.max())
     order = np.arange(1, int(0.49 / fastest) + 1)
-    total, number = np.zeros(len(order)), np.zeros(len(order))
+    total, noise, number = np.zeros(len(order)), np.zeros(len(order)), np.zeros(len(order))
     left, level = LineSpace(rest), data.level_of(rest)
     for fit, spacing in zip(fits, spacings, strict=True):
         own = dict(zip(fit.orders.tolist(), fit.amplitudes, strict=True))
         for sign in (-1, 1):
             frequency = fit.centre + sign * order * spacing
             fitted = np.array([own.get(int(sign * per_turn * o), 0.0) for o in order])
-            power = np.abs(left.at(frequency)[0] + fitted) ** 2 * data.pulses / level(frequency)
+            power = np.abs(left.at(frequency)[0] + fitted) ** 2 * data.pulses
             usable = data.usable(frequency)
             total += np.where(usable, power, 0.0)
+            noise += np.where(usable, level(frequency), 0.0)
             number += usable
     # where the single rotors' lines lie in one another they add up: those orders stand too high beside the outer ones
     seen = (number > 0) & (order * np.ptp(spacings) * data.pulses >= MERGED_BINS * (len(fits) > 1))
-    return fit_edge(order[seen] * fastest, total[seen] / number[seen], number[seen], fastest / blades)
+    count = number[seen]
+    edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades)
+    return edge * fastest, std * fastest
 
 
 def _agreed(lines: tuple[float, float], around: tuple[float, float]) -> tuple[float, float]:
@@ -340,7 +347,7 @@ def _agreed(lines: tuple[float, float], around: tuple[float, float]) -> tuple[fl
     return float(edge), float(std)
 
 
-def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int) -> tuple[float, float]:
+def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | None) -> tuple[float, float]:
     """Edge and its standard deviation by all that lies about each order: rotors that are not told apart count too.
 
     What they hold between the lines lifts the local level as well, which therefore counts up to the floor only.
@@ -352,18 +359,19 @@ def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int) -> 
     half_bins = min(nominal * pulses / 2, 1 + comb.last / comb.per_turn * spread * pulses)
     half = int(half_bins * size / pulses)
     level = data.level_of(rotors.rest)
-    total, number = np.zeros(len(order)), np.zeros(len(order))
+    total, noise, number = np.zeros(len(order)), np.zeros(len(order)), np.zeros(len(order))
     for sign in (-1, 1):
         middle = np.rint((centre + sign * order * nominal) * size).astype(np.intp)
         frequency = (middle[:, None] + np.arange(-half, half + 1)) / size
-        power = data.at(frequency) * data.level_at(frequency) / np.minimum(level(frequency), 1.0)
         usable = data.usable(frequency)
-        bins = usable.sum(axis=1) * pulses / size
+        # what lies between the lines lifts the local level as well, which therefore counts up to the floor only
+        floor = np.minimum(level(frequency), 1.0)
+        power = data.at(frequency) * data.level_at(frequency)
         total += np.where(usable, power, 0.0).sum(axis=1) * pulses / size
-        number += np.asarray(bins, np.float64)
+        noise += np.where(usable, floor, 0.0).sum(axis=1) * pulses / size
+        number += usable.sum(axis=1) * pulses / size
     seen = number > 2
+    count = number[seen]
+    edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades, least_share=AROUND_SHARE, leak=AROUND_LEAK)
     fastest = float(max(nominal, rotors.rates.max()))
-    mean = np.asarray(total / np.maximum(number, 1.0), np.float64)
-    away = np.asarray(order[seen] * nominal, np.float64)
-    edge, std = fit_edge(away, mean[seen], number[seen], nominal / blades)
-    return edge * fastest / nominal, std
+    return edge * fastest, std * fastest
