@@ -29,10 +29,10 @@ MERGED_BINS = 1.0
 
 #: About the orders of several rotors
 
-AROUND_SHARE, AROUND_LEAK = 0.1, 0.02
+AROUND_SHARE, AROUND_LEAK, AROUND_LINES = 0.4, 0.02, 0.05
 
 #: Edges found in two ways agree within so many standard deviations.
-AGREED_DEVIATIONS = 3.0
+AGREED_DEVIATIONS = 2.0
 
 #: Rotors that are not told apart differ by about so much in their rates, relative.
 LEAST_SPREAD = 0.02
@@ -254,7 +254,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     if not rotors.resolved:  # the mean lies anywhere within what the unresolved rates span
         out["chopping_hz_std"] = float(np.hypot(out["chopping_hz_std"], rotors.spread * prf_hz / np.sqrt(12)))
     if count > 1 or not rotors.resolved:
-        edge, edge_std = _agreed((edge, edge_std), _edge_around(data, comb, rotors, blades))
+        edge, edge_std = _surer((edge, edge_std), _edge_around(data, comb, rotors, blades))
     for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):
         padded = np.full(MAX_ROTORS, np.nan)
         padded[:count] = values * prf_hz
@@ -328,23 +328,20 @@ def _edge(
             noise += np.where(usable, level(frequency), 0.0)
             number += usable
     # where the single rotors' lines lie in one another they add up: those orders stand too high beside the outer ones
-    seen = (number > 0) & (order * np.ptp(spacings) * data.pulses >= MERGED_BINS * (len(fits) > 1))
+    nearest = float(np.diff(np.sort(spacings)).min()) if len(fits) > 1 else 1.0
+    seen = (number > 0) & (order * nearest * data.pulses >= MERGED_BINS)
     count = number[seen]
     edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades)
     return edge * fastest, std * fastest
 
 
-def _agreed(lines: tuple[float, float], around: tuple[float, float]) -> tuple[float, float]:
-    """One edge and its deviation from that of the fitted lines and that of all about them, of several rotors.
+def _surer(lines: tuple[float, float], around: tuple[float, float]) -> tuple[float, float]:
+    """Of several rotors, the edge of the fitted lines with its deviation, if it is the surer one; or that about them.
 
-    Rotors that were not told apart show in the second alone. Where the two agree each is off for reasons of its own,
-    but by the same noise, so that their mean is no surer than they are.
+    Rotors that were not told apart show in the second alone. It is known to its own deviation, whatever the first says.
     """
-    if abs(around[0] - lines[0]) > AGREED_DEVIATIONS * np.hypot(lines[1], around[1]):
-        return around
-    weights = 1 / np.square([lines[1], around[1]])
-    edge, std = np.average([lines, around], axis=0, weights=weights)
-    return float(edge), float(std)
+    agreed = abs(around[0] - lines[0]) < AGREED_DEVIATIONS * around[1]
+    return lines if agreed and lines[1] < around[1] else around
 
 
 def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | None) -> tuple[float, float]:
@@ -352,7 +349,7 @@ def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | No
 
     What they hold between the lines lifts the local level as well, which therefore counts up to the floor only.
     """
-    nominal, centre = comb.chopping, comb.fit.centre
+    nominal, centre = float(np.mean([rotors.rates.min(), rotors.rates.max()])), comb.fit.centre
     size, pulses = len(data.power), data.pulses
     order = np.arange(1, int(0.49 / nominal) + 1)
     spread = max(rotors.spread, LEAST_SPREAD * nominal)
@@ -372,6 +369,9 @@ def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | No
         number += usable.sum(axis=1) * pulses / size
     seen = number > 2
     count = number[seen]
-    edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades, least_share=AROUND_SHARE, leak=AROUND_LEAK)
+    scatter = AROUND_SHARE / (1 + 2 * order[seen] * spread * pulses)
+    edge, std = fit_edge(
+        order[seen], total[seen] / count, noise[seen] / count, count, blades, scatter=scatter, leak=AROUND_LEAK
+    )
     fastest = float(max(nominal, rotors.rates.max()))
-    return edge * fastest, std * fastest
+    return edge * fastest, float(np.hypot(std, AROUND_LINES)) * fastest

@@ -98,11 +98,11 @@ def _log_likelihood(
     A mean of |line + noise|^2 as a gamma law of the same mean and variance: exact for noise alone.
     """
     excess, beat, own = power - noise, 2 * noise / bins, (noise + leak) ** 2 / bins
-    shape, share = shape[..., None, :], shares[:, None]
+    shape = shape[..., None, :]
     level = np.maximum((shape @ excess) / (shape**2).sum(axis=-1), 1e-6)
 
     def variance(line: NDArray[np.float64]) -> NDArray[np.float64]:
-        out = share * line
+        out = shares * line
         out += beat
         out *= line
         out += own
@@ -136,7 +136,7 @@ def fit_edge(
     bins: NDArray[np.float64],
     blades: int | None = None,
     *,
-    least_share: float = 0.0,
+    scatter: NDArray[np.float64] | float = 0.0,
     leak: float = LEAK_SHARE,
 ) -> tuple[float, float]:
     """Fit the edge of a line family.
@@ -166,8 +166,9 @@ def fit_edge(
     step = max(STEP, (high - low) / MOST_STEPS)
     choices = list(BLADES) if blades is None else [blades]
     # shares that the noise outweighs are all alike
-    least_share = max(least_share, 0.1 * float(np.median(noise / bins)) / max(loud, 1e-9))
-    every = np.array([share for share in SHARES if share >= least_share or share == SHARES[-1]])
+    least = 0.1 * float(np.median(noise / bins)) / max(loud, 1e-9)
+    every = np.array([share for share in SHARES if share >= least or share == SHARES[-1]])
+    scatter = np.broadcast_to(scatter, power.shape)
     prior = np.ones(len(every))
     prior[0] += len(SHARES) - len(every)
     few = np.arange(len(every))[::-3]
@@ -177,7 +178,7 @@ def fit_edge(
         count = int(order[near][-1])
         shapes = [line_powers(number * edges, number, count)[..., order[near] - 1] for number in choices]
         weight = _log_likelihood(
-            np.stack(shapes), power[near], noise[near], bins[near], every[few], leak * loud
+            np.stack(shapes), power[near], noise[near], bins[near], every[few, None] + scatter[near], leak * loud
         )
         weight += np.log(np.outer([BLADES.get(number, 1.0) for number in choices], PROFILES))[..., None, None]
         weight += np.log(prior[few] / edges[:, None])
