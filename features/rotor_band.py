@@ -22,6 +22,9 @@ LEAK_SHARE = 0.002
 #: How unlike the model the powers of the lines may be: variances over the mean's square. The lines decide.
 SHARES = tuple(1e-6 * 4.0**step for step in range(11))
 
+#: Each of these is so likely beforehand beside the one before it.
+SHARE_FALL = 0.6
+
 #: Widths of the roll-off, Gamma^(1/3) orders, past the tip that lines are followed.
 REACH = 3.0
 
@@ -169,8 +172,8 @@ def fit_edge(
     least = 0.1 * float(np.median(noise / bins)) / max(loud, 1e-9)
     every = np.array([share for share in SHARES if share >= least or share == SHARES[-1]])
     scatter = np.broadcast_to(scatter, power.shape)
-    prior = np.ones(len(every))
-    prior[0] += len(SHARES) - len(every)
+    prior = SHARE_FALL ** np.arange(len(SHARES))
+    prior = np.append(prior[: len(SHARES) - len(every) + 1].sum(), prior[len(SHARES) - len(every) + 1 :])
     few = np.arange(len(every))[::-3]
     for search in range(SEARCHES):
         edges = np.arange(max(low, LEAST_EDGE), high + step, step)
