@@ -225,8 +225,8 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     prf_hz, wavelength_m = data.prf_hz, data.wavelength_m
     if comb is not None:
         edge, edge_std = _edge(data, [comb.fit], comb.rest, comb.per_turn, blades)
-        edge_mps = edge * prf_hz * wavelength_m / 2
-        if edge_mps < LEAST_REACH_MPS:
+        edge_mps, edge_std_mps = (value * prf_hz * wavelength_m / 2 for value in (edge, edge_std))
+        if edge_mps + edge_std_mps < LEAST_REACH_MPS:
             comb, out["reason"] = (
                 None,
                 f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s",

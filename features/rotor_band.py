@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 #: Blades that a fit to an unknown number of them tries, and how likely they are beforehand.
-BLADES = {1: 0.1, 2: 0.6, 3: 0.2, 4: 0.1}
+BLADES = {1: 0.1, 2: 0.65, 3: 0.25}
 
 #: Likewise blades that reflect evenly, and points at their tips: a model of the literature rather than a blade.
 PROFILES = (0.95, 0.05)
@@ -35,14 +35,14 @@ LEVEL_STEPS = 2
 NEAR_ZERO = 1e-4
 
 #: Step of the first search [lines]: the lines' ripple repeats every pi of the phase deviation.
-STEP = 0.15
+STEP = 0.2
 
 #: The first search goes so far about all lines that may be the last [lines], which the coarse one has as likely as this
 #: [nats], in so many steps at most; and no nearer to the body than this.
-HALF_RANGE, COARSE_NATS, MOST_STEPS, LEAST_EDGE = 3.0, 6.0, 80, 0.7
+HALF_RANGE, COARSE_NATS, MOST_STEPS, LEAST_EDGE = 2.5, 6.0, 60, 0.7
 
 #: Searches, each about what is left of the one before in so many steps, until the deviation is so many of these.
-SEARCHES, FINE, FINE_ENOUGH = 5, 40, 1.5
+SEARCHES, FINE, FINE_ENOUGH = 5, 30, 1.5
 
 #: Hypotheses less likely than this are left out.
 NEGLIGIBLE = 1e-3
@@ -169,7 +169,7 @@ def fit_edge(
     step = max(STEP, (high - low) / MOST_STEPS)
     choices = list(BLADES) if blades is None else [blades]
     # shares that the noise outweighs are all alike
-    least = 0.1 * float(np.median(noise / bins)) / max(loud, 1e-9)
+    least = 0.1 * float((noise / bins).mean()) / max(loud, 1e-9)
     every = np.array([share for share in SHARES if share >= least or share == SHARES[-1]])
     scatter = np.broadcast_to(scatter, power.shape)
     prior = SHARE_FALL ** np.arange(len(SHARES))
