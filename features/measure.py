@@ -27,12 +27,12 @@ BLADE_CHOICES = (1, 2, 3, 4, 5)
 #: Rates nearer than this at an order [bins] have one line there.
 MERGED_BINS = 1.0
 
-#: About the orders of several rotors
-
-AROUND_SHARE, AROUND_LEAK, AROUND_LINES = 0.4, 0.02, 0.05
-
-#: Edges found in two ways agree within so many standard deviations.
+#: The edge of several rotors' fitted lines holds if that of all about them agrees within so many of its deviations.
 AGREED_DEVIATIONS = 2.0
+
+#: Of the sums of all about an order: variance over the square where the rotors' lines lie in one another (four of equal
+#: power, both sides), share of the family's power that lines leak past it, what an edge is off by at least [lines].
+AROUND_SCATTER, AROUND_LEAK, AROUND_LINES = 0.4, 0.02, 0.05
 
 #: Rotors that are not told apart differ by about so much in their rates, relative.
 LEAST_SPREAD = 0.02
@@ -310,7 +310,7 @@ def _edge(
     """Edge of the line family and its standard deviation [cycles a sample from the body], both sides together.
 
     Each line's power is what is seen there with all other fitted lines taken out; an order's is the mean over both
-    sides and the single rotors, since their lines part at the outer orders.
+    sides and the single rotors, since their lines part at the outer orders. Without such orders nothing is known.
     """
     spacings = np.array([fit.spacing * per_turn for fit in fits])
     fastest = float(spacings.max())
@@ -330,6 +330,8 @@ def _edge(
     # where the single rotors' lines lie in one another they add up: those orders stand too high beside the outer ones
     nearest = float(np.diff(np.sort(spacings)).min()) if len(fits) > 1 else 1.0
     seen = (number > 0) & (order * nearest * data.pulses >= MERGED_BINS)
+    if not seen.any():
+        return 0.0, np.inf
     count = number[seen]
     edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades)
     return edge * fastest, std * fastest
@@ -349,7 +351,7 @@ def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | No
 
     What they hold between the lines lifts the local level as well, which therefore counts up to the floor only.
     """
-    nominal, centre = float(np.mean([rotors.rates.min(), rotors.rates.max()])), comb.fit.centre
+    nominal, centre = float(np.mean([rotors.rates.min(), rotors.rates.max()])), rotors.fits[0].centre
     size, pulses = len(data.power), data.pulses
     order = np.arange(1, int(0.49 / nominal) + 1)
     spread = max(rotors.spread, LEAST_SPREAD * nominal)
@@ -369,7 +371,7 @@ def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | No
         number += usable.sum(axis=1) * pulses / size
     seen = number > 2
     count = number[seen]
-    scatter = AROUND_SHARE / (1 + 2 * order[seen] * spread * pulses)
+    scatter = np.asarray(AROUND_SCATTER / (1 + 2 * order[seen] * spread * pulses), np.float64)
     edge, std = fit_edge(
         order[seen], total[seen] / count, noise[seen] / count, count, blades, scatter=scatter, leak=AROUND_LEAK
     )

@@ -156,6 +156,10 @@ def fit_edge(
         Independent bins in each mean.
     blades : int, optional
         Blades of the rotor: they set how sharp the edge is. Those of `BLADES` are tried where it is not known.
+    scatter : ndarray, shape (lines,), or float
+        What is known beforehand of how unlike the model the lines' powers are: variance over the mean's square.
+    leak : float
+        Share of the family's power that lines leak past its edge.
 
     Returns
     -------
