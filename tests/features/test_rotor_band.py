@@ -28,6 +28,8 @@ def test_line_powers_are_those_of_bessel_functions(blades, gamma):
     count = max(3, int((gamma + 4 * gamma ** (1 / 3)) / blades))
     even, tip = line_powers(np.array([0.8 * gamma, gamma]), blades, count)[:, 1]
     order = blades * np.arange(1, count + 1)
+    # the lines left out are not folded into those that are kept
+    np.testing.assert_allclose(line_powers(np.array([gamma]), blades, 2)[:, 0], [even[:2], tip[:2]], atol=1e-9)
     np.testing.assert_allclose(tip, jv(order, gamma) ** 2, atol=1e-9)
     # the integral of J_n from 0 to gamma is 2 (J_(n+1) + J_(n+3) + ...)
     series = jv(order[:, None] + 1 + 2 * np.arange(int(gamma) + 20), gamma).sum(axis=1)
