@@ -13,7 +13,7 @@ from .helicopter import find_gear
 from .lines import LineSpace
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .periodogram import Periodogram, prepare
-from .rotor_band import fit_edge
+from .rotor_band import LEAK_SHARE, fit_edge
 from .rotors import MAX_ROTORS, Rotors
 from .smearing import smearing_index
 from .spectrum import LEAST_PART, Spectrum, doppler_spectrum, largest_part
@@ -30,9 +30,13 @@ MERGED_BINS = 1.0
 #: The edge of several rotors' fitted lines holds if that of all about them agrees within so many of its deviations.
 AGREED_DEVIATIONS = 2.0
 
+#: Share of the power of several rotors' family that does not count past its edge: what their inner lines leave between
+#: them lifts the level that the outer ones are read against.
+SEVERAL_LEAK = 0.02
+
 #: Of the sums of all about an order: variance over the square where the rotors' lines lie in one another (four of equal
-#: power, both sides), share of the family's power that lines leak past it, what an edge is off by at least [lines].
-AROUND_SCATTER, AROUND_LEAK, AROUND_LINES = 0.4, 0.02, 0.05
+#: power, both sides), and what an edge is off by at least [lines].
+AROUND_SCATTER, AROUND_LINES = 0.4, 0.05
 
 #: Rotors that are not told apart differ by about so much in their rates, relative.
 LEAST_SPREAD = 0.02
@@ -333,7 +337,8 @@ def _edge(
     if not seen.any():
         return 0.0, np.inf
     count = number[seen]
-    edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades)
+    leak = SEVERAL_LEAK if len(fits) > 1 else LEAK_SHARE
+    edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades, leak=leak)
     return edge * fastest, std * fastest
 
 
@@ -373,7 +378,7 @@ def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | No
     count = number[seen]
     scatter = np.asarray(AROUND_SCATTER / (1 + 2 * order[seen] * spread * pulses), np.float64)
     edge, std = fit_edge(
-        order[seen], total[seen] / count, noise[seen] / count, count, blades, scatter=scatter, leak=AROUND_LEAK
+        order[seen], total[seen] / count, noise[seen] / count, count, blades, scatter=scatter, leak=SEVERAL_LEAK
     )
     fastest = float(max(nominal, rotors.rates.max()))
     return edge * fastest, float(np.hypot(std, AROUND_LINES)) * fastest
