@@ -12,7 +12,8 @@ from scipy import fft
 #: Blades that a fit to an unknown number of them tries, and how likely they are beforehand.
 BLADES = {1: 0.1, 2: 0.65, 3: 0.25}
 
-#: Likewise blades that reflect evenly, and points at their tips: a model of the literature rather than a blade.
+#: Likewise blades that reflect evenly, and points at their tips: a model of the literature rather than a blade. The
+#: lines of a drone measured with a tag on one blade speak for even blades against such that fade towards the tip.
 PROFILES = (0.95, 0.05)
 
 #: Lines so far below the family's level do not count: a share of its power, added to noise and lines alike. There is

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from bladewing.features import measure
 from bladewing.features.rotor_band import fit_edge, line_powers
+from bladewing.simulate import RotorMotion, rotor_echo
 from scipy.special import jv
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, white
@@ -107,3 +108,22 @@ def test_the_band_of_a_dwell_is_that_of_eq_26_at_any_level(rates_rpm, snr_db, wi
     assert found.bandwidth_hz == pytest.approx(theory_hz, rel=within)
     assert abs(found.bandwidth_hz - theory_hz) < 4.5 * found.bandwidth_hz_std
     assert found.bandwidth_hz_std < within * theory_hz
+
+
+@pytest.mark.parametrize(
+    "blade",
+    [{"root_m": 0.05}, {"root_m": 0.02, "edge_asymmetry": 0.9}, {"blade_amplitudes": (1.0, 0.85)}],
+    ids=["a hub", "unlike edges", "unequal blades"],
+)
+@pytest.mark.parametrize("snr_db", [0, 30])
+def test_blades_unlike_the_ideal_one_stay_within_what_is_stated(blade, snr_db):
+    rng = np.random.default_rng(8)
+    for _ in range(6):
+        rate_hz = rng.uniform(52, 58)  # off the mains
+        angle_rad = RotorMotion(rate_hz, rng.uniform(0, 6)).angle_rad(np.arange(PULSES) / PRF_HZ)
+        echo = rotor_echo(angle_rad, wavelength_m=WAVELENGTH_M, blade_length_m=0.15, **blade)
+        echo *= 10 ** (snr_db / 20) / np.sqrt(np.mean(np.abs(echo) ** 2))
+        found = measure(echo + 10 ** (snr_db / 20 + 0.5) + white(rng, PULSES), **RADAR, blades=2)
+        error_hz = found.bandwidth_hz - 8 * np.pi * rate_hz * 0.15 / WAVELENGTH_M
+        assert abs(error_hz) < 4 * found.bandwidth_hz_std
+        assert abs(error_hz) < 0.02 * found.bandwidth_hz
