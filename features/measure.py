@@ -13,7 +13,7 @@ from .helicopter import find_gear
 from .lines import LineSpace
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .periodogram import Periodogram, prepare
-from .rotor_band import fit_edge
+from .rotor_band import LEAK_SHARE, fit_edge
 from .rotors import MAX_ROTORS, Rotors
 from .smearing import smearing_index
 from .spectrum import LEAST_PART, Spectrum, doppler_spectrum, largest_part
@@ -27,8 +27,16 @@ BLADE_CHOICES = (1, 2, 3, 4, 5)
 #: Rates nearer than this at an order [bins] have one line there.
 MERGED_BINS = 1.0
 
-#: Edges found in two ways agree within so many standard deviations.
-AGREED_DEVIATIONS = 3.0
+#: The edge of several rotors' fitted lines holds if that of all about them agrees within so many of its deviations.
+AGREED_DEVIATIONS = 2.0
+
+#: Share of the power of several rotors' family that does not count past its edge: what their inner lines leave between
+#: them lifts the level that the outer ones are read against.
+SEVERAL_LEAK = 0.02
+
+#: Of the sums of all about an order: variance over the square where the rotors' lines lie in one another (four of equal
+#: power, both sides), and what an edge is off by at least [lines].
+AROUND_SCATTER, AROUND_LINES = 0.4, 0.05
 
 #: Rotors that are not told apart differ by about so much in their rates, relative.
 LEAST_SPREAD = 0.02
@@ -220,9 +228,9 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     comb, out["reason"] = find_comb(data)
     prf_hz, wavelength_m = data.prf_hz, data.wavelength_m
     if comb is not None:
-        edge, edge_std = _edge(data, [comb.fit], comb.rest, comb.per_turn, blades or 2)
-        edge_mps = edge * prf_hz * wavelength_m / 2
-        if edge_mps < LEAST_REACH_MPS:
+        edge, edge_std = _edge(data, [comb.fit], comb.rest, comb.per_turn, blades)
+        edge_mps, edge_std_mps = (value * prf_hz * wavelength_m / 2 for value in (edge, edge_std))
+        if edge_mps + edge_std_mps < LEAST_REACH_MPS:
             comb, out["reason"] = (
                 None,
                 f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s",
@@ -246,11 +254,11 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
         out["chopping_hz"] = float(rotors.rates.mean()) * prf_hz
         out["chopping_hz_std"] = float(np.sqrt((rotors.stds**2).sum())) / count * prf_hz
-        edge, edge_std = _edge(data, rotors.fits, rotors.rest, 1, blades or 2)
+        edge, edge_std = _edge(data, rotors.fits, rotors.rest, 1, blades)
     if not rotors.resolved:  # the mean lies anywhere within what the unresolved rates span
         out["chopping_hz_std"] = float(np.hypot(out["chopping_hz_std"], rotors.spread * prf_hz / np.sqrt(12)))
     if count > 1 or not rotors.resolved:
-        edge, edge_std = _agreed((edge, edge_std), _edge_around(data, comb, rotors, blades or 2))
+        edge, edge_std = _surer((edge, edge_std), _edge_around(data, comb, rotors, blades))
     for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):
         padded = np.full(MAX_ROTORS, np.nan)
         padded[:count] = values * prf_hz
@@ -301,69 +309,76 @@ def _body(data: Periodogram, comb: Comb | None) -> dict[str, float]:
 
 
 def _edge(
-    data: Periodogram, fits: list[CombFit], rest: NDArray[np.complex128], per_turn: int, blades: int
+    data: Periodogram, fits: list[CombFit], rest: NDArray[np.complex128], per_turn: int, blades: int | None
 ) -> tuple[float, float]:
     """Edge of the line family and its standard deviation [cycles a sample from the body], both sides together.
 
     Each line's power is what is seen there with all other fitted lines taken out; an order's is the mean over both
-    sides and the single rotors, since their lines part at the outer orders.
+    sides and the single rotors, since their lines part at the outer orders. Without such orders nothing is known.
     """
     spacings = np.array([fit.spacing * per_turn for fit in fits])
     fastest = float(spacings.max())
     order = np.arange(1, int(0.49 / fastest) + 1)
-    total, number = np.zeros(len(order)), np.zeros(len(order))
+    total, noise, number = np.zeros(len(order)), np.zeros(len(order)), np.zeros(len(order))
     left, level = LineSpace(rest), data.level_of(rest)
     for fit, spacing in zip(fits, spacings, strict=True):
         own = dict(zip(fit.orders.tolist(), fit.amplitudes, strict=True))
         for sign in (-1, 1):
             frequency = fit.centre + sign * order * spacing
             fitted = np.array([own.get(int(sign * per_turn * o), 0.0) for o in order])
-            power = np.abs(left.at(frequency)[0] + fitted) ** 2 * data.pulses / level(frequency)
+            power = np.abs(left.at(frequency)[0] + fitted) ** 2 * data.pulses
             usable = data.usable(frequency)
             total += np.where(usable, power, 0.0)
+            noise += np.where(usable, level(frequency), 0.0)
             number += usable
     # where the single rotors' lines lie in one another they add up: those orders stand too high beside the outer ones
-    seen = (number > 0) & (order * np.ptp(spacings) * data.pulses >= MERGED_BINS * (len(fits) > 1))
-    return fit_edge(order[seen] * fastest, total[seen] / number[seen], number[seen], fastest / blades)
+    nearest = float(np.diff(np.sort(spacings)).min()) if len(fits) > 1 else 1.0
+    seen = (number > 0) & (order * nearest * data.pulses >= MERGED_BINS)
+    if not seen.any():
+        return 0.0, np.inf
+    count = number[seen]
+    leak = SEVERAL_LEAK if len(fits) > 1 else LEAK_SHARE
+    edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades, leak=leak)
+    return edge * fastest, std * fastest
 
 
-def _agreed(lines: tuple[float, float], around: tuple[float, float]) -> tuple[float, float]:
-    """One edge and its deviation from that of the fitted lines and that of all about them, of several rotors.
+def _surer(lines: tuple[float, float], around: tuple[float, float]) -> tuple[float, float]:
+    """Of several rotors, the edge of the fitted lines with its deviation, if it is the surer one; or that about them.
 
-    Rotors that were not told apart show in the second alone. Where the two agree each is off for reasons of its own,
-    but by the same noise, so that their mean is no surer than they are.
+    Rotors that were not told apart show in the second alone. It is known to its own deviation, whatever the first says.
     """
-    if abs(around[0] - lines[0]) > AGREED_DEVIATIONS * np.hypot(lines[1], around[1]):
-        return around
-    weights = 1 / np.square([lines[1], around[1]])
-    edge, std = np.average([lines, around], axis=0, weights=weights)
-    return float(edge), float(std)
+    agreed = abs(around[0] - lines[0]) < AGREED_DEVIATIONS * around[1]
+    return lines if agreed and lines[1] < around[1] else around
 
 
-def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int) -> tuple[float, float]:
+def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | None) -> tuple[float, float]:
     """Edge and its standard deviation by all that lies about each order: rotors that are not told apart count too.
 
     What they hold between the lines lifts the local level as well, which therefore counts up to the floor only.
     """
-    nominal, centre = comb.chopping, comb.fit.centre
+    nominal, centre = float(np.mean([rotors.rates.min(), rotors.rates.max()])), rotors.fits[0].centre
     size, pulses = len(data.power), data.pulses
     order = np.arange(1, int(0.49 / nominal) + 1)
     spread = max(rotors.spread, LEAST_SPREAD * nominal)
     half_bins = min(nominal * pulses / 2, 1 + comb.last / comb.per_turn * spread * pulses)
     half = int(half_bins * size / pulses)
     level = data.level_of(rotors.rest)
-    total, number = np.zeros(len(order)), np.zeros(len(order))
+    total, noise, number = np.zeros(len(order)), np.zeros(len(order)), np.zeros(len(order))
     for sign in (-1, 1):
         middle = np.rint((centre + sign * order * nominal) * size).astype(np.intp)
         frequency = (middle[:, None] + np.arange(-half, half + 1)) / size
-        power = data.at(frequency) * data.level_at(frequency) / np.minimum(level(frequency), 1.0)
         usable = data.usable(frequency)
-        bins = usable.sum(axis=1) * pulses / size
+        # what lies between the lines lifts the local level as well, which therefore counts up to the floor only
+        floor = np.minimum(level(frequency), 1.0)
+        power = data.at(frequency) * data.level_at(frequency)
         total += np.where(usable, power, 0.0).sum(axis=1) * pulses / size
-        number += np.asarray(bins, np.float64)
+        noise += np.where(usable, floor, 0.0).sum(axis=1) * pulses / size
+        number += usable.sum(axis=1) * pulses / size
     seen = number > 2
+    count = number[seen]
+    scatter = np.asarray(AROUND_SCATTER / (1 + 2 * order[seen] * spread * pulses), np.float64)
+    edge, std = fit_edge(
+        order[seen], total[seen] / count, noise[seen] / count, count, blades, scatter=scatter, leak=SEVERAL_LEAK
+    )
     fastest = float(max(nominal, rotors.rates.max()))
-    mean = np.asarray(total / np.maximum(number, 1.0), np.float64)
-    away = np.asarray(order[seen] * nominal, np.float64)
-    edge, std = fit_edge(away, mean[seen], number[seen], nominal / blades)
-    return edge * fastest / nominal, std
+    return edge * fastest, float(np.hypot(std, AROUND_LINES)) * fastest

@@ -1,118 +1,222 @@
-"""Where the line family of a rotor ends: the edge fitted to all lines, instead of a threshold and a count."""
+"""Where the line family of a rotor ends: the tip's order fitted to all its lines, instead of a threshold and a count.
 
-from functools import lru_cache
+The line of rotation order n of a blade whose reflectivity is g(u), u = 0..1 from the hub to the tip, has the amplitude
+of the n-th Fourier coefficient of the integral of g(u) exp(j Gamma u cos(theta)): for all of it at the tip J_n(Gamma),
+the paper's eq. (24). Gamma, the phase deviation at the tip (eq. 16), is the tip's Doppler frequency in rotation rates.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
-#: Phase deviation of the blade the roll-off is tabulated from [rad]; in its own unit it is the same for all.
-_GAMMA = 400
+#: Blades that a fit to an unknown number of them tries, and how likely they are beforehand.
+BLADES = {1: 0.1, 2: 0.65, 3: 0.25}
 
-#: Range of the table, in units of the roll-off's width.
-_REACH = 6.0
+#: Likewise blades that reflect evenly, and points at their tips: a model of the literature rather than a blade. The
+#: lines of a drone measured with a tag on one blade speak for even blades against such that fade towards the tip.
+PROFILES = (0.95, 0.05)
+
+#: Lines so far below the family's level do not count: a share of its power, added to noise and lines alike. There is
+#: what strong lines leak, and what blades unlike the ideal ones put past the tip.
+LEAK_SHARE = 0.002
+
+#: How unlike the model the powers of the lines may be: variances over the mean's square. The lines decide.
+SHARES = tuple(1e-6 * 4.0**step for step in range(11))
+
+#: Each of these is so likely beforehand beside the one before it.
+SHARE_FALL = 0.6
+
+#: Widths of the roll-off, Gamma^(1/3) orders, past the tip that lines are followed.
+REACH = 3.0
+
+#: Gauss-Newton steps of the level.
+LEVEL_STEPS = 2
+
+#: In place of 0 [rad].
+NEAR_ZERO = 1e-4
+
+#: Step of the first search [lines]: the lines' ripple repeats every pi of the phase deviation.
+STEP = 0.2
+
+#: The first search goes so far about all lines that may be the last [lines], which the coarse one has as likely as this
+#: [nats], in so many steps at most; and no nearer to the body than this.
+HALF_RANGE, COARSE_NATS, MOST_STEPS, LEAST_EDGE = 2.5, 6.0, 60, 0.7
+
+#: Searches, each about what is left of the one before in so many steps, until the deviation is so many of these.
+SEARCHES, FINE, FINE_ENOUGH = 5, 30, 1.5
+
+#: Hypotheses less likely than this are left out.
+NEGLIGIBLE = 1e-3
+
+#: The coarse search has no model of the roll-off: what lies so far below the level is not seen there.
+COARSE_LEAK_SHARE = 0.03
 
 
-#: What strong lines leak past the edge, and blades unlike the uniform one put there, as a share of their power.
-LEAK_SHARE = 0.001
+def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[np.float64]:
+    """Powers of the lines of rotors whose blades reflect evenly, and at the tip alone.
 
-
-#: What the fit is off by where noise is no limit, in spacings: a real blade's roll-off is not the uniform one's.
-MODEL_ERROR_SPACINGS = 0.1
-
-
-#: How unlike the powers of a family's lines may be: variances over the mean's square. A uniform blade's inner lines
-#: are nearly equal, a real one's fade and scatter; what the lines themselves show decides.
-POWER_VARIANCES = (0.02, 0.1, 0.3, 1.0)
-
-#: Step of the edges tried, in spacings.
-FINE_STEP = 1 / 12
-
-
-@lru_cache(maxsize=1)
-def roll_off() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Line power of a uniform blade about the tip's Doppler, 1 well inside.
-
-    A line of rotation order n has the amplitude (1 / Gamma) x integral of J_n from 0 to Gamma, Gamma the phase
-    deviation at the tip (the paper's eq. 16). Near n = Gamma that depends on (n - Gamma) / Gamma^(1/3) alone.
+    Parameters
+    ----------
+    gamma : ndarray, shape (tips,)
+        Phase deviation at the tip [rad].
+    blades : int
+        Equal blades: only every so many-th order has a line.
+    count : int
+        Lines wanted, orders `blades` to `count` x `blades`.
 
     Returns
     -------
-    place, power : ndarray
-        Place (n - Gamma) / Gamma^(1/3), rising from -`_REACH`, and power there.
+    ndarray of float64, shape (2, tips, count)
+        Relative to a blade at rest.
     """
-    angle = 2 * np.pi * np.arange(8192) / 8192
-    x = _GAMMA * np.cos(angle) / 2
-    lines = np.fft.fft(np.exp(1j * x) * np.sinc(x / np.pi)) / len(angle)
-    order = np.arange(int(_GAMMA - 6 * _GAMMA ** (1 / 3)), _GAMMA + 200)
-    return (order - _GAMMA) / _GAMMA ** (1 / 3), np.abs(lines[order] * _GAMMA) ** 2
-
-
-def expected_power(away: NDArray[np.float64], edge: NDArray[np.float64], rotation: float) -> NDArray[np.float64]:
-    """Line power at distances from the body, 1 well inside the edge; shapes of `away` and `edge` broadcast."""
-    place, power = roll_off()
-    width = rotation * np.maximum(edge / rotation, 1.0) ** (1 / 3)
-    return np.interp((away - edge) / width, place, power, left=1.0, right=0.0)
+    widest = float(gamma.max())
+    # of an even number of blades only the real part is there, the same on both sides of a right angle
+    fold = 2 - blades % 2
+    orders = blades // fold * np.arange(1, count + 1)
+    # orders past the middle of the transform stand for what lies beyond the tip, where nothing is
+    beyond = int(widest + 6 * widest ** (1 / 3)) // fold
+    steps = fft.next_fast_len(max(count * blades // fold, (count * blades // fold + beyond) // 2) + 8, real=True)
+    z = gamma[:, None] * np.cos(np.pi / fold * np.arange(steps + 1) / steps)
+    z[np.abs(z) < NEAR_ZERO] = NEAR_ZERO
+    sine, cosine = np.sin(z), np.cos(z)
+    parts = [np.stack([sine / z, cosine])]
+    if fold == 1:
+        parts.append(np.stack([(1 - cosine) / z, sine]))
+    powers = np.empty((2, len(gamma), count))
+    for odd, part in enumerate(parts):
+        own = orders % 2 == odd if fold == 1 else slice(None)
+        powers[..., own] = fft.dct(part, 1)[..., orders[own]]
+    return (powers / (2 * steps)) ** 2
 
 
 def _log_likelihood(
-    shape: NDArray[np.float64], power: NDArray[np.float64], bins: NDArray[np.float64], level: float, share: float
+    shape: NDArray[np.float64],
+    power: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    bins: NDArray[np.float64],
+    shares: NDArray[np.float64],
+    leak: float,
 ) -> NDArray[np.float64]:
-    """Log likelihood of expected line powers `level` x `shape` over the noise.
+    """Log likelihood of line powers in noise, the family's level the likeliest, shape (..., shares).
 
-    The mean of lines of the amplitudes' variance `share` x level^2 in noise, as a gamma law of the same mean and
-    variance: exact for noise alone and for lines that are complex Gaussian (share 1).
+    A mean of |line + noise|^2 as a gamma law of the same mean and variance: exact for noise alone.
     """
-    line = level * shape
-    mean = 1 + line
-    number = bins * mean**2 / (1 + 2 * line + share * line**2)
-    ratio = power / mean
+    excess, beat, own = power - noise, 2 * noise / bins, (noise + leak) ** 2 / bins
+    shape = shape[..., None, :]
+    level = np.maximum((shape @ excess) / (shape**2).sum(axis=-1), 1e-6)
+
+    def variance(line: NDArray[np.float64]) -> NDArray[np.float64]:
+        out = shares * line
+        out += beat
+        out *= line
+        out += own
+        return out
+
+    for _ in range(LEVEL_STEPS):
+        pull = variance(level[..., None] * shape)
+        np.divide(shape, pull, out=pull)
+        fisher = (pull[..., None, :] @ shape[..., None])[..., 0, 0]
+        level = np.maximum((pull @ excess) / fisher, 0.05 * level)
+    line = level[..., None] * shape
+    mean = line + (noise + leak)
+    number = mean**2
+    number /= variance(line)
+    ratio = np.divide(power + leak, mean, out=mean)
+    each = np.log(ratio)
+    each -= ratio
+    each += 1
+    each *= number
     # Stirling's series for the gamma function
-    return np.asarray((0.5 * np.log(number) - 1 / (12 * number) - number * (ratio - 1 - np.log(ratio))).sum(axis=-1))
+    each += 0.5 * np.log(number)
+    each -= np.divide(1 / 12, number, out=number)
+    # a level of any size is as likely: what the data leave of its logarithm
+    return np.asarray(each.sum(axis=-1) - 0.5 * np.log(level**2 * fisher + 1), np.float64)
 
 
 def fit_edge(
-    away: NDArray[np.float64], power: NDArray[np.float64], bins: NDArray[np.float64], rotation: float
+    order: NDArray[np.intp],
+    power: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    bins: NDArray[np.float64],
+    blades: int | None = None,
+    *,
+    scatter: NDArray[np.float64] | float = 0.0,
+    leak: float = LEAK_SHARE,
 ) -> tuple[float, float]:
     """Fit the edge of a line family.
 
     Parameters
     ----------
-    away : ndarray, shape (lines,)
-        Distance of the lines from the body, > 0 [any frequency unit].
+    order : ndarray of int, shape (lines,)
+        Orders of the chopping lines, rising, >= 1.
     power : ndarray, shape (lines,)
-        Mean power over noise about each line; noise alone has mean 1.
+        Mean power of each line with its noise, any unit.
+    noise : ndarray, shape (lines,)
+        Mean power of the noise there, > 0.
     bins : ndarray, shape (lines,)
         Independent bins in each mean.
-    rotation : float
-        Rotation rate, same unit as `away`; it sets how sharp the edge is.
+    blades : int, optional
+        Blades of the rotor: they set how sharp the edge is. Those of `BLADES` are tried where it is not known.
+    scatter : ndarray, shape (lines,), or float
+        What is known beforehand of how unlike the model the lines' powers are: variance over the mean's square.
+    leak : float
+        Share of the family's power that lines leak past its edge.
 
     Returns
     -------
     edge, edge_std : float
-        The tip's Doppler frequency and its standard deviation, in the unit of `away`.
+        The tip's Doppler frequency and its standard deviation [chopping frequencies].
     """
-    spacing = float(np.min(away))
-    power = np.maximum(power / (1 + LEAK_SHARE * float(np.quantile(power, 0.9))), 1e-3)
-    levels = np.geomspace(0.3, max(10.0, 2 * float(power.max())), 8)
-    coarse = np.arange(1.5 * spacing, away.max() + spacing, spacing)
-    shape = expected_power(away, coarse[:, None], rotation)
-    likelihood = np.logaddexp.reduce([_log_likelihood(shape, power, bins, level, 1.0) for level in levels], axis=0)
-    best = coarse[likelihood.argmax()]
-    fine = best + spacing * np.arange(-3, 3.01, FINE_STEP)
-    fine = fine[fine > spacing]
-    shape = expected_power(away, fine[:, None], rotation)
-    # the level that fits each edge best, and others as far off as chance allows
-    height = np.maximum(((power - 1) * bins * shape).sum(axis=1) / (bins * shape**2).sum(axis=1), 0.1)[:, None]
-    total = (bins * shape).sum(axis=1)[:, None]
-    tables = []
-    for share in POWER_VARIANCES:
-        off = np.sqrt((1 + 2 * height + share * height**2) / total)
-        for deviations in (-1.5, -0.5, 0.5, 1.5):
-            level = np.maximum(height + deviations * off, 0.05)
-            tables.append(_log_likelihood(shape, power, bins, level, share))
-    likelihood = np.logaddexp.reduce(tables, axis=0)
-    weight = np.exp(likelihood - likelihood.max())
-    weight /= weight.sum()
-    edge = float((weight * fine).sum())
-    spread = float(np.sqrt((weight * (fine - edge) ** 2).sum()))
-    return edge, float(np.hypot(spread, MODEL_ERROR_SPACINGS * spacing))
+    excess = np.maximum(power - noise, 0.0)
+    loud = float((excess**2).sum() / max(excess.sum(), 1e-9))
+    maybe = order[_coarse_nats(power, noise, bins, loud) > -COARSE_NATS]
+    low, high = maybe[0] - HALF_RANGE, maybe[-1] + HALF_RANGE
+    step = max(STEP, (high - low) / MOST_STEPS)
+    choices = list(BLADES) if blades is None else [blades]
+    # shares that the noise outweighs are all alike
+    least = 0.1 * float((noise / bins).mean()) / max(loud, 1e-9)
+    every = np.array([share for share in SHARES if share >= least or share == SHARES[-1]])
+    scatter = np.broadcast_to(scatter, power.shape)
+    prior = SHARE_FALL ** np.arange(len(SHARES))
+    prior = np.append(prior[: len(SHARES) - len(every) + 1].sum(), prior[len(SHARES) - len(every) + 1 :])
+    few = np.arange(len(every))[::-3]
+    for search in range(SEARCHES):
+        edges = np.arange(max(low, LEAST_EDGE), high + step, step)
+        near = order <= high + REACH * high ** (1 / 3) / min(choices) ** (2 / 3)
+        count = int(order[near][-1])
+        shapes = [line_powers(number * edges, number, count)[..., order[near] - 1] for number in choices]
+        weight = _log_likelihood(
+            np.stack(shapes), power[near], noise[near], bins[near], every[few, None] + scatter[near], leak * loud
+        )
+        weight += np.log(np.outer([BLADES.get(number, 1.0) for number in choices], PROFILES))[..., None, None]
+        weight += np.log(prior[few] / edges[:, None])
+        weight = np.exp(weight - weight.max())
+        weight /= weight.sum()
+        along = weight.sum(axis=(0, 1, 3))
+        edge = float((along * edges).sum())
+        std = float(np.sqrt((along * (edges - edge) ** 2).sum()))
+        held = np.flatnonzero(along > NEGLIGIBLE)
+        low, high = edges[held[0]] - step, edges[held[-1]] + step
+        wider = HALF_RANGE * np.array([held[0] == 0 and low > LEAST_EDGE, held[-1] == len(edges) - 1])
+        if search and not wider.any() and std > FINE_ENOUGH * step:
+            break
+        low, high = low - wider[0], high + wider[1]
+        step = (high - low) / FINE
+        choices = [number for number, own in zip(choices, weight, strict=True) if own.sum() > NEGLIGIBLE]
+        live = few[weight.sum(axis=(0, 1, 2)) > NEGLIGIBLE]
+        few = np.arange(max(live.min() - 2, 0), min(live.max() + 3, len(every)))
+    return edge, std
+
+
+def _coarse_nats(
+    power: NDArray[np.float64], noise: NDArray[np.float64], bins: NDArray[np.float64], loud: float
+) -> NDArray[np.float64]:
+    """Log likelihood of each line to be the last of a family of one level, less that of the likeliest.
+
+    Powers are exponentials; far under the level, where a family rolls off, nothing counts.
+    """
+    ratio = (power + COARSE_LEAK_SHARE * loud) / (noise + COARSE_LEAK_SHARE * loud)
+    total, number = np.cumsum(bins * ratio), np.cumsum(bins)
+    mean = np.maximum(total / number, 1.0)
+    nats = number * (mean - 1 - np.log(mean))
+    return np.asarray(nats - nats.max(), np.float64)

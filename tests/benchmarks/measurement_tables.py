@@ -97,7 +97,7 @@ def bandwidth(draws: int) -> None:
     print(f"bandwidth, {draws} draws a row, rates jittered by 1 %; errors are medians of |found / eq. 26 - 1|")
     print("type  SNR | found  edge fit %  bias %  normalised variance  rule 20 dB %  length %  95 % of |v| errors m/s")
     for number, (length_m, rpm, count, velocity_mps, beta_rad) in TYPES.items():
-        for snr_db in (10, 0, -10):
+        for snr_db in (30, 10, 0, -10):
             rng = np.random.default_rng(number)
             rows = []
             for _ in range(draws):
@@ -120,9 +120,9 @@ def bandwidth(draws: int) -> None:
             fit, std, rule, length, speed = np.array(rows).T
             given = np.isfinite(fit)
             print(
-                f"{number:4d} {snr_db:4d} | {given.mean():5.2f} {100 * np.nanmedian(np.abs(fit)):10.2f} "
-                f"{100 * np.nanmedian(fit):8.2f} {variance((fit / std)[given]):>20s} "
-                f"{100 * np.median(np.abs(rule)):12.2f} {100 * np.nanmedian(np.abs(length)):9.2f} "
+                f"{number:4d} {snr_db:4d} | {given.mean():5.2f} {100 * np.nanmedian(np.abs(fit)):10.3f} "
+                f"{100 * np.nanmedian(fit):8.3f} {variance((fit / std)[given]):>20s} "
+                f"{100 * np.median(np.abs(rule)):12.2f} {100 * np.nanmedian(np.abs(length)):9.3f} "
                 f"{np.quantile(speed, 0.95):12.3f}",
                 flush=True,
             )

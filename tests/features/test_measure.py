@@ -6,7 +6,6 @@ from bladewing.features.comb_fit import fit_combs
 from bladewing.features.flashes import flash_nats
 from bladewing.features.lines import LineSpace, line_products, sum_of_lines
 from bladewing.features.periodogram import prepare, without_clicks
-from bladewing.features.rotor_band import expected_power, fit_edge
 from bladewing.features.slow_lines import remove_bands, slepian, without_bands
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
@@ -156,14 +155,6 @@ def test_slepian_sequences_take_out_a_band_and_leave_the_rest():
     inside, outside = np.exp(2j * np.pi * 0.1012 * time), np.exp(2j * np.pi * 0.15 * time)
     assert np.mean(np.abs(remove_bands(1e4 * inside, [(0.1, 3.0), (0.3, 3.0)])) ** 2) < 1e-4
     assert np.mean(np.abs(remove_bands(outside, [(0.1, 3.0)])) ** 2) > 0.9
-
-
-def test_the_edge_of_an_ideal_family_is_found():
-    away = np.arange(1, 60) * 117.0
-    power = 1 + 300 * expected_power(away, np.array(3610.0), 58.5)
-    edge, std = fit_edge(away, power, np.ones(59), 58.5)
-    assert edge == pytest.approx(3610, rel=0.01)
-    assert 0 < std < 117
 
 
 def test_evidence_needs_more_than_chance():
