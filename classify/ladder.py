@@ -31,9 +31,10 @@ _ROUNDS = 40
 
 
 def shipped_account() -> dict[str, Any]:
-    """The models of the shipped `train.json`, name to account."""
-    text = resources.files("bladewing.models.pretrained").joinpath("train.json").read_text(encoding="utf-8")
-    return json.loads(text)["models"]
+    """The shipped models, name to account in `train.json`, which also tells of those that are on no front."""
+    folder = resources.files("bladewing.models.pretrained")
+    models = json.loads(folder.joinpath("train.json").read_text(encoding="utf-8"))["models"]
+    return {name: account for name, account in models.items() if folder.joinpath(f"{name}.onnx").is_file()}
 
 
 def front(account: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, float]]:

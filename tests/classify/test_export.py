@@ -120,24 +120,24 @@ def test_the_shipped_model_answers_the_same_from_raw_iq(radar, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def linear(tmp_path_factory):
+def small(tmp_path_factory):
     """A small exported graph and the records it answers for."""
     radar = {"carrier_hz": 10e9, "prf_hz": 20e3, "pulses": 200}
-    out = tmp_path_factory.mktemp("raw") / "linear.onnx"
-    export_raw_iq(out, **radar, model="features-linear")
+    out = tmp_path_factory.mktemp("raw") / "small.onnx"
+    export_raw_iq(out, **radar, model="spectrum-cnn-fast")
     return out, radar, opened(out)
 
 
-def test_a_batch_answers_like_its_records_alone(linear):
-    _, radar, session = linear
+def test_a_batch_answers_like_its_records_alone(small):
+    _, radar, session = small
     iq = records(8, **radar)
     together, apart = run(session, iq), [run(session, one[None]) for one in iq]
     np.testing.assert_allclose(together[0], np.concatenate([one[0] for one in apart]), atol=1e-5)
     np.testing.assert_array_equal(together[1], np.concatenate([one[1] for one in apart]))
 
 
-def test_records_that_cannot_be_judged_are_unknown_and_spoil_no_other(linear):
-    _, radar, session = linear
+def test_records_that_cannot_be_judged_are_unknown_and_spoil_no_other(small):
+    _, radar, session = small
     iq = records(5, **radar)
     alone = run(session, iq)
     iq[1], iq[2, 7], iq[3, 9] = 0, np.nan, np.inf
@@ -147,8 +147,8 @@ def test_records_that_cannot_be_judged_are_unknown_and_spoil_no_other(linear):
     np.testing.assert_allclose(probabilities[[0, 4]], alone[0][[0, 4]], atol=1e-6)
 
 
-def test_the_file_says_what_it_is_for_and_shows_any_change(linear):
-    out, radar, _ = linear
+def test_the_file_says_what_it_is_for_and_shows_any_change(small):
+    out, radar, _ = small
     content = out.read_bytes()
     verify(content)
     said = {entry.key: entry.value for entry in onnx.load_model_from_string(content).metadata_props}
@@ -160,8 +160,8 @@ def test_the_file_says_what_it_is_for_and_shows_any_change(linear):
         Classifier.load(out)
 
 
-def test_the_graph_needs_only_the_standard(linear):
-    out, *_ = linear
+def test_the_graph_needs_only_the_standard(small):
+    out, *_ = small
     model = onnx.load_model_from_string(out.read_bytes())
     assert {entry.domain for entry in model.opset_import} <= {"", "ai.onnx.ml"}
     assert {node.domain for node in model.graph.node} <= {"", "ai.onnx.ml"}
@@ -183,19 +183,25 @@ assert not any(name.startswith("bladewing") for name in sys.modules)
         (["--pulses", "50"], "50 pulses are fewer than 64"),
         (["--carrier-hz", "1e9"], "carrier 1 GHz is outside"),
         (["--carrier-hz", "-1"], "carrier_hz is -1"),
-        (["--model", "image-cnn"], "image-cnn reads 'image'"),
         (["--model", "nothing"], "no model 'nothing'"),
     ],
 )
 def test_what_cannot_be_exported_is_refused_and_nothing_written(options, rule, tmp_path, capsys):
     out = tmp_path / "raw.onnx"
-    given = ["--carrier-hz", "10e9", "--prf-hz", "20e3", "--pulses", "200", "--model", "features-linear", *options]
+    given = ["--carrier-hz", "10e9", "--prf-hz", "20e3", "--pulses", "200", "--model", "spectrum-cnn-fast", *options]
     assert main(["export", str(out), *given]) == 2
     assert rule in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
+def test_a_model_of_an_stft_is_refused(make_model, tmp_path):
+    of_stft = tmp_path / "joint.onnx"
+    of_stft.write_bytes(make_model(input_name="joint_features", width=INPUT_SHAPES["joint_features"][0]))
+    with pytest.raises(BadInput, match=r"joint\.onnx reads 'joint_features', of an STFT"):
+        export_raw_iq(tmp_path / "raw.onnx", carrier_hz=10e9, prf_hz=20e3, pulses=200, model=of_stft)
+
+
 def test_a_folder_that_is_missing_is_bad_input(tmp_path, capsys):
-    given = ["--carrier-hz", "10e9", "--prf-hz", "20e3", "--pulses", "200", "--model", "features-linear"]
+    given = ["--carrier-hz", "10e9", "--prf-hz", "20e3", "--pulses", "200", "--model", "spectrum-cnn-fast"]
     assert main(["export", str(tmp_path / "none" / "raw.onnx"), *given]) == 2
     assert "cannot be written" in capsys.readouterr().err

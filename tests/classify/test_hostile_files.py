@@ -221,7 +221,7 @@ def test_a_toml_of_ten_gigabytes_is_not_read(tmp_path, capsys):
         assert "may have" in (said := capsys.readouterr().err) or "at most" in said
 
 
-def shipped(name="features-linear"):
+def shipped(name="spectrum-cnn-fast"):
     with open(f"{pretrained[0]}/{name}.onnx", "rb") as file:
         return file.read()
 

@@ -1,8 +1,12 @@
 """A model by its place on the front, or by a budget of time."""
 
+import json
+from importlib import resources
+
 import numpy as np
 import pytest
 from bladewing.classify import BadInput, Classifier, inference, ladder
+from bladewing.classify.inference import model_names
 from bladewing.classify.ladder import by_budget, by_place, front
 
 
@@ -41,12 +45,12 @@ def test_models_without_costs_are_refused_by_one_line():
 
 
 def test_the_classifier_loads_by_place_and_by_budget(monkeypatch):
-    shipped = account(**{"features-linear": (40, 0.5), "spectrum-cnn": (50, 0.7)})
+    shipped = account(**{"spectrum-cnn-fast": (40, 0.5), "spectrum-cnn": (50, 0.7)})
     monkeypatch.setattr(inference, "shipped_account", lambda: shipped)
     monkeypatch.setattr(inference, "measured_fft_us", lambda: 2.0)
-    assert Classifier.load("fast").metadata["name"] == "features-linear"
+    assert Classifier.load("fast").metadata["name"] == "spectrum-cnn-fast"
     assert Classifier.load("best").metadata["name"] == "spectrum-cnn"
-    assert Classifier.load(budget_us=99).metadata["name"] == "features-linear"
+    assert Classifier.load(budget_us=99).metadata["name"] == "spectrum-cnn-fast"
     assert Classifier.load(budget_us=100).metadata["name"] == "spectrum-cnn"
     for wrong, rule in [({"budget_us": -1}, "budget_us is -1"), ({"name_or_path": "fast", "budget_us": 9}, "one of")]:
         with pytest.raises(BadInput, match=rule):
@@ -60,3 +64,11 @@ def test_the_bare_fft_has_a_time():
 
 def test_every_place_of_the_shipped_ladder_loads():
     assert {Classifier.load(place).metadata["product"] for place in ladder.PLACES} == {"bladewing"}
+
+
+def test_the_package_holds_what_is_on_the_front_and_nothing_else():
+    folder = resources.files("bladewing.models.pretrained")
+    trained = json.loads(folder.joinpath("train.json").read_text(encoding="utf-8"))["models"]
+    assert set(model_names()) == {name for name, _ in front(trained)}
+    assert set(ladder.shipped_account()) == set(model_names())
+    assert sum(len(folder.joinpath(f"{name}.onnx").read_bytes()) for name in model_names()) <= 1_000_000

@@ -223,7 +223,7 @@ def _toml_seeds() -> tuple[bytes, ...]:
 
 def _model_seeds() -> tuple[bytes, ...]:
     folder = resources.files("bladewing.models.pretrained")
-    return ((folder / "features-linear.onnx").read_bytes(), (folder / "spectrum-cnn.onnx").read_bytes())
+    return ((folder / "spectrum-cnn-fast.onnx").read_bytes(), (folder / "spectrum-cnn.onnx").read_bytes())
 
 
 def _dataset_seeds(place: Path) -> tuple[bytes, ...]:

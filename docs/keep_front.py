@@ -1,0 +1,25 @@
+"""Take every model out of models/pretrained that another beats in accuracy at less cost: python docs/keep_front.py.
+
+`train.json` keeps the accounts of all, so that the front can be read there.
+"""
+
+import json
+from pathlib import Path
+
+from bladewing.classify.ladder import front
+
+PRETRAINED = Path(__file__).parents[1] / "models" / "pretrained"
+
+
+def main() -> None:
+    """Remove the files."""
+    account = json.loads((PRETRAINED / "train.json").read_text(encoding="utf-8"))["models"]
+    kept = {name for name, _ in front(account)}
+    for file in PRETRAINED.glob("*.onnx"):
+        if file.stem not in kept:
+            file.unlink()
+            print(f"took out {file.stem}")
+
+
+if __name__ == "__main__":
+    main()
