@@ -16,7 +16,7 @@ from .comb_fit import MARGIN_ORDERS, CombFit, fit_combs
 from .comb_search import FINE_STEPS, Candidate, line_evidence, score, spacing_limits
 from .lines import sum_of_lines
 from .periodogram import BLOCK_BINS, LEAST_LEVEL, Periodogram, local_level
-from .rotors import Rotors, separate_rotors
+from .rotors import Rotors, judged, separate_rotors
 from .slow_lines import remove_bands
 
 #: Ratio of tail to main chopping frequency: 4.73 in the paper, 4 to 6 in general, and some room.
@@ -111,7 +111,7 @@ def find_gear(data: Periodogram, comb: Comb, edge: float) -> tuple[Gear | None, 
     if gear is not None and (len(rotors.rates) > 1 or not rotors.resolved):
         gear, reason = None, "no second comb: several rotors of nearly one rate, or of a changing one"
         rotors = separate_rotors(data, comb, edge)
-    return gear, rotors, reason
+    return gear, rotors if gear is not None else judged(rotors, data, comb, edge), reason
 
 
 def _second_comb(data: Periodogram, comb: Comb) -> tuple[Gear | None, str]:

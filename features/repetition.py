@@ -178,7 +178,7 @@ def repetition(levels: LevelSpectrum, low_hz: float, high_hz: float) -> Repetiti
     good = peaks[best[peaks] >= most - max(FASTER_LESS, FASTER_SHARE * most)]
     chosen = int(good[-1]) if len(good) else int(best.argmax())
     multiples = np.arange(1, int(orders[chosen]) + 1)
-    place = np.array([levels.places(rates[chosen], k) for k in multiples])
+    place = np.array([levels.places(rates[chosen], int(k)) for k in multiples])
     power = np.abs(levels.whole[place]) ** 2
     moving = np.abs(levels.moving[place]) ** 2
     limit = 5 * np.sqrt(len(multiples))
