@@ -235,15 +235,16 @@ def _heights(evidence: NDArray[np.float32], spacings: NDArray[np.float64], centr
     while start < len(spacings):  # combs of about as many lines are summed together
         stop = min(int(np.searchsorted(spacings, 1.3 * spacings[start])), start + ROWS_AT_ONCE)
         widest = (0.5 / spacings[start:stop]).astype(np.intp)
-        order = np.arange(1, widest[0] + 1)
-        beyond = order > widest[:, None]
-        place = np.rint((spacings[start:stop] * size)[:, None] * np.where(beyond, 0, order)).astype(np.intp)
+        # orders first: their running sums then go over whole rows at a time
+        order = np.arange(1, widest[0] + 1)[:, None]
+        beyond = order > widest
+        place = np.rint((spacings[start:stop] * size) * np.where(beyond, 0, order)).astype(np.intp)
         best = np.full(stop - start, -np.inf, np.float32)
         for row in folded:
             seen = row.take(place, mode="clip")
             seen[beyond] = 0.0
-            seen.cumsum(axis=1, out=seen)
-            np.maximum(best, seen.max(axis=1), out=best)
+            seen.cumsum(axis=0, out=seen)
+            np.maximum(best, seen.max(axis=0), out=best)
         out[start:stop] = best
         start = stop
     return out
