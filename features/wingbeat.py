@@ -46,7 +46,7 @@ LOBE_CELLS = 1.5
 
 #: Wings are no further than this below the body [dB], and flash: their power swings by this much over a beat. Limbs and
 #: wheels echo all the time.
-MOST_BODY_DB, LEAST_SWING = 28.0, 0.5
+MOST_BODY_DB, LEAST_SWING = 32.0, 0.5
 
 #: A walker's legs swing in step, so that the pattern repeats at twice the gait, up to this [Hz]; the body moves no
 #: faster than this [m/s], and the feet about it at most so many times as fast.
