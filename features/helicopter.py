@@ -16,7 +16,7 @@ from .comb_fit import MARGIN_ORDERS, CombFit, fit_combs
 from .comb_search import FINE_STEPS, Candidate, line_evidence, score, spacing_limits
 from .lines import sum_of_lines
 from .periodogram import BLOCK_BINS, LEAST_LEVEL, Periodogram, local_level
-from .rotors import Rotors, separate_rotors
+from .rotors import Rotors, judged, separate_rotors
 from .slow_lines import remove_bands
 
 #: Ratio of tail to main chopping frequency: 4.73 in the paper, 4 to 6 in general, and some room.
@@ -111,7 +111,7 @@ def find_gear(data: Periodogram, comb: Comb, edge: float) -> tuple[Gear | None, 
     if gear is not None and (len(rotors.rates) > 1 or not rotors.resolved):
         gear, reason = None, "no second comb: several rotors of nearly one rate, or of a changing one"
         rotors = separate_rotors(data, comb, edge)
-    return gear, rotors, reason
+    return gear, rotors if gear is not None else judged(rotors, data, comb, edge), reason
 
 
 def _second_comb(data: Periodogram, comb: Comb) -> tuple[Gear | None, str]:
@@ -235,15 +235,16 @@ def _heights(evidence: NDArray[np.float32], spacings: NDArray[np.float64], centr
     while start < len(spacings):  # combs of about as many lines are summed together
         stop = min(int(np.searchsorted(spacings, 1.3 * spacings[start])), start + ROWS_AT_ONCE)
         widest = (0.5 / spacings[start:stop]).astype(np.intp)
-        order = np.arange(1, widest[0] + 1)
-        beyond = order > widest[:, None]
-        place = np.rint((spacings[start:stop] * size)[:, None] * np.where(beyond, 0, order)).astype(np.intp)
+        # orders first: their running sums then go over whole rows at a time
+        order = np.arange(1, widest[0] + 1)[:, None]
+        beyond = order > widest
+        place = np.rint((spacings[start:stop] * size) * np.where(beyond, 0, order)).astype(np.intp)
         best = np.full(stop - start, -np.inf, np.float32)
         for row in folded:
             seen = row.take(place, mode="clip")
             seen[beyond] = 0.0
-            seen.cumsum(axis=1, out=seen)
-            np.maximum(best, seen.max(axis=1), out=best)
+            seen.cumsum(axis=0, out=seen)
+            np.maximum(best, seen.max(axis=0), out=best)
         out[start:stop] = best
         start = stop
     return out

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
 from .comb import Comb
 from .comb_fit import CombFit, fit_combs
 from .comb_search import line_evidence, score
 from .flashes import flash_nats
-from .periodogram import BLOCK_BINS, LINE_DB, Periodogram
+from .periodogram import BLOCK_BINS, LINE_DB, Periodogram, squared
 
 #: Rotors looked for at most.
 MAX_ROTORS = 8
@@ -29,6 +30,16 @@ LEAST_POWER_SHARE = 0.12
 
 #: Steps of the joint fit each time a rotor is added.
 JOINT_STEPS = 3
+
+#: A rotor flashes once a period on each side of the body. A second flash of this share of the first one's power is
+#: another rotor's, of a rate that the dwell does not tell apart; so far from the first it is no part of it [1 / lines].
+SECOND_FLASH_SHARE, FLASH_WIDTH, FLASH_PADDING = 0.3, 2.5, 16
+LEAST_FLASH_LINES = 6
+
+#: What is left between the lines within the band, over what is left beyond it, and as a share of the lines' power,
+#: speaks of rotors that were not found where it exceeds both of these.
+LEFT_OVER, LEFT_SHARE = 0.3, 0.05
+LEAST_BINS = 100
 
 #: Rates nearer than this are one: so many bins apart at the outermost order.
 RESOLVED_BINS = 0.9
@@ -77,6 +88,44 @@ def _strongest(data: Periodogram, centre: float, rates: NDArray[np.float64]) -> 
     sums = powers + flashes
     best = int(sums.argmax())
     return float(rates[best]), int(reach[best]), float(sums[best])
+
+
+def _flashes_twice(fit: CombFit, per_turn: int) -> bool:
+    """True where a comb's phases show the flashes of two rotors in each period."""
+    shares = []
+    for sign in (-1, 1):
+        side = np.flatnonzero((sign * fit.orders > 0) & (fit.orders % per_turn == 0))
+        order = np.abs(fit.orders[side]) // per_turn
+        if len(side) < LEAST_FLASH_LINES:
+            continue
+        lines = np.zeros(order.max() + 1, np.complex128)
+        lines[order] = fit.amplitudes[side]
+        size = FLASH_PADDING * len(lines)
+        power = np.abs(fft.fft(lines, size)) ** 2
+        first = int(power.argmax())
+        lines_away = np.abs((np.arange(size) - first + size // 2) % size - size // 2) / FLASH_PADDING
+        other = lines_away > FLASH_WIDTH
+        for part in (2, 3):  # unequal blades of one rotor flash at fractions of the turn
+            other &= np.abs(lines_away - len(lines) / part) > 1
+        shares.append(power[other].max(initial=0) / power[first])
+    return len(shares) == 2 and min(shares) > SECOND_FLASH_SHARE / 2 and sum(shares) > 2 * SECOND_FLASH_SHARE
+
+
+def _left_over(rest: Periodogram, fits: list[CombFit], edge: float) -> bool:
+    """True where more is left within the band than the noise beyond it."""
+    frequency = fft.fftfreq(rest.pulses)
+    away = np.abs(frequency - fits[0].centre)
+    away = np.abs(away - np.rint(away))
+    usable = rest.usable(frequency)
+    within = usable & (away < 0.9 * edge) & (away > 2 * fits[0].spacing)
+    beyond = usable & (away > 1.1 * edge)
+    if within.sum() < LEAST_BINS or beyond.sum() < LEAST_BINS:
+        return False
+    power = squared(fft.fft(rest.samples)) / rest.pulses
+    noise = float(power[beyond].mean())
+    over = float(power[within].mean()) - noise
+    lines = sum(float((np.abs(fit.amplitudes) ** 2).sum()) for fit in fits) * rest.pulses
+    return over > LEFT_OVER * noise and over * within.sum() > LEFT_SHARE * lines
 
 
 def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
@@ -142,3 +191,24 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
         return replace(alone, resolved=False, spread=float(np.ptp(found)))
     spread = float(np.ptp(found)) if resolved else max(spread, float(np.ptp(found)))
     return Rotors(found, np.array([fit.spacing_std for fit in fits]), resolved, spread, fits, rest.samples)
+
+
+def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float) -> Rotors:
+    """Rotors, called unresolved where their flashes, or what they leave, speak of more than were found.
+
+    Parameters
+    ----------
+    rotors : Rotors
+        From `separate_rotors`.
+    data, comb, edge
+        As there.
+    """
+    if not rotors.resolved:
+        return rotors
+    several = len(rotors.fits) > 1
+    twice = any(_flashes_twice(fit, 1 if several else comb.per_turn) for fit in rotors.fits)
+    # what a single rotor leaves may be a change of its rate
+    if not twice and not (several and _left_over(data.left(rotors.rest), rotors.fits, edge)):
+        return rotors
+    reach = max(int(np.abs(rotors.fits[0].orders).max()), 1)
+    return replace(rotors, resolved=False, spread=max(rotors.spread, RESOLVED_BINS / (reach * data.pulses)))

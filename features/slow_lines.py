@@ -19,6 +19,12 @@ EXTRA_SEQUENCES = 11
 _HELD_STEPS = 8
 
 
+#: Points about a place that a table is read from, the others of each, and one over the products of their distances.
+_NODES = np.arange(-2, 4)
+_OTHER_NODES = np.array([[other for other in range(6) if other != node] for node in range(6)])
+_NODE_SCALES = 1 / (_NODES[:, None] - _NODES[_OTHER_NODES]).prod(axis=1)
+
+
 @lru_cache(maxsize=32)
 def slepian(pulses: int, half_bins: float) -> NDArray[np.float64]:
     """Orthonormal sequences that hold the signals within so many bins of frequency 0, shape (sequences, pulses).
@@ -121,7 +127,7 @@ def without_bands(
         Centre [cycles a sample] and half width [bins] of each band.
     """
     plains, timeds = [], []
-    nodes = np.arange(-2, 4)
+    nodes = _NODES
     for centre, half in bands:
         table = _held(pulses, float(half))
         away = frequency - centre
@@ -131,10 +137,8 @@ def without_bands(
         # the polynomial through six points; time counts from the middle, half a sample off where the pulses are even
         sign = 1 - 2 * (turns % 2) * (pulses % 2 == 0)
         gaps = (place - first)[:, None] - nodes
-        weights = [
-            np.prod(np.delete(gaps, i, 1), axis=1) / np.prod(n - np.delete(nodes, i)) for i, n in enumerate(nodes)
-        ]
-        held = sum(table[first + n] * (w * sign)[:, None, None] for n, w in zip(nodes, weights, strict=True))
+        weights = gaps[:, _OTHER_NODES].prod(axis=-1) * _NODE_SCALES * sign[:, None]
+        held = np.einsum("ln,lnks->lks", weights, table[first[:, None] + nodes])
         plains.append(held[:, 0])
         timeds.append(held[:, 1])
     if not plains:

@@ -8,29 +8,56 @@ from scipy import fft
 
 from .notch import body_line
 from .periodogram import LINE_DB
+from .repetition import HARMONICS, LevelSpectrum, Repetition, level_spectrum, repetition
 from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum
 from .stft import stft
 
 #: Wingbeats that are sought [Hz]: the slowest is a swan's in a slow beat, the fastest a small songbird's.
 WINGBEAT_RANGE_HZ = (2.4, 20.0)
 
+#: Rates so far below the slowest are looked at too: their flank must not pass for it [Hz].
+SLOWER_HZ = 0.2
+
 #: Shortest recording [s]: several beats of a slow bird.
 LEAST_S = 1.5
 
-#: Frames of the sequence [s], and from frame to frame.
-FRAME_S, HOP_S = 0.012, 0.003
+#: Frames of the sequence last so long [s], the longer the lower the carrier, for cells of this width [m/s]; and from
+#: frame to frame [s].
+FRAME_S, CELL_MPS, HOP_S = (0.012, 0.024), 1.0, 0.003
 
 #: Dwells by which the body is followed [s].
 BODY_DWELL_S = 0.1
 
-#: Wings move within this of the body [m/s]; what is over the noise further out must be below this share of the bins.
-WING_MPS, FAR_SHARE = 25.0, 0.1
+#: Wings move within this of the body [m/s], and birds fly no faster.
+WING_MPS = 25.0
 
-#: How well the pattern must repeat after a beat, over what it does between beats [1 of the pattern's power].
-LEAST_REPEAT = 0.5
+#: A repetition must have this much evidence [standard deviations], and this share of it must move through the
+#: velocities: what rises and falls at all of them alike is fading, or lines that beat.
+LEAST_EVIDENCE, LEAST_MOVING_SHARE = 40.0, 0.08
 
-#: The earliest repetition with this share of the best is the beat, not a multiple.
-FIRST_SHARE = 0.8
+#: As much evidence of the same rate further than the wings from the body speaks of a rotor [standard deviations].
+FAR_EVIDENCE = 15.0
+
+#: Rates up to this are looked at, for the multiples of the beat [Hz].
+HIGHEST_HZ = 48.0
+
+#: The window's main lobe to each side [cells].
+LOBE_CELLS = 1.5
+
+#: Wings are no further than this below the body [dB], and flash: their power swings by this much over a beat. Limbs and
+#: wheels echo all the time.
+MOST_BODY_DB, LEAST_SWING = 32.0, 0.5
+
+#: A walker's legs swing in step, so that the pattern repeats at twice the gait, up to this [Hz]; the body moves no
+#: faster than this [m/s], and the feet about it at most so many times as fast.
+GAIT_HZ, GAIT_MPS, LIMB_SPEEDS = 4.6, 3.0, 2.5
+
+#: A vehicle's wheels are this much weaker than its body [dB], roll so far a turn [m], and their rims move about the
+#: body so many times as fast as it moves itself: once, but for parts that show unlike speeds near the road.
+WHEEL_BODY_DB, WHEEL_TURN_M, RIM_SPEEDS = 6.0, (1.2, 4.5), (0.4, 1.3)
+
+#: What stands at rest in this sense is taken for the background [m/s, m/s^2], and taken out so far about velocity zero.
+REST_MPS, REST_MPS2, REST_NOTCH_MPS = 0.4, 0.15, 0.5
 
 
 @dataclass(frozen=True)
@@ -42,7 +69,7 @@ class Wingbeat:
     wingbeat_hz, wingbeat_hz_std : ndarray of float64, shape (...)
         Wingbeat rate [Hz].
     repeat : ndarray of float64, shape (...)
-        How well the pattern repeats, 0..1.
+        Share of the pattern's fluctuation that repeats, 0..1.
     velocity_mps : ndarray of float64, shape (...)
         Radial velocity of the body in the middle of the recording [m/s].
     acceleration_mps2, acceleration_mps2_std : ndarray of float64, shape (...)
@@ -60,12 +87,43 @@ class Wingbeat:
     reason: NDArray[np.str_]
 
 
+@dataclass(frozen=True)
+class _Motion:
+    """What repeats, beside the body.
+
+    Parameters
+    ----------
+    near_mps, far_mps : float
+        Range of its radial velocities [m/s], the cells' own width taken off; empty where it lies within the body's.
+    body_db : float
+        The body's power over it [dB].
+    swing : float
+        How far its power, all velocities together, swings over a beat: rms over mean times the root of 2 [1].
+    """
+
+    near_mps: float
+    far_mps: float
+    body_db: float
+    swing: float
+
+    @property
+    def reach_mps(self) -> float:
+        """Half the range of velocities [m/s]."""
+        return max((self.far_mps - self.near_mps) / 2, 0.0)
+
+    @property
+    def centre_mps(self) -> float:
+        """Its middle, without its sign [m/s]."""
+        return abs(self.far_mps + self.near_mps) / 2
+
+
 def wingbeat(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float) -> Wingbeat:
     """Wingbeat rate and body acceleration of long recordings, or why there is no wingbeat.
 
-    The body's trend is taken out first. Then the pattern of levels over velocity and time is compared with itself some
-    time later: it repeats after one beat. Up and down stroke lie on different sides of the body, so half a beat later
-    it does not.
+    A background at rest and the body's trend are taken out first. Then a rate is sought at which the pattern of levels
+    over velocity and time repeats (`repetition`). It is a wingbeat where wings can be what moves: not what rises and
+    falls at all velocities alike (fading), nor what repeats beyond the wings' speeds as well (rotors), nor what a
+    walker's limbs or a vehicle's wheels would do.
 
     Parameters
     ----------
@@ -91,57 +149,105 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     if len(iq) < LEAST_S * prf_hz:
         return (*nothing, f"no wingbeat: {len(iq) / prf_hz:.2g} s, less than {LEAST_S:g} s")
     scale = np.abs(iq).max()
-    if scale == 0 or round(FRAME_S * prf_hz) < 8:
+    if scale == 0 or round(FRAME_S[0] * prf_hz) < 8:
         return (*nothing, "no wingbeat: no signal" if scale == 0 else f"no wingbeat: PRF {prf_hz:g} Hz is too low")
     wavelength_m = SPEED_OF_LIGHT_MPS / carrier_hz
     if prf_hz * wavelength_m / 4 < 1.1 * WING_MPS:
         # a rotor folded into the wings' speeds cannot be told from them
         return (*nothing, f"no wingbeat: unambiguous only to {prf_hz * wavelength_m / 4:.1f} m/s")
-    velocity, acceleration, std = _track(iq / scale, carrier_hz, prf_hz)
+    shown, body = _followed(iq / scale, carrier_hz, prf_hz)
+    velocity, acceleration, _ = body
     if np.isnan(velocity):
         return (*nothing, "no wingbeat: no body line")
-    body = (velocity, acceleration, std)
     time_s = (np.arange(len(iq)) - (len(iq) - 1) / 2) / prf_hz
     turns = 2 / wavelength_m * (velocity * time_s + acceleration / 2 * time_s**2)
-    steady = iq / scale * np.exp(2j * np.pi * (turns - np.rint(turns))).astype(np.complex64)
-    frames = stft(steady, carrier_hz=carrier_hz, prf_hz=prf_hz, window_s=FRAME_S, overlap=1 - HOP_S / FRAME_S)
-    speed = np.abs(frames.frequency_hz) * wavelength_m / 2
+    steady = shown * np.exp(2j * np.pi * (turns - np.rint(turns))).astype(np.complex64)
+    frame_s = float(np.clip(wavelength_m / 2 / CELL_MPS, *FRAME_S))
+    frames = stft(steady, carrier_hz=carrier_hz, prf_hz=prf_hz, window_s=frame_s, overlap=1 - HOP_S / frame_s)
     # the floor from a low quantile of each bin's mean: wings fill the middle
-    mean = frames.power.mean(axis=0)
-    floor = float(np.quantile(mean, 0.2))
-    far = speed > WING_MPS
-    if far.any() and (mean[far] > 2 * floor).mean() > FAR_SHARE:
-        return (
-            np.nan,
-            np.nan,
-            np.nan,
-            *body,
-            f"no wingbeat: echoes beyond {WING_MPS:g} m/s of the body, too fast for wings",
-        )
-    level = np.log1p(frames.power[:, ~far] / np.float32(floor)).astype(np.float64)
-    # bouts and fading are slower than a beat
-    span = round(frames.frame_rate_hz / WINGBEAT_RANGE_HZ[0])
-    from scipy.ndimage import uniform_filter1d  # here, because predicting needs no such import
-
-    level -= uniform_filter1d(level, span, axis=0, mode="nearest")
-    count = len(level)
-    size = fft.next_fast_len(2 * count, real=True)
-    power = np.abs(fft.rfft(level, n=size, axis=0)) ** 2
-    # cells of noise alone say nothing of the beat
-    weight = np.maximum(mean[~far] / floor - 1.3, 0)
-    weight /= weight + 1
-    correlation = fft.irfft(power @ weight, n=size)[:count] * (count / (count - np.arange(count)))
-    if correlation[0] <= 0:
+    floor = float(np.quantile(frames.power.mean(axis=0, dtype=np.float64), 0.2))
+    # closing on the radar is a positive Doppler shift, and a velocity below the body's
+    velocities = velocity - frames.frequency_hz * wavelength_m / 2
+    near = np.abs(velocities - velocity) <= WING_MPS
+    levels = level_spectrum(frames.power[:, near], floor, frames.frame_rate_hz, HIGHEST_HZ)
+    if levels is None:
         return (np.nan, np.nan, np.nan, *body, "no wingbeat: nothing moves")
-    row = correlation / correlation[0]
-    low, high = WINGBEAT_RANGE_HZ
-    lag, lag_std, repeat = _repetition(row, FRAME_S * frames.frame_rate_hz, frames.frame_rate_hz / low)
-    if not repeat >= LEAST_REPEAT:
-        return (np.nan, np.nan, repeat, *body, f"no wingbeat: the pattern repeats by {max(repeat, 0):.2f} only")
-    rate = frames.frame_rate_hz / lag
-    if rate > high:
-        return (np.nan, np.nan, repeat, *body, f"no wingbeat: the pattern repeats at {rate:.0f} Hz, too fast for wings")
-    return (rate, rate * lag_std / lag, repeat, *body, "")
+    found = repetition(levels, WINGBEAT_RANGE_HZ[0] - SLOWER_HZ, WINGBEAT_RANGE_HZ[1])
+    far = level_spectrum(frames.power[:, ~near], floor, frames.frame_rate_hz, HIGHEST_HZ)
+    motion = _motion(found, frames.power[:, near], floor, velocities[near], velocity, frames.frame_rate_hz)
+    reason = _not_wings(found, velocity, motion, far)
+    if reason:
+        return (np.nan, np.nan, found.share, *body, f"no wingbeat: {reason}")
+    return (found.rate_hz, found.rate_hz_std, found.share, *body, "")
+
+
+def _motion(
+    found: Repetition,
+    power: NDArray[np.float32],
+    floor: float,
+    velocity_mps: NDArray[np.float64],
+    body_mps: float,
+    frame_rate_hz: float,
+) -> _Motion:
+    """How what repeats moves: power of the cells, shape (frames, cells), at these radial velocities."""
+    lobe = LOBE_CELLS * float(np.abs(np.diff(velocity_mps[:2])[0]))
+    inner = np.abs(velocity_mps - body_mps) <= lobe
+    cells = found.cells & ~inner
+    if not cells.any():
+        return _Motion(body_mps, body_mps, np.inf, 0.0)
+    seen = velocity_mps[found.cells]
+    over = power[:, cells].sum(axis=1, dtype=np.float64) - floor * cells.sum()
+    body = power[:, inner].sum(axis=1).mean() - floor * inner.sum()
+    weight = np.hanning(len(over) + 2)[1:-1]
+    turn = 2 * np.pi * found.rate_hz / frame_rate_hz * np.arange(len(over))
+    swings = np.exp(-1j * np.arange(1, HARMONICS + 1)[:, None] * turn) @ (weight * over)
+    mean = float(max(over.mean(), 1e-9 * floor))
+    swing = float(np.sqrt(2 * (np.abs(swings) ** 2).sum()) / (weight.sum() * mean))
+    return _Motion(
+        float(seen.min()) + lobe, float(seen.max()) - lobe, 10 * float(np.log10(max(body / mean, 1e-9))), swing
+    )
+
+
+def _not_wings(found: Repetition, body_mps: float, motion: _Motion, far: LevelSpectrum | None) -> str:
+    """Why a repetition is not a wingbeat; empty where it may be one."""
+    rate, reach, speed = found.rate_hz, motion.reach_mps, abs(body_mps)
+    if found.evidence < LEAST_EVIDENCE:
+        return f"nothing repeats: evidence {max(found.evidence, 0):.0f} below {LEAST_EVIDENCE:.0f}"
+    if found.moving_share < LEAST_MOVING_SHARE:
+        return f"what repeats at {rate:.1f} Hz rises and falls at all velocities alike, as fading does"
+    if far is not None and far.at(rate) > FAR_EVIDENCE:
+        return f"what repeats at {rate:.1f} Hz lies beyond {WING_MPS:g} m/s of the body too, too fast for wings"
+    if speed > WING_MPS:
+        return f"the body moves at {speed:.0f} m/s, faster than birds fly"
+    if rate < WINGBEAT_RANGE_HZ[0]:
+        return f"what repeats at {rate:.1f} Hz is too slow for wings"
+    if motion.body_db == np.inf:
+        return f"what repeats at {rate:.1f} Hz does not leave the body's cell"
+    if motion.body_db > MOST_BODY_DB:
+        return f"what repeats at {rate:.1f} Hz is {motion.body_db:.0f} dB below the body, too weak for wings"
+    if motion.swing < LEAST_SWING:
+        return f"what repeats at {rate:.1f} Hz echoes all the time, as limbs and wheels do, and not in flashes"
+    if rate < GAIT_HZ and speed < GAIT_MPS and reach < LIMB_SPEEDS * speed + 1:
+        return f"what repeats at {rate:.1f} Hz may be a walker's gait"
+    centre = max(motion.centre_mps, 0.1)
+    rolls = WHEEL_TURN_M[0] < centre / rate < WHEEL_TURN_M[1] and RIM_SPEEDS[0] < reach / centre < RIM_SPEEDS[1]
+    if rolls and motion.body_db > WHEEL_BODY_DB:
+        return f"what repeats at {rate:.1f} Hz may be a wheel's turn"
+    return ""
+
+
+def _followed(
+    iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float
+) -> tuple[NDArray[np.complex64], tuple[float, float, float]]:
+    """The samples without a background at rest, and the track of the body in them."""
+    body = _track(iq, carrier_hz, prf_hz)
+    if not (abs(body[0]) < REST_MPS and abs(body[1]) < REST_MPS2):
+        return iq, body
+    away = np.abs(fft.fftfreq(len(iq), 1 / prf_hz)) * SPEED_OF_LIGHT_MPS / carrier_hz / 2
+    kept = np.clip((away / REST_NOTCH_MPS - 1) / 0.3, 0, 1).astype(np.float32)
+    moving = fft.ifft(fft.fft(iq) * kept)
+    other = _track(moving, carrier_hz, prf_hz)
+    return (iq, body) if np.isnan(other[0]) else (moving, other)
 
 
 def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[float, float, float]:
@@ -163,46 +269,3 @@ def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple
     middle = float(np.median(rest))
     spread = 1.4826 * float(np.median(np.abs(rest - middle)))
     return middle, slope, spread / float(np.sqrt(((when - when.mean()) ** 2).sum()))
-
-
-def _repetition(row: NDArray[np.float64], shortest: float, longest: float) -> tuple[float, float, float]:
-    """Lag after which a pattern repeats, its deviation, and how well: over the correlation between the beats."""
-    first, last = max(2, int(shortest)), min(int(longest) + 1, len(row) // 3)
-    inner = row[first : last + 1]
-    peaks = first + np.flatnonzero((inner >= row[first - 1 : last]) & (inner > row[first + 1 : last + 2]))
-    best = (np.nan, np.nan, -1.0)
-    if not len(peaks):
-        return best
-    heights = np.array([_over(row, int(peak)) for peak in peaks])
-    top = heights.max()
-    chosen = int(np.flatnonzero(heights >= FIRST_SHARE * top)[0])
-    lag, height = float(peaks[chosen]), float(heights[chosen])
-    found, weights = [], []
-    for number in range(1, 8):
-        near, reach = round(number * lag), max(1, int(0.15 * lag))
-        if near + reach + 1 >= len(row) // 2:
-            break
-        peak = near - reach + int(row[near - reach : near + reach + 1].argmax())
-        if abs(peak - near) == reach or row[peak] < 0.4 * row[peaks[chosen]]:
-            break
-        left, middle, right = row[peak - 1 : peak + 2]
-        curve = 2 * middle - left - right
-        place = peak + (float(np.clip((right - left) / (2 * curve), -0.5, 0.5)) if curve > 0 else 0.0)
-        found.append(place / number)
-        weights.append(float(number**2))
-        lag = float(np.average(found, weights=weights))
-    if not found:
-        return best
-    scatter = float(np.sqrt(np.average((np.array(found) - lag) ** 2, weights=weights)))
-    # no better than a thirtieth of a frame's step at the last multiple
-    return lag, float(np.hypot(scatter, 0.03 / len(found))), height
-
-
-def _over(row: NDArray[np.float64], peak: int) -> float:
-    """Correlation after one and two beats over the lowest between and after them."""
-    if 5 * peak // 2 >= len(row):
-        return -1.0
-    reach = max(1, peak // 8)
-    again = row[2 * peak - reach : 2 * peak + reach + 1].max()
-    between = row[peak // 2 : peak].min(), row[peak : 2 * peak].min()
-    return float((row[peak] + again - sum(between)) / 2)

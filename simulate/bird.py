@@ -222,7 +222,7 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
         micro[rows] += moved * wings
         body[rows] += moved
     truth = {
-        "wingbeat_hz": beat,
+        "wingbeat_hz": rate[:, 0],  # what is rendered; of a flock, the first member's
         "mass_kg": mass,
         "span_m": span,
         "members": members.astype(float),

@@ -124,12 +124,15 @@ def tracks(classifier: Classifier, count: int) -> None:
             if not (truth["snr_db"][row] >= 0 or truth["kind"][row] == "noise"):
                 continue
             given = answer(Recording("drawn", samples, radar.carrier_hz, radar.prf_hz), classifier, dwell_s=DWELL_S)
-            bird = truth["label"][row] == "bird"
-            beat = wingbeat(samples, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz).wingbeat_hz if bird else np.nan
+            beat = wingbeat(samples, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
             declared_s = np.inf if given.declared_s is None else given.declared_s
             said = {"best": CLASSES[int(given.track.probabilities.argmax())], "final": given.track.label}
             said |= {"first": given.dwells.labels[0], "declared": given.track.declared, "declared_s": declared_s}
-            parts.append({name: values[row] for name, values in truth.items()} | said | {"beat": beat})
+            parts.append(
+                {name: values[row] for name, values in truth.items()}
+                | said
+                | {"beat": beat.wingbeat_hz, "beat_std": beat.wingbeat_hz_std}
+            )
     every = {name: np.array([part[name] for part in parts]) for name in parts[0]}
     truth = every["label"]
     print(f"\ntracks of {TRACK_S} s at 0 dB and above, dwells of {DWELL_S} s, {len(parts)} tracks")
@@ -152,7 +155,17 @@ def tracks(classifier: Classifier, count: int) -> None:
     error = np.abs(every["beat"] - every["wingbeat_hz"])[flapping]
     some = np.isfinite(error)
     close = (error[some] <= 0.3).mean()
-    print(f"wingbeat of flapping birds: found in {some.mean():.3f} of {len(some)}, of these within 0.3 Hz {close:.3f}")
+    print(
+        f"wingbeat of flapping birds: found in {some.mean():.3f} of {len(some)}, of these within 0.3 Hz {close:.3f}",
+        end="",
+    )
+    spread = np.mean((error / every["beat_std"][flapping])[some & (error <= 0.3)] ** 2)
+    print(f", normalised variance {spread:.2f}")
+    kinds = [kind for group in ("uav", "clutter") for kind in KINDS[group]]
+    false = {kind: np.isfinite(every["beat"][every["kind"] == kind]) for kind in kinds}
+    print(
+        "wingbeats where there is none: " + ", ".join(f"{kind} {hit.sum()}/{len(hit)}" for kind, hit in false.items())
+    )
     print(f"{'':16s} {'n':>6s} {'best':>8s} " + " ".join(f"{name:>8s}" for name in (*CLASSES, "unknown")))
     for kind in (kind for group in KINDS.values() for kind in group):
         rows = every["kind"] == kind

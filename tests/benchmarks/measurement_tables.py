@@ -175,6 +175,27 @@ def near_rotors(draws: int) -> None:
             )
 
 
+def random_rotors(draws: int) -> None:
+    """Rotors of random rates within 3 %, nearer than the dwell tells apart or not: number right, or told unresolved."""
+    print(f"rotors of random rates within 3 %, {draws} draws a row: number right, told resolved, right or unresolved")
+    for snr_db in (0, 10):
+        for count in (1, 2, 4, 6, 8):
+            rng = np.random.default_rng(100 * count + snr_db)
+            rows = []
+            for _ in range(draws):
+                rpm = np.sort(3450 * (1 + 0.03 * (rng.uniform(size=count) - 0.5)))
+                iq = records.record(rng, rpm / 60, snr_db=snr_db, body_db=20, velocity_mps=rng.uniform(-30, 30))
+                found = measure(iq, **records.RADAR)
+                spread = 30 * float(found.rotor_spread_hz) / max(float(np.ptp(rpm)), 1e-9)
+                rows.append((found.rotor_count == count, bool(found.rotors_resolved), spread))
+            right, resolved, spread = np.array(rows, float).T
+            print(
+                f"SNR {snr_db:3d} dB, {count} rotors: number {right.mean():.2f}, resolved {resolved.mean():.2f}, "
+                f"either {share((right > 0) | (resolved == 0))}, spread over true {np.nanmedian(spread):.2f}",
+                flush=True,
+            )
+
+
 def helicopter_record(rng: np.random.Generator, snr_db: float, tail_db: float) -> tuple[np.ndarray, float, float]:
     """A helicopter's record with the chopping frequencies of its rotors; the tail so many dB from the main rotor."""
     length_m, tip_mps = rng.uniform(0.3, 0.5), rng.uniform(60, 110)
@@ -322,6 +343,7 @@ TABLES = {
     "bandwidth": bandwidth,
     "rotors": single_rotors,
     "near-rotors": near_rotors,
+    "random-rotors": random_rotors,
     "helicopters": helicopters,
     "false-alarms": false_alarms,
     "joint": joint,

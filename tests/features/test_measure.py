@@ -7,6 +7,7 @@ from bladewing.features.flashes import flash_nats
 from bladewing.features.lines import LineSpace, line_products, sum_of_lines
 from bladewing.features.periodogram import prepare, without_clicks
 from bladewing.features.slow_lines import remove_bands, slepian, without_bands
+from bladewing.simulate import RotorMotion, rotor_echo
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
 
@@ -327,3 +328,24 @@ def test_the_blade_of_several_rotors_follows_from_the_fastest():
     assert found.rotor_count == 4
     assert found.body_velocity_mps == pytest.approx(0, abs=0.05)
     assert found.blade_length_m == pytest.approx(0.15, rel=0.03)
+
+
+@pytest.mark.parametrize("rpm", [(3430, 3433), (3400, 3404, 3420, 3460, 3462, 3495)])
+def test_rotors_nearer_than_the_dwell_tells_apart_are_not_called_resolved(rpm):
+    # 3 rpm are a quarter of a bin at the outermost line: one comb fits two rotors, whose flashes stand side by side
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        angles = rng.uniform(0, 2 * np.pi, len(rpm))
+        angles[1] = angles[0] + 0.7  # not the same flash
+        iq = sum(shifted(value / 60, angle) for value, angle in zip(rpm, angles, strict=True)) + 10 + white(rng, PULSES)
+        found = measure(iq, **RADAR)
+        assert not found.rotors_resolved
+        assert found.rotor_count < len(rpm)
+        assert found.rotor_spread_hz > 0
+
+
+def shifted(rate_hz, angle_rad):
+    """A rotor that begins at an angle."""
+    motion = RotorMotion(rate_hz, angle_rad)
+    times_s = np.arange(PULSES) / PRF_HZ
+    return 1.5 * rotor_echo(motion.angle_rad(times_s), wavelength_m=WAVELENGTH_M, blade_length_m=0.15)

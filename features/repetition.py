@@ -1,0 +1,238 @@
+"""What repeats in a pattern of levels over velocity and time, apart from what rises and falls at all velocities alike.
+
+Fading, a gain that wanders and two lines that beat lift and lower the level of every cell together: a pattern of rank
+one. What moves through the velocities, as wings do, is a pattern of a higher rank. So the common course is taken out
+first, and a rate is sought at whose multiples enough is left.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+#: Multiples of the rate that are looked at.
+HARMONICS = 6
+
+#: What each further multiple must bring [standard deviations of noise].
+HARMONIC_COST = 1.0
+
+#: A faster rate that has no less evidence than this [standard deviations], or share, under the best one's is the rate:
+#: the best one is then a fraction of it.
+FASTER_LESS, FASTER_SHARE = 15.0, 0.03
+
+#: The rate itself or twice it holds this share of the evidence.
+LOW_SHARE = 0.15
+
+#: Zeros appended: the spectrum is read between its bins.
+_PADDING = 8
+
+#: Span over which the continuum of fluctuations is followed [Hz], and where it begins.
+_CONTINUUM_HZ, _SLOWEST_HZ = 6.0, 2.0
+
+#: Stated deviations count neighbouring cells and frames as so much less than independent [1 of the variance].
+_OVERLAP = 2.3
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """The rate at which a pattern repeats, and what speaks for it.
+
+    Parameters
+    ----------
+    rate_hz, rate_hz_std : float
+        [Hz]
+    evidence : float
+        What is left at the rate's multiples beside the common course, over what chance leaves [standard deviations].
+    moving_share : float
+        Share of the repeating pattern that is no common course of all velocities, 0..1.
+    share : float
+        Share of the cells' fluctuation that repeats, 0..1.
+    cells : ndarray of bool, shape (cells,)
+        Where the pattern repeats.
+    """
+
+    rate_hz: float
+    rate_hz_std: float
+    evidence: float
+    moving_share: float
+    share: float
+    cells: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class LevelSpectrum:
+    """Spectrum over time of each cell's level, over its continuum.
+
+    Parameters
+    ----------
+    whole : ndarray of complex128, shape (rates, cells)
+        In units of the continuum's rms.
+    moving : ndarray of complex128, same shape
+        The same without the common course.
+    weight : ndarray of float64, shape (cells,)
+        How much a cell has to say, 0..1.
+    step_hz : float
+        From rate to rate [Hz].
+    """
+
+    whole: NDArray[np.complex128]
+    moving: NDArray[np.complex128]
+    weight: NDArray[np.float64]
+    step_hz: float
+
+    def excess(self, amplitudes: NDArray[np.complex128]) -> NDArray[np.float64]:
+        """Weighted power of the cells at each rate over that of chance [standard deviations], shape (rates,)."""
+        over = (amplitudes.real**2 + amplitudes.imag**2 - 1) @ self.weight
+        return np.asarray(over / np.sqrt(2 * (self.weight**2).sum() + 1e-9), np.float64)
+
+    def at(self, rate_hz: float) -> float:
+        """Excess of what is no common course at the first multiples of a rate, together."""
+        place = self.places(rate_hz, 1) * np.arange(1, HARMONICS + 1)
+        excess = self.excess(self.moving)
+        place = place[place < len(excess)]
+        return float(excess[place].sum() / np.sqrt(len(place)))
+
+    def places(self, rate_hz: NDArray[np.float64] | float, order: int) -> NDArray[np.intp]:
+        """Index of a multiple of rates."""
+        return np.asarray(np.rint(np.asarray(rate_hz) * order / self.step_hz), np.intp)
+
+
+def level_spectrum(
+    power: NDArray[np.float32], floor: float, frame_rate_hz: float, highest_hz: float
+) -> LevelSpectrum | None:
+    """Spectra of the levels of cells over time.
+
+    Parameters
+    ----------
+    power : ndarray of float32, shape (frames, cells)
+        Power of each cell over time.
+    floor : float
+        Noise power of a cell.
+    frame_rate_hz : float
+        Frames a second [Hz].
+    highest_hz : float
+        Highest rate that is kept [Hz].
+
+    Returns
+    -------
+    LevelSpectrum or None
+        None where no cell is over the noise.
+    """
+    from scipy.ndimage import median_filter  # here, because predicting needs no such import
+
+    mean = power.mean(axis=0, dtype=np.float64)
+    weight = np.maximum(mean / floor - 1.3, 0)  # cells of noise alone say nothing
+    weight /= weight + 1
+    if not weight.any():
+        return None
+    level = np.log1p(power / np.float32(floor)).astype(np.float64)
+    level -= level.mean(axis=0)
+    size = fft.next_fast_len(_PADDING * len(level), real=True)
+    step_hz = frame_rate_hz / size
+    taper = np.hanning(len(level) + 2)[1:-1, None]
+    spectrum = fft.rfft(level * taper, size, axis=0)[: int(highest_hz / step_hz) + 2]
+    squared = spectrum.real**2 + spectrum.imag**2
+    slowest = int(_SLOWEST_HZ / step_hz)
+    own = np.median(squared[slowest:], axis=0) + 1e-12
+    squared /= own
+    course = median_filter(squared.mean(axis=1), size=int(_CONTINUUM_HZ / step_hz) | 1, mode="nearest")
+    # the median of an exponential is log 2 of its mean
+    course *= np.median(squared[slowest:] / course[slowest:, None]) / np.log(2)
+    whole = spectrum / np.sqrt(own * course[:, None])
+    # a common gain shows in a cell by as much as its echo is over the noise
+    common = mean / (mean + floor) / np.sqrt(own)
+    weighed = common * weight
+    moving = whole - np.outer(whole @ weighed / (weighed @ common), common)
+    return LevelSpectrum(whole, moving, weight, step_hz)
+
+
+def repetition(levels: LevelSpectrum, low_hz: float, high_hz: float) -> Repetition:
+    """The rate between two limits at which a pattern repeats best.
+
+    Parameters
+    ----------
+    levels : LevelSpectrum
+        From `level_spectrum`.
+    low_hz, high_hz : float
+        Limits [Hz].
+
+    Returns
+    -------
+    Repetition
+    """
+    excess = levels.excess(levels.moving)
+    rates = np.arange(low_hz, high_hz, levels.step_hz / 3)
+    total, best, orders = np.zeros(len(rates)), np.full(len(rates), -np.inf), np.ones(len(rates), np.intp)
+    for order in range(1, HARMONICS + 1):
+        place = levels.places(rates, order)
+        inside = place < len(excess)
+        total += np.where(inside, excess[np.minimum(place, len(excess) - 1)] - HARMONIC_COST, -np.inf)
+        better = total > best
+        best[better], orders[better] = total[better], order
+    # a rate of which only a high multiple is seen is a fraction of that one's
+    low = np.maximum(*(excess[np.minimum(levels.places(rates, k), len(excess) - 1)] for k in (1, 2)))
+    best[low < LOW_SHARE * best] = -np.inf
+    peaks = 1 + np.flatnonzero((best[1:-1] >= best[:-2]) & (best[1:-1] > best[2:]))
+    most = best.max()
+    good = peaks[best[peaks] >= most - max(FASTER_LESS, FASTER_SHARE * most)]
+    chosen = int(good[-1]) if len(good) else int(best.argmax())
+    multiples = np.arange(1, int(orders[chosen]) + 1)
+    place = np.array([levels.places(rates[chosen], int(k)) for k in multiples])
+    power = np.abs(levels.whole[place]) ** 2
+    moving = np.abs(levels.moving[place]) ** 2
+    limit = 5 * np.sqrt(len(multiples))
+    cells = ((moving - 1).sum(axis=0) > max(limit, 0.03 * (moving - 1).sum(axis=0).max())) & (
+        (power - 1).sum(axis=0) > max(limit, 0.03 * (power - 1).sum(axis=0).max())
+    )
+    rate, std = _refined(levels, float(rates[chosen]), multiples, cells)
+    return Repetition(rate, std, float(best[chosen]), _moving_share(levels, place), _share(levels, power), cells)
+
+
+def _moving_share(levels: LevelSpectrum, place: NDArray[np.intp]) -> float:
+    """Share of the pattern at these places that no single course over time, whichever it be, explains."""
+    rows = levels.whole[place] * np.sqrt(levels.weight)
+    strength = np.linalg.svd(np.concatenate([rows.real, rows.imag]), compute_uv=False) ** 2
+    number = 2 * len(place)
+    noise = levels.weight.sum() * len(place)
+    over = strength[1:].sum() - noise * (number - 1) / number
+    return float(np.clip(over / max(strength.sum() - noise, 1e-9), 0, 1))
+
+
+def _share(levels: LevelSpectrum, power: NDArray[np.float64]) -> float:
+    """Share of the weighted fluctuation that lies at the multiples."""
+    resolution = 1.5 * _PADDING  # the taper's noise bandwidth, in steps
+    repeats = float(((power - 1) @ levels.weight).sum()) * resolution
+    return float(np.clip(repeats / (repeats + len(levels.whole) * levels.weight.sum()), 0, 1)) if repeats > 0 else 0.0
+
+
+def _refined(
+    levels: LevelSpectrum, rate: float, order: NDArray[np.intp], cells: NDArray[np.bool_]
+) -> tuple[float, float]:
+    """The rate from the tops of its multiples, and its deviation: by their curvature, or their scatter if that is more.
+
+    The power at a multiple is the log likelihood of its place, so the curvature at its top is one over the variance.
+    """
+    used = cells if cells.any() else levels.weight > 0
+    power = (np.abs(levels.moving[:, used]) ** 2).sum(axis=1)
+    places, weights = [], []
+    for k in order:
+        near = int(levels.places(rate, int(k)))
+        reach = _PADDING // 2
+        low = max(near - reach, 1)
+        top = low + int(power[low : near + reach + 1].argmax())
+        if not low < top < min(near + reach, len(power) - 2):
+            continue
+        left, middle, right = power[top - 1 : top + 2]
+        curve = 2 * middle - left - right
+        if curve > 0:
+            places.append((top + (right - left) / (2 * curve)) * levels.step_hz / k)
+            weights.append(curve * k**2 / levels.step_hz**2)
+    if not places:
+        return rate, levels.step_hz * _PADDING
+    rates, weight = np.array(places), np.array(weights)
+    found = float(np.average(rates, weights=weight))
+    variance = _OVERLAP / weight.sum()
+    if len(rates) > 1:
+        variance *= max(1.0, float((weight * (rates - found) ** 2).sum()) / (len(rates) - 1) / _OVERLAP)
+    return found, float(np.sqrt(variance))
