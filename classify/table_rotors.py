@@ -30,8 +30,8 @@ EXPLAINED = (
     "printed frequencies at its 9.85 GHz, as if the carrier had been 8.94 GHz: 'paper, printed' is with that factor, "
     "'paper, eq. 26' and 'paper, 2 v / wavelength' are the equations at 9.85 GHz. The equations come nearer to the "
     "blades' true lengths. Of several unlike rotors, chopping is the mean in 'truth' and one rotor's in 'ours'; the "
-    "single rotors are below it, 'and more' where the dwell is seen not to part them all. Six rotors within 1.6 Hz, "
-    "as the hexacopter's, lie nearer than 80 ms part: their number, band and blade length are not to be relied on."
+    "single rotors are below it, 'and more' where the dwell is seen not to part them all: six rotors within 1.6 Hz, as "
+    "the hexacopter's, lie nearer than 80 ms part, but their band and blade do not depend on that."
 )
 
 
