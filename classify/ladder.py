@@ -7,7 +7,7 @@ another machine; only the FFT is timed here.
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any
 
@@ -37,6 +37,23 @@ def shipped_account() -> dict[str, Any]:
     return {name: account for name, account in models.items() if folder.joinpath(f"{name}.onnx").is_file()}
 
 
+def non_dominated(costs: Sequence[float], values: Sequence[float]) -> list[bool]:
+    """Which points no other point beats: none is as cheap and as good and better in one of the two.
+
+    Parameters
+    ----------
+    costs, values : sequence of float
+        Lower costs and higher values are better; equal lengths.
+
+    Returns
+    -------
+    list of bool
+        True for the points of the front; equal points stand or fall together.
+    """
+    points = list(zip(costs, values, strict=True))
+    return [not any(c <= cost and v >= value and (c < cost or v > value) for c, v in points) for cost, value in points]
+
+
 def front(account: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, float]]:
     """Names and costs of the models that none is both cheaper and more accurate than, cheapest first.
 
@@ -47,14 +64,11 @@ def front(account: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, float]]:
     """
     if not account or any(COST_KEY not in model for model in account.values()):
         raise BadInput(f"the shipped train.json holds no {COST_KEY!r}: name a model, or train the models again")
-    kept: list[tuple[str, float]] = []
-    most = -1.0
-    for name, model in sorted(account.items(), key=lambda item: item[1][COST_KEY]):
-        accuracy = model["test"]["balanced_accuracy"]
-        if accuracy > most:
-            kept.append((name, float(model[COST_KEY])))
-            most = accuracy
-    return kept
+    costs = [float(model[COST_KEY]) for model in account.values()]
+    kept = non_dominated(costs, [model["test"]["balanced_accuracy"] for model in account.values()])
+    return sorted(
+        ((name, cost) for name, cost, keep in zip(account, costs, kept, strict=True) if keep), key=lambda m: m[1]
+    )
 
 
 def by_place(place: str, account: Mapping[str, Mapping[str, Any]]) -> str:

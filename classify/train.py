@@ -26,10 +26,8 @@ from .labels import CLASSES
 from .ladder import COST_KEY, timed_records
 from .parts import Parts
 from .progress import Progress
+from .training_account import ACCOUNT, alarm_threshold, covered, figures, print_table
 from .training_config import TrainingConfig, training_config
-
-#: Name of the account beside the models.
-ACCOUNT = "train.json"
 
 #: Folder of what is trained so far, beside the models while the run is not done.
 PARTS = "train-parts"
@@ -129,7 +127,7 @@ def run_training(
     write_together(out, files)
     parts.forget()
     if progress:
-        _print_table(account, out)
+        print_table(account, out)
     return account
 
 
@@ -221,7 +219,7 @@ def train_one(
     calibrated = calibration.probabilities(scores_of(sets.calibrate))
     accept = acceptance_thresholds(calibrated, sets.calibrate.labels, settings.precision)
     # A false drone is what users complain of: "uav" must also keep the false-alarm rate, however many UAVs it costs.
-    accept[0] = max(accept[0], _alarm_threshold(calibrated, sets.calibrate.labels, settings.false_alarm))
+    accept[0] = max(accept[0], alarm_threshold(calibrated, sets.calibrate.labels, settings.false_alarm))
     curve = operating_curve(calibrated, sets.calibrate.labels)
     limits = np.array([conformal_thresholds(calibrated, sets.calibrate.labels, coverage) for coverage in COVERAGES])
     onnx_bytes = export(calibration)
@@ -232,9 +230,9 @@ def train_one(
     labels = sets.test.labels
     account = {
         "inputs": list(LADDER[name].inputs),
-        "test": _figures(probabilities, labels, accept, settings.false_alarm)
+        "test": figures(probabilities, labels, accept, settings.false_alarm)
         | {"expected_calibration_error": round(expected_calibration_error(probabilities, labels), 4)}
-        | {"coverage": [round(share, 4) for share in _covered(probabilities, labels, limits)]},
+        | {"coverage": [round(share, 4) for share in covered(probabilities, labels, limits)]},
         "calibration": {"scale": float(calibration.scale), "bias": [float(b) for b in calibration.bias]},
         "accept": [float(limit) for limit in accept],
         "export_difference": difference,
@@ -348,78 +346,6 @@ def _network(
     )
 
 
-def _alarm_threshold(probabilities: NDArray[np.floating], labels: NDArray[np.integer], false_alarm: float) -> float:
-    """UAV probability that this share of the birds and the clutter exceeds."""
-    return float(np.quantile(probabilities[labels != 0, 0], 1 - false_alarm, method="higher"))
-
-
-def _covered(
-    probabilities: NDArray[np.floating], labels: NDArray[np.integer], limits: NDArray[np.floating]
-) -> list[float]:
-    """Share of the records whose prediction set holds their class, for each row of thresholds (coverages, 3)."""
-    truth = probabilities[np.arange(len(labels)), labels]
-    return [float(np.mean(truth >= row[labels])) for row in limits]
-
-
-def _figures(
-    probabilities: NDArray[np.floating],
-    labels: NDArray[np.integer],
-    accept: NDArray[np.floating],
-    false_alarm: float,
-) -> dict[str, Any]:
-    """What the table quotes, on records that neither training nor calibration has seen."""
-    winner = probabilities.argmax(axis=1)
-    recall = [float(np.mean(winner[labels == index] == index)) for index in range(len(CLASSES))]
-    threshold = _alarm_threshold(probabilities, labels, false_alarm)
-    named = probabilities.max(axis=1) >= accept[winner]
-    return {
-        "balanced_accuracy": round(float(np.mean(recall)), 4),
-        "recall": {name: round(value, 4) for name, value in zip(CLASSES, recall, strict=True)},
-        "uav_detection": round(float(np.mean(probabilities[labels == 0, 0] > threshold)), 4),
-        "false_uav": round(float(np.mean(((winner == 0) & named)[labels != 0])), 4),
-        "named_share": round(float(np.mean(named)), 4),
-        "named_accuracy": round(float(np.mean((winner == labels)[named])), 4) if named.any() else None,
-    }
-
-
 def _versions() -> dict[str, str]:
     names = ("bladewing", "numpy", "scipy", "scikit-learn", "torch", "onnx", "onnxruntime", "skl2onnx")
     return {"python": platform.python_version(), **{name: version(name) for name in names}}
-
-
-def _print_table(account: dict[str, Any], out: Path) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    title = f"{account['records']['test']} test records, looked at once"
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
-    table.add_column("model", no_wrap=True)
-    for column in ("accuracy", "found", "false", "named", "right", "ECE", "kB", "s"):
-        table.add_column(column, justify="right", no_wrap=True)
-    for name, model in account["models"].items():
-        figures = model["test"]
-        right = figures["named_accuracy"]
-        table.add_row(
-            name,
-            f"{figures['balanced_accuracy']:.3f}",
-            f"{figures['uav_detection']:.3f}",
-            f"{figures['false_uav']:.3f}",
-            f"{figures['named_share']:.3f}",
-            "-" if right is None else f"{right:.3f}",
-            f"{figures['expected_calibration_error']:.3f}",
-            f"{model['bytes'] / 1000:.0f}",
-            f"{model['seconds']:.0f}",
-        )
-    console = Console(highlight=False)
-    console.print(table)
-    console.print(
-        "accuracy  balanced over the classes; radars of 2 to 100 GHz, dwells from 5 ms,\n"
-        "          SNR from -20 dB: many records hold nothing to see\n"
-        f"found     UAVs found where {account['false_alarm']:.0%} of birds and clutter would be called UAV\n"
-        "false     birds and clutter that are named UAV\n"
-        "named     records not answered 'unknown'; right: how many of these are right\n"
-        "ECE       expected calibration error of the probabilities"
-    )
-    since = " since the interruption" if account["resumed"] else ""
-    took = f"trained in {account['seconds']['all']:.0f} s{since}"
-    console.print(f"Models and {ACCOUNT} are in {out}; {took}.", soft_wrap=True)

@@ -10,7 +10,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLoca
 
 from .draw_scores import LEAST_RECORDS
 from .series import choice_looks
-from .svg import INK, MUTED, PAPER, SERIES, Panel, drawing, panel
+from .svg import INK, MUTED, PAPER, SERIES, Panel, banded, drawing, panel
 from .words import batch_words, micros, millis, number, percent, size
 
 #: Letters of the points that nothing beats, in the order of their cost.
@@ -126,9 +126,7 @@ def by_dwell(report: Mapping[str, Any]) -> list[Panel]:
                 for row, look in rows:
                     x = [1e3 * point["dwell_s"] for point in row["dwells"]]
                     rates = [point[key] for point in row["dwells"]]
-                    low, high = [one["low"] for one in rates], [one["high"] for one in rates]
-                    axes.fill_between(x, low, high, color=look.colour, alpha=0.08, linewidth=0)
-                    axes.plot(x, [one["value"] for one in rates], color=look.colour, marker=look.marker)
+                    banded(axes, x, rates, look.colour, look.marker)
                     words.append(f"{_name(row)}: {percent(rates[0]['value'])} to {percent(rates[-1]['value'])}.")
                 axes.set_xscale("log")
                 axes.set_xticks(x, [f"{value:g}" for value in x])
@@ -155,10 +153,7 @@ def by_snr(report: Mapping[str, Any]) -> list[Panel]:
                     continue
                 x = [(one["from"] + one["to"]) / 2 for one in slices]
                 rates = [one["found"] for one in slices]
-                axes.fill_between(
-                    x, [r["low"] for r in rates], [r["high"] for r in rates], color=look.colour, alpha=0.08, linewidth=0
-                )
-                axes.plot(x, [one["value"] for one in rates], color=look.colour, marker=look.marker)
+                banded(axes, x, rates, look.colour, look.marker)
                 words.append(f"{_name(row)}: {percent(rates[-1]['value'])} at the highest SNR.")
             axes.set_xlim(-35, 35)
             axes.set_xlabel("SNR of the rotors, a sample [dB]")
@@ -178,10 +173,7 @@ def stored(report: Mapping[str, Any]) -> list[Panel]:
             x = [row["bytes"] for row in mine]
             rates = [row["balanced_accuracy"] for row in mine]
             y = [one["value"] for one in rates]
-            axes.fill_between(
-                x, [r["low"] for r in rates], [r["high"] for r in rates], color=SERIES[colour], alpha=0.08, linewidth=0
-            )
-            axes.plot(x, y, color=SERIES[colour], marker=marker)
+            banded(axes, x, rates, SERIES[colour], marker)
             words.append(
                 f"{bits} bits: {percent(y[0])} at {mine[0]['bins']} bins, {percent(y[-1])} at {mine[-1]['bins']}."
             )

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, PercentFormatter
 
 from .series import looks
-from .svg import MUTED, NARROW_IN, SERIES, Panel, drawing, panel
+from .svg import MUTED, NARROW_IN, SERIES, Panel, banded, drawing, panel
 from .words import percent, spoken
 
 GROUPS = ("all", "uav", "bird", "clutter")
@@ -57,9 +57,7 @@ def _lines(axes: Axes, report: Mapping[str, Any], by: str, group: str, *, centre
             continue
         x = [centre(one["from"] * unit, one["to"] * unit) for one in slices]
         rates = [one[group] for one in slices]
-        low, high = [one["low"] for one in rates], [one["high"] for one in rates]
-        axes.fill_between(x, low, high, color=look.colour, alpha=0.1, linewidth=0)
-        axes.plot(x, [one["value"] for one in rates], color=look.colour, marker=look.marker)
+        banded(axes, x, rates, look.colour, look.marker)
         words.append(
             f"{name}: {percent(rates[0]['value'])} at the left end, {percent(rates[-1]['value'])} at the right."
         )
@@ -86,10 +84,7 @@ def accuracy_by_beta(report: Mapping[str, Any]) -> list[Panel]:
                     continue
                 x = [(one["from"] + one["to"]) / 2 for one in slices]
                 rates = [one[key] for one in slices]
-                axes.fill_between(
-                    x, [r["low"] for r in rates], [r["high"] for r in rates], color=look.colour, alpha=0.1, linewidth=0
-                )
-                axes.plot(x, [r["value"] for r in rates], color=look.colour, marker=look.marker)
+                banded(axes, x, rates, look.colour, look.marker)
                 words.append(f"{name}: {percent(rates[0]['value'])} from the side, {percent(rates[-1]['value'])} last.")
             axes.set_xlim(0, 90)
             axes.set_xticks(range(0, 91, 15))

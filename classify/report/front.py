@@ -16,6 +16,7 @@ from bladewing.features.schema import INPUT_SHAPES
 from bladewing.simulate import Radar, draw_records
 from numpy.typing import NDArray
 
+from ..ladder import non_dominated
 from ..parts import Parts
 from . import choices, metrics
 from .bounds import detection_bounds
@@ -98,7 +99,7 @@ def measure_front(
     rows = [_row(kind, name, scored[name], cost[name], models.get(name)) for kind, name in entries]
     _mark(rows)
     stored = [row for bins in STORED_BINS for row in parts.take(f"front picture {choices.stored_name(bins)}", dict)]
-    kept = metrics.non_dominated([row["bytes"] for row in stored], [_accuracy(row) for row in stored])
+    kept = non_dominated([row["bytes"] for row in stored], [_accuracy(row) for row in stored])
     return {
         "dwells_s": list(DWELLS_S),
         "train_records": config.front_train,
@@ -326,7 +327,7 @@ def _mark(rows: Sequence[Mapping[str, Any]]) -> None:
     accuracy = [_accuracy(point) for _, point in points]
     for place in range(len(BATCHES)):
         entries = [point["cost"][place] for _, point in points]
-        kept = metrics.non_dominated([entry["median_us"] for entry in entries], accuracy)
+        kept = non_dominated([entry["median_us"] for entry in entries], accuracy)
         for entry, keep in zip(entries, kept, strict=True):
             entry["front"] = keep
 

@@ -197,20 +197,3 @@ def reliability(confidence: NDArray[np.floating], hits: NDArray[np.bool_], *, bi
         edge = {"from": int(number) / bins, "to": (int(number) + 1) / bins}
         filled.append({**edge, "confidence": mean, "accuracy": accuracy})
     return {"ece": gap if filled else None, "bins": filled}
-
-
-def non_dominated(costs: Sequence[float], values: Sequence[float]) -> list[bool]:
-    """Which points no other point beats: none is as cheap and as good and better in one of the two.
-
-    Parameters
-    ----------
-    costs, values : sequence of float
-        Lower costs and higher values are better; equal lengths.
-
-    Returns
-    -------
-    list of bool
-        True for the points of the front; equal points stand or fall together.
-    """
-    points = list(zip(costs, values, strict=True))
-    return [not any(c <= cost and v >= value and (c < cost or v > value) for c, v in points) for cost, value in points]

@@ -29,7 +29,7 @@ from ..labels import CLASSES
 from ..parts import Parts
 from ..progress import Progress
 from ..stability.run import worst_of_each
-from ..train import ACCOUNT
+from ..training_account import ACCOUNT
 from ..training_config import TrainingConfig
 from . import cost, evaluate, scores, stft, storage, trade
 from .card import model_card

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from html import escape
@@ -76,6 +76,13 @@ class Panel:
     title: str
     alt: str
     svg: str
+
+
+def banded(axes: Axes, x: Sequence[float], rates: Sequence[Mapping[str, Any]], colour: str, marker: str) -> None:
+    """Draw a line of rates with their intervals as a band."""
+    low, high = [one["low"] for one in rates], [one["high"] for one in rates]
+    axes.fill_between(x, low, high, color=colour, alpha=0.1, linewidth=0)
+    axes.plot(x, [one["value"] for one in rates], color=colour, marker=marker)
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .metrics import non_dominated
+from ..ladder import non_dominated
 
 BUDGETS_US = (100.0, 300.0, 1000.0, 3000.0)
 

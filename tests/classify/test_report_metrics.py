@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+from bladewing.classify.ladder import non_dominated
 from bladewing.classify.report import metrics
 from bladewing.models.calibration import expected_calibration_error
 from hypothesis import given
@@ -109,7 +110,7 @@ def test_front_keeps_no_beaten_point_and_drops_only_beaten_ones(points: list[tup
     def beaten(point: tuple[int, int], by: tuple[int, int]) -> bool:
         return by != point and by[0] <= point[0] and by[1] >= point[1]
 
-    kept = metrics.non_dominated([cost for cost, _ in points], [value for _, value in points])
+    kept = non_dominated([cost for cost, _ in points], [value for _, value in points])
     front = [point for point, keep in zip(points, kept, strict=True) if keep]
     assert front
     for point, keep in zip(points, kept, strict=True):

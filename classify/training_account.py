@@ -1,0 +1,85 @@
+"""What a training says of the models it made: their figures on the test records, and the table on the terminal."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .labels import CLASSES
+
+#: Name of the account beside the models.
+ACCOUNT = "train.json"
+
+
+def alarm_threshold(probabilities: NDArray[np.floating], labels: NDArray[np.integer], false_alarm: float) -> float:
+    """UAV probability that this share of the birds and the clutter exceeds."""
+    return float(np.quantile(probabilities[labels != 0, 0], 1 - false_alarm, method="higher"))
+
+
+def covered(
+    probabilities: NDArray[np.floating], labels: NDArray[np.integer], limits: NDArray[np.floating]
+) -> list[float]:
+    """Share of the records whose prediction set holds their class, for each row of thresholds (coverages, 3)."""
+    truth = probabilities[np.arange(len(labels)), labels]
+    return [float(np.mean(truth >= row[labels])) for row in limits]
+
+
+def figures(
+    probabilities: NDArray[np.floating],
+    labels: NDArray[np.integer],
+    accept: NDArray[np.floating],
+    false_alarm: float,
+) -> dict[str, Any]:
+    """What the table quotes, on records that neither training nor calibration has seen."""
+    winner = probabilities.argmax(axis=1)
+    recall = [float(np.mean(winner[labels == index] == index)) for index in range(len(CLASSES))]
+    threshold = alarm_threshold(probabilities, labels, false_alarm)
+    named = probabilities.max(axis=1) >= accept[winner]
+    return {
+        "balanced_accuracy": round(float(np.mean(recall)), 4),
+        "recall": {name: round(value, 4) for name, value in zip(CLASSES, recall, strict=True)},
+        "uav_detection": round(float(np.mean(probabilities[labels == 0, 0] > threshold)), 4),
+        "false_uav": round(float(np.mean(((winner == 0) & named)[labels != 0])), 4),
+        "named_share": round(float(np.mean(named)), 4),
+        "named_accuracy": round(float(np.mean((winner == labels)[named])), 4) if named.any() else None,
+    }
+
+
+def print_table(account: dict[str, Any], out: Path) -> None:
+    """Write the table of all models to the terminal."""
+    from rich.console import Console
+    from rich.table import Table
+
+    title = f"{account['records']['test']} test records, looked at once"
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
+    table.add_column("model", no_wrap=True)
+    for column in ("accuracy", "found", "false", "named", "right", "ECE", "kB", "s"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for name, model in account["models"].items():
+        figures = model["test"]
+        right = figures["named_accuracy"]
+        table.add_row(
+            name,
+            f"{figures['balanced_accuracy']:.3f}",
+            f"{figures['uav_detection']:.3f}",
+            f"{figures['false_uav']:.3f}",
+            f"{figures['named_share']:.3f}",
+            "-" if right is None else f"{right:.3f}",
+            f"{figures['expected_calibration_error']:.3f}",
+            f"{model['bytes'] / 1000:.0f}",
+            f"{model['seconds']:.0f}",
+        )
+    console = Console(highlight=False)
+    console.print(table)
+    console.print(
+        "accuracy  balanced over the classes; radars of 2 to 100 GHz, dwells from 5 ms,\n"
+        "          SNR from -20 dB: many records hold nothing to see\n"
+        f"found     UAVs found where {account['false_alarm']:.0%} of birds and clutter would be called UAV\n"
+        "false     birds and clutter that are named UAV\n"
+        "named     records not answered 'unknown'; right: how many of these are right\n"
+        "ECE       expected calibration error of the probabilities"
+    )
+    since = " since the interruption" if account["resumed"] else ""
+    took = f"trained in {account['seconds']['all']:.0f} s{since}"
+    console.print(f"Models and {ACCOUNT} are in {out}; {took}.", soft_wrap=True)
