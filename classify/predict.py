@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from bladewing.features.wingbeat import wingbeat
 
 from .errors import BadInput, one_line
 from .labels import CLASSES, UNKNOWN
 from .recording import Recording, find_recording, load_recording
 from .samples import positive
-from .track import LONGER, Track, fuse
+from .track import LONGER, WING_ODDS, Track, fuse
 
 if TYPE_CHECKING:
     from bladewing.models.operating import OperatingPoint
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 
 DWELL_S = 0.08
 """Default length of a dwell [s]."""
+
+WINGS_S = 5.0
+"""How much of a recording, from its start, a wingbeat is sought in [s]."""
 
 _COLOURS = {"uav": "bold red", "bird": "green", "clutter": "cyan", UNKNOWN: "yellow"}
 
@@ -47,7 +51,9 @@ class Answer:
     dwells
         The answers, shape (dwells,).
     track
-        The dwells together.
+        The dwells together, and the wingbeat.
+    wingbeat_hz
+        Wingbeat rate of the recording [Hz]; None where none is found, or it is shorter than 1.5 s.
     """
 
     name: str
@@ -55,6 +61,7 @@ class Answer:
     stop_s: np.ndarray
     dwells: "Prediction"
     track: Track
+    wingbeat_hz: float | None = None
 
     @property
     def declared_s(self) -> float | None:
@@ -83,6 +90,7 @@ class Answer:
             "dwells": len(self.dwells.labels),
             "declared": self.track.declared or None,
             "declared_s": self.declared_s,
+            "wingbeat_hz": None if self.wingbeat_hz is None else round(self.wingbeat_hz, 3),
         }
         yield {"file": self.name, "track": track}
 
@@ -115,6 +123,8 @@ class Answer:
         if self.track.reason:
             line.append(f"  ({self.track.reason})")
         console.print(line)
+        if self.wingbeat_hz is not None:
+            console.print(Text(f"wingbeat {self.wingbeat_hz:.1f} Hz: the odds of a bird count {WING_ODDS:g} times"))
         if self.declared_s is not None:
             later = "" if self.track.declared == self.track.label else ", which later dwells do not bear out"
             console.print(Text(f"declared {self.track.declared} after {self.declared_s:.3g} s{later}"))
@@ -168,8 +178,14 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
         joined = iq[: count // LONGER * LONGER].reshape(count // LONGER, LONGER * wanted)
         looks = classifier.predict(joined, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
         longer = looks.probabilities, looks.labels
-    track = fuse(dwells.probabilities, dwells.labels, longer=longer, rule=classifier.decide)
-    return Answer(recording.name, start_s, start_s + wanted / recording.prf_hz, dwells, track)
+    beat_hz = None
+    if any(dwells.labels != UNKNOWN) or np.ptp(dwells.probabilities) > 0:  # else nothing could be judged
+        start = recording.iq[: round(WINGS_S * recording.prf_hz)]
+        found = float(wingbeat(start, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz).wingbeat_hz)
+        beat_hz = found if np.isfinite(found) else None
+    wings = beat_hz is not None
+    track = fuse(dwells.probabilities, dwells.labels, longer=longer, wings=wings, rule=classifier.decide)
+    return Answer(recording.name, start_s, start_s + wanted / recording.prf_hz, dwells, track, beat_hz)
 
 
 def answers(

@@ -22,6 +22,11 @@ LONGER = 5
 # were declared UAV at limits that 0.8 % of single dwells exceed. Odds halved before they are judged bring 0.9 % back.
 DOUBT = 2.0
 
+WING_ODDS = 10.0
+"""What a wingbeat, found in the whole track, multiplies the odds of a bird by. On simulated tracks at 0 dB and above one
+is found in 62 % of flapping birds and in 0 to 3 % of any other kind; far less is counted, because the dwells have seen the
+same wings. That none is found says nothing: most gliding and weak birds show none."""
+
 _FLOOR = 1e-6  # no single dwell rules a class out for ever
 
 Decide = Callable[[NDArray[np.floating]], tuple[NDArray[np.str_], list[str]]]
@@ -62,6 +67,7 @@ def fuse(
     labels: Sequence[str] | NDArray[np.str_],
     *,
     longer: Looks | None = None,
+    wings: bool = False,
     accept: Sequence[float] = (0.5, 0.5, 0.5),
     rule: Decide | None = None,
     correlation: float = CORRELATION,
@@ -86,6 +92,8 @@ def fuse(
     longer
         Probabilities and labels of the looks at each `LONGER` dwells in a row; number k is known after dwell
         k `LONGER`. None without them.
+    wings
+        Whether a wingbeat is found in the whole track; it speaks for a bird at the end, not while dwells come in.
     accept
         Least probability at which each class is named, as `Classifier.accept`.
     rule
@@ -118,6 +126,9 @@ def fuse(
     weights = np.exp(evidence - evidence.max(axis=1, keepdims=True))
     fused = weights / weights.sum(axis=1, keepdims=True)
     fused[(used == 1) & (looks == 0)] = p[np.argmax(heard)]  # to the last digit
+    if wings:
+        fused[-1, CLASSES.index("bird")] *= WING_ODDS
+        fused[-1] /= fused[-1].sum()
     rule = rule or partial(decide, accept=accept)
     (named, reasons), (doubted, _) = rule(fused), rule(_doubted(fused))
     # the same class, or halved odds would let the second speak

@@ -63,7 +63,7 @@ def test_one_line_a_dwell_and_a_closing_line(run_json, sigmf_pair):
     assert second == said | {"start_s": 0.08, "stop_s": 0.16, "reason": None}
     assert list(first) == ["file", "start_s", "stop_s", "label", "probabilities", "reason"]
     assert list(closing) == ["file", "track"]
-    assert list(closing["track"]) == ["label", "probabilities", "dwells", "declared", "declared_s"]
+    assert list(closing["track"]) == ["label", "probabilities", "dwells", "declared", "declared_s", "wingbeat_hz"]
     assert (closing["track"]["label"], closing["track"]["dwells"]) == ("uav", 2)
     assert (closing["track"]["declared"], closing["track"]["declared_s"]) == ("uav", 0.08)
     assert list(closing["track"]["probabilities"]) == NAMES
@@ -102,7 +102,7 @@ def test_outside_the_envelope_is_answered_unknown_with_the_cure(run_json, sigmf_
     }
     assert dwells[0]["probabilities"] == dict.fromkeys(NAMES, 0.333333)
     nothing = {"label": "unknown", "probabilities": dict.fromkeys(NAMES, 0.333333), "declared": None}
-    assert closing["track"] == nothing | {"dwells": 4, "declared_s": None}
+    assert closing["track"] == nothing | {"dwells": 4, "declared_s": None, "wingbeat_hz": None}
 
 
 def test_a_dwell_too_short_is_unknown(run_json, sigmf_pair):
@@ -125,7 +125,11 @@ def test_a_silent_dwell_is_unknown_and_left_out_of_the_track(run_json, sigmf_pai
     silent, heard, closing = run_json(sigmf_pair(iq=iq))
     assert (silent["label"], silent["reason"]) == ("unknown", "no signal: every sample is 0")
     said = {"label": "uav", "probabilities": heard["probabilities"], "dwells": 2}
-    assert closing["track"] == said | {"declared": "uav", "declared_s": 0.16}  # the silent dwell took its time
+    assert closing["track"] == said | {
+        "declared": "uav",
+        "declared_s": 0.16,
+        "wingbeat_hz": None,
+    }  # the silent dwell took its time
 
 
 def test_both_files_of_a_recording_are_answered_once(run_json, sigmf_pair):

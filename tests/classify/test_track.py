@@ -1,7 +1,11 @@
 import numpy as np
 import pytest
+from bladewing.classify import Classifier
 from bladewing.classify.labels import CLASSES, UNKNOWN, decide
-from bladewing.classify.track import CORRELATION, LONGER, fuse
+from bladewing.classify.predict import answer
+from bladewing.classify.recording import Recording
+from bladewing.classify.track import CORRELATION, LONGER, WING_ODDS, fuse
+from bladewing.simulate import Radar, draw_records
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -188,3 +192,30 @@ def test_reason_shows_that_the_probability_is_below_the_limit():
     labels, reasons = decide(np.array([[0.48, 0.32, 0.2], [0.6199, 0.2, 0.1801], [0.62, 0.2, 0.18]]), (0.62,) * 3)
     assert list(labels) == [UNKNOWN, UNKNOWN, "uav"]
     assert reasons == ["not sure: best uav 0.48 < 0.62", "not sure: best uav 0.6199 < 0.6200", ""]
+
+
+def test_a_wingbeat_multiplies_the_odds_of_a_bird_at_the_end_alone():
+    p = [[0.5, 0.3, 0.2]] * 4
+    plain, winged = fuse(p, ["unknown"] * 4), fuse(p, ["unknown"] * 4, wings=True)
+    odds = [track.probabilities / (1 - track.probabilities) for track in (plain, winged)]
+    assert odds[1][1] == pytest.approx(WING_ODDS * odds[0][1], rel=1e-5)
+    assert winged.probabilities[0] / winged.probabilities[2] == pytest.approx(
+        plain.probabilities[0] / plain.probabilities[2], rel=1e-5
+    )
+    assert winged.label == "bird"
+
+
+def test_a_flapping_bird_shows_its_wingbeat_in_the_track_and_a_short_one_none():
+    radar = Radar(9.85e9, 10e3, 25_000)
+    records = draw_records(radar, 12, 3, purpose="bench", kind="flapping_bird")
+    clear = np.flatnonzero(records.truth["snr_db"] > 5)
+    found = [
+        (answer(Recording("x", records.iq[row], radar.carrier_hz, radar.prf_hz), Classifier.load()), row)
+        for row in clear
+    ]
+    beats = [(one.wingbeat_hz, records.truth["wingbeat_hz"][row]) for one, row in found if one.wingbeat_hz is not None]
+    assert beats
+    for beat_hz, truth_hz in beats:
+        assert beat_hz == pytest.approx(truth_hz, abs=0.3)
+    short = Recording("x", records.iq[clear[0]][:8000], radar.carrier_hz, radar.prf_hz)
+    assert answer(short, Classifier.load()).wingbeat_hz is None
