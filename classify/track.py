@@ -23,9 +23,9 @@ LONGER = 5
 DOUBT = 2.0
 
 WING_ODDS = 10.0
-"""What a wingbeat, found in the whole track, multiplies the odds of a bird by. On simulated tracks at 0 dB and above one
-is found in 62 % of flapping birds and in 0 to 3 % of any other kind; far less is counted, because the dwells have seen the
-same wings. That none is found says nothing: most gliding and weak birds show none."""
+"""What a wingbeat, found in the whole track, multiplies the odds of a bird by. On simulated tracks at 0 dB and above
+one is found in 62 % of flapping birds and in 0 to 3 % of any other kind; far less is counted, because the dwells have
+seen the same wings. That none is found says nothing: most gliding and weak birds show none."""
 
 _FLOOR = 1e-6  # no single dwell rules a class out for ever
 
