@@ -105,7 +105,12 @@ def test_what_has_no_rotor_is_no_uav(kind):
     assert share(kind, "uav", 10.0) <= 0.075
 
 
-@pytest.mark.xfail(reason="training draws no spoked rims and at most 8 scatterers on a turbine's blade")
+@pytest.mark.parametrize("kind", ["vehicle", "wind_turbine"])
+def test_what_turns_but_does_not_fly_is_seldom_a_uav(kind):
+    assert share(kind, "uav") <= 0.35
+
+
+@pytest.mark.xfail(reason="where spokes or turbine blades stand high over the noise, a model is still fooled")
 @pytest.mark.parametrize("kind", ["vehicle", "wind_turbine"])
 def test_what_turns_but_does_not_fly_is_no_uav(kind):
     assert share(kind, "uav") <= 0.1

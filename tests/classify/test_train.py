@@ -11,7 +11,8 @@ from bladewing.classify import Classifier, train
 from bladewing.classify.errors import BadInput
 from bladewing.classify.gather import Gathered
 from bladewing.classify.inference import COVERAGES
-from bladewing.classify.train import _figures, run_training
+from bladewing.classify.train import run_training
+from bladewing.classify.training_account import figures
 from bladewing.classify.training_config import TrainingConfig, training_config
 from bladewing.features import INPUT_SHAPES
 from bladewing.models import tabular, training
@@ -197,15 +198,15 @@ def test_figures_against_brute_force():
     probabilities = rng.dirichlet(np.ones(3), 3000)
     probabilities[np.arange(3000), labels] += 1
     probabilities /= 2
-    figures = _figures(probabilities, labels, np.array([0.7, 0.6, 0.5]), 0.01)
+    found = figures(probabilities, labels, np.array([0.7, 0.6, 0.5]), 0.01)
     threshold = sorted(probabilities[labels != 0, 0])[int(np.ceil(0.99 * ((labels != 0).sum() - 1)))]
-    assert figures["uav_detection"] == pytest.approx(np.mean(probabilities[labels == 0, 0] > threshold), abs=1e-4)
+    assert found["uav_detection"] == pytest.approx(np.mean(probabilities[labels == 0, 0] > threshold), abs=1e-4)
     winner = probabilities.argmax(1)
     named = probabilities.max(1) >= np.array([0.7, 0.6, 0.5])[winner]
-    assert figures["named_share"] == pytest.approx(named.mean(), abs=1e-4)
+    assert found["named_share"] == pytest.approx(named.mean(), abs=1e-4)
     wrong = [p[0] >= 0.7 and p.argmax() == 0 for p in probabilities[labels != 0]]
-    assert figures["false_uav"] == pytest.approx(np.mean(wrong), abs=1e-4)
-    assert figures["named_accuracy"] == pytest.approx((winner == labels)[named].mean(), abs=1e-4)
+    assert found["false_uav"] == pytest.approx(np.mean(wrong), abs=1e-4)
+    assert found["named_accuracy"] == pytest.approx((winner == labels)[named].mean(), abs=1e-4)
 
 
 def test_options_come_before_the_file_and_the_file_before_quick(tmp_path):
