@@ -39,6 +39,7 @@ bench: $(STAMP)
 
 fuzz: $(STAMP)
 	$(BIN)/python -m tests.fuzz.long_run
+	$(BIN)/python -m tests.fuzz.guided
 	$(BIN)/python -m tests.fuzz.faults
 	$(BIN)/python -m tests.fuzz.mutations
 	$(BIN)/python -m tests.fuzz.predictions
