@@ -13,6 +13,7 @@ import torch
 from bladewing.features.bandwidth import threshold_band_hz
 from bladewing.features.inputs import model_inputs
 from bladewing.features.spectrum import doppler_spectrum
+from bladewing.models.export import _quiet_converters
 from bladewing.simulate import Radar
 from numpy.typing import NDArray
 from scipy import fft
@@ -106,9 +107,10 @@ def train_resnet(pictures: Arrays, labels: NDArray[np.int64], epochs: int) -> Ca
             nn.functional.cross_entropy(net(turned), y[rows]).backward()
             optimiser.step()
             schedule.step()
-    program = torch.onnx.export(
-        net.eval(), (x[:2],), dynamo=True, dynamic_shapes=({0: torch.export.Dim("n")},), verbose=False
-    )
+    with _quiet_converters():
+        program = torch.onnx.export(
+            net.eval(), (x[:2],), dynamo=True, dynamic_shapes=({0: torch.export.Dim("n")},), verbose=False
+        )
     assert program is not None
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
