@@ -49,11 +49,20 @@ if __name__ == "__main__":
 REPORT = """
 import sys
 from pathlib import Path
-from bladewing.classify.report import run
-run.QUICK = run.Effort(records=48, reference_records=64, chain_s=0.1, stft_s=0.05, least_rounds=1)
+from bladewing.classify.report import choices, families, front, pictures, run
+for module in (choices, front):
+    module.PICTURES = {"spectrum": pictures.PICTURES["spectrum"]}
+    module.DWELLS_S, module.STORED_BINS = (0.005, 0.08), (64,)
+families.FAMILIES = {"sea": families.FAMILIES["sea"]}
+front.peak_bytes = lambda *_: 1_000_000  # the real one starts a process for each choice
 models = Path(sys.argv[1] + "-models")
 if __name__ == "__main__":
-    run.run_report(Path(sys.argv[1]), models=models, quick=True, seed=int(sys.argv[2]), progress=False)
+    config = Path(sys.argv[1] + ".toml")
+    config.write_text(
+        "records = 48\\nreference_records = 64\\nchain_s = 0.05\\nstft_s = 0.01\\nleast_rounds = 1\\nrepeats = 1\\n"
+        "front_train = 210\\nfront_test = 6\\nfront_epochs = 1\\nfront_s = 0.01\\nfamily_train = 600\\n"
+    )
+    run.run_report(Path(sys.argv[1]), models=models, quick=True, seed=int(sys.argv[2]), config=config, progress=False)
 """
 
 

@@ -42,8 +42,8 @@ MUTATIONS = (
     Mutation(
         "records are scaled before they are squared",
         "features/spectrum.py",
-        "return np.ldexp(np.float32(1), -np.clip(exponent, -126, 126))[..., None].astype(np.float32)",
-        "return np.ones((*exponent.shape, 1), np.float32)",
+        "return np.ldexp(np.float32(1), -np.minimum(np.maximum(exponent, -126), 126))",
+        "return np.ones(exponent.shape, np.float32)",
         "tests/classify/test_stability.py -k features",
     ),
     Mutation(
@@ -134,7 +134,7 @@ MUTATIONS = (
     ),
     Mutation(
         "text nested beyond reason is refused",
-        "classify/training_config.py",
+        "classify/settings_file.py",
         "except (ValueError, RecursionError) as error:",
         "except ValueError as error:",
         "tests/classify/test_hostile_files.py -k hostile_toml",
