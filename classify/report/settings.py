@@ -13,7 +13,7 @@ from ..settings_file import build_settings, given_settings
 QUICK: dict[str, Any] = {
     "records": 3000,
     "reference_records": 128,
-    "chain_s": 5.0,
+    "chain_s": 4.0,
     "stft_s": 2.0,
     "least_rounds": 100,
     "repeats": 100,
@@ -21,7 +21,7 @@ QUICK: dict[str, Any] = {
     "front_test": 300,
     "front_epochs": 6,
     "front_s": 0.5,
-    "family_train": 3000,
+    "family_train": 1500,
 }
 
 Seconds = Annotated[float, Field(gt=0, le=3600)]
