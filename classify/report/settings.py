@@ -11,14 +11,14 @@ from ..settings_file import build_settings, given_settings
 
 #: What `--quick` changes: enough to see every figure, with wide intervals.
 QUICK: dict[str, Any] = {
-    "records": 3000,
+    "records": 2400,
     "reference_records": 128,
     "chain_s": 4.0,
     "stft_s": 2.0,
     "least_rounds": 100,
     "repeats": 100,
-    "front_train": 2100,
-    "front_test": 300,
+    "front_train": 1500,
+    "front_test": 200,
     "front_epochs": 6,
     "front_s": 0.5,
     "family_train": 1500,
