@@ -165,14 +165,8 @@ def _called_uav(report: Mapping[str, Any], slug: str, title: str, *, wanted: boo
             if rates[name]:
                 worst = (min if wanted else max)(rates[name].items(), key=lambda pair: pair[1]["value"])
                 words.append(f"{name}: worst {spoken(worst[0])}, {percent(worst[1]['value'])}.")
-        for line in range(1, len(kinds)):
-            axes.axhline(line - 0.5, color=MUTED, linewidth=0.3)
-        axes.grid(visible=False, axis="y")
-        axes.set_ylim(max(len(kinds), 1) - 0.5, -0.5)
-        axes.set_yticks(range(len(kinds)), [spoken(kind) for kind in kinds])
-        axes.tick_params(axis="y", length=0)
+        _named_rows(axes, [spoken(kind) for kind in kinds])
         axes.set_xlim(-0.02, 1.02)
-        axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
         axes.set_xlabel("called UAV")
         return panel(figure, name=f"kinds-{slug}", title=title, alt=f"{title}. {' '.join(words)}")
 
@@ -194,15 +188,20 @@ def families(report: Mapping[str, Any]) -> list[Panel]:
                 axes.plot([one["value"]], [y + shift], color=colour, marker=marker, markersize=4)
                 ends.append(percent(one["value"]))
             words.append(f"{row['name']}: {' with, '.join(ends)} without.")
-        for line in range(1, len(rows)):
-            axes.axhline(line - 0.5, color=MUTED, linewidth=0.3)
-        axes.grid(visible=False, axis="y")
-        axes.set_ylim(len(rows) - 0.5, -0.5)
-        axes.set_yticks(range(len(rows)), [row["name"] for row in rows])
-        axes.tick_params(axis="y", length=0)
-        axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+        _named_rows(axes, [row["name"] for row in rows])
         axes.set_xlabel("balanced accuracy")
         return [panel(figure, name="families", title=title, alt=f"{title}. {' '.join(words)}")]
+
+
+def _named_rows(axes: Axes, names: Sequence[str]) -> None:
+    """Lay out shares along x with one named row each, the first on top, and a rule between any two."""
+    for line in range(1, len(names)):
+        axes.axhline(line - 0.5, color=MUTED, linewidth=0.3)
+    axes.grid(visible=False, axis="y")
+    axes.set_ylim(max(len(names), 1) - 0.5, -0.5)
+    axes.set_yticks(range(len(names)), names)
+    axes.tick_params(axis="y", length=0)
+    axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
 
 
 def _slug(name: str) -> str:
