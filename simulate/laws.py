@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Uniform numbers a record owns; the widest targets (a wind turbine, a vehicle) use about nine tenths of them.
+#: Uniform numbers a record owns; the widest target (a wind turbine) takes 372 of them.
 WIDTH = 448
 
 #: What a steady body's acceleration is of a manoeuvring one's. Half of all bodies are steady, whatever they are: if one
