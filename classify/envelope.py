@@ -87,14 +87,13 @@ class Envelope:
     def _radar_reason(self, carrier_hz: float, prf_hz: float) -> str | None:
         wavelength_m = SPEED_OF_LIGHT_MPS / carrier_hz
         unambiguous_mps = wavelength_m * prf_hz / 4
-        prf_needed_hz = math.ceil(max(self.prf_min_hz, self._prf_for_velocity_hz(carrier_hz)) * (1 - _ROUNDING))
         if not self.carrier_min_hz <= carrier_hz <= self.carrier_max_hz:
             return (
                 f"carrier {carrier_hz / 1e9:g} GHz is outside {self.carrier_min_hz / 1e9:g} to "
                 f"{self.carrier_max_hz / 1e9:g} GHz, the bands this model was trained for: use or train another model"
             )
         if prf_hz < self.prf_min_hz:
-            return f"PRF {prf_hz:g} Hz is below {self.prf_min_hz:g} Hz: raise the PRF to {prf_needed_hz} Hz or more"
+            return f"PRF {prf_hz:g} Hz is below {self.prf_min_hz:g} Hz: {self._raise_prf(carrier_hz)}"
         if prf_hz > self.prf_max_hz:
             step = math.ceil(prf_hz / self.prf_max_hz)
             return (
@@ -104,26 +103,35 @@ class Envelope:
         if unambiguous_mps < self.unambiguous_min_mps * (1 - _ROUNDING):
             return (
                 f"unambiguous velocity {_under(unambiguous_mps, self.unambiguous_min_mps)} m/s is below "
-                f"{self.unambiguous_min_mps:g} m/s (wavelength x PRF / 4): raise the PRF to {prf_needed_hz} Hz or more"
+                f"{self.unambiguous_min_mps:g} m/s (wavelength x PRF / 4): {self._raise_prf(carrier_hz)}"
             )
         return None
 
     def _dwell_reason(self, prf_hz: float, pulses: int) -> str | None:
         dwell_s = pulses / prf_hz
-        pulses_needed = max(self.pulses_min, math.ceil(self.dwell_min_s * prf_hz * (1 - _ROUNDING)))
-        cure = f"take {pulses_needed} pulses, {_up(pulses_needed / prf_hz)} s, or more (dwell = pulses / PRF)"
         if pulses < self.pulses_min:
-            return f"{pulses} pulses are fewer than {self.pulses_min}: {cure}"
-        longest_s = min(self.pulses_max / prf_hz, self.dwell_max_s)
-        shorten = f"take dwells of {longest_s:.4g} s or less (dwell = pulses / PRF)"
+            return f"{pulses} pulses are fewer than {self.pulses_min}: {self._lengthen(prf_hz)}"
         if pulses > self.pulses_max:
-            return f"{pulses} pulses are more than {self.pulses_max}: {shorten}"
+            return f"{pulses} pulses are more than {self.pulses_max}: {self._shorten(prf_hz)}"
         if dwell_s > self.dwell_max_s * (1 + _ROUNDING):
-            return f"dwell {dwell_s:.7g} s is above {self.dwell_max_s:g} s: {shorten}"
+            return f"dwell {dwell_s:.7g} s is above {self.dwell_max_s:g} s: {self._shorten(prf_hz)}"
         if dwell_s < self.dwell_min_s * (1 - _ROUNDING):
             shortest_ms = self.dwell_min_s * 1e3
-            return f"dwell {_under(dwell_s * 1e3, shortest_ms)} ms is below {shortest_ms:g} ms: {cure}"
+            short_ms = _under(dwell_s * 1e3, shortest_ms)
+            return f"dwell {short_ms} ms is below {shortest_ms:g} ms: {self._lengthen(prf_hz)}"
         return None
+
+    def _raise_prf(self, carrier_hz: float) -> str:
+        needed_hz = math.ceil(max(self.prf_min_hz, self._prf_for_velocity_hz(carrier_hz)) * (1 - _ROUNDING))
+        return f"raise the PRF to {needed_hz} Hz or more"
+
+    def _lengthen(self, prf_hz: float) -> str:
+        needed = max(self.pulses_min, math.ceil(self.dwell_min_s * prf_hz * (1 - _ROUNDING)))
+        return f"take {needed} pulses, {_up(needed / prf_hz)} s, or more (dwell = pulses / PRF)"
+
+    def _shorten(self, prf_hz: float) -> str:
+        longest_s = min(self.pulses_max / prf_hz, self.dwell_max_s)
+        return f"take dwells of {longest_s:.4g} s or less (dwell = pulses / PRF)"
 
     def _prf_for_velocity_hz(self, carrier_hz: float) -> float:
         return 4 * self.unambiguous_min_mps * carrier_hz / SPEED_OF_LIGHT_MPS

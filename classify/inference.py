@@ -47,6 +47,8 @@ FORMAT = "1"
 _STEP_RECORDS = 256
 _STEP_SAMPLES = 1 << 21
 
+_OUTPUTS = ["probabilities"]
+
 
 @dataclass(frozen=True)
 class Prediction:
@@ -272,40 +274,45 @@ class Classifier:
         if samples.ndim == 0 or samples.shape[-1] == 0:
             raise BadInput(f"iq has shape {samples.shape}: it must be (..., pulses) with one pulse or more")
         *leading, pulses = samples.shape
-        records = samples.reshape(-1, pulses)
-        probabilities = np.full((len(records), len(CLASSES)), 1 / len(CLASSES), dtype=np.float32)
-        labels = np.full(len(records), UNKNOWN, dtype="<U7")
-        outside = self.envelope.reason(carrier_hz, prf_hz, pulses)
-        if outside is not None:
-            reasons = np.full(len(records), outside)
-        else:
-            largest = largest_part(records)
-            live = np.flatnonzero(largest >= LEAST_PART)
-            probabilities[live] = self._probabilities(records, live, carrier_hz, prf_hz)
-            labels[live], why = self.decide(probabilities[live])
-            if len(live) < len(records):
-                texts = np.full(len(records), "no signal: every sample is 0", dtype=object)
-                texts[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
-                texts[live] = why
-                why = texts.tolist()
-            reasons = np.array(why, dtype=np.str_)
+        probabilities, labels, reasons = self._answers(samples.reshape(-1, pulses), carrier_hz, prf_hz)
         return Prediction(
             labels.reshape(leading), probabilities.reshape(*leading, len(CLASSES)), reasons.reshape(leading)
         )
 
+    def _answers(
+        self, records: NDArray[np.complex64], carrier_hz: float, prf_hz: float
+    ) -> tuple[NDArray[np.float32], NDArray[np.str_], NDArray[np.str_]]:
+        """Probabilities, labels and reasons of (records, pulses)."""
+        outside = self.envelope.reason(carrier_hz, prf_hz, records.shape[-1])
+        largest = largest_part(records)
+        live = largest >= LEAST_PART
+        if outside is None and live.all():
+            probabilities = self._probabilities(records, None, carrier_hz, prf_hz)
+            labels, why = self.decide(probabilities)
+            return probabilities, labels, np.array(why, dtype=np.str_)
+        probabilities = np.full((len(records), len(CLASSES)), 1 / len(CLASSES), dtype=np.float32)
+        labels = np.full(len(records), UNKNOWN, dtype="<U7")
+        if outside is not None:
+            return probabilities, labels, np.full(len(records), outside)
+        reasons = np.full(len(records), "no signal: every sample is 0", dtype=object)
+        reasons[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
+        rows = np.flatnonzero(live)
+        probabilities[rows] = self._probabilities(records, rows, carrier_hz, prf_hz)
+        labels[rows], reasons[rows] = self.decide(probabilities[rows])
+        return probabilities, labels, reasons.astype(np.str_)
+
     def _probabilities(
-        self, records: NDArray[np.complex64], rows: NDArray[np.intp], carrier_hz: float, prf_hz: float
+        self, records: NDArray[np.complex64], rows: NDArray[np.intp] | None, carrier_hz: float, prf_hz: float
     ) -> NDArray[np.float32]:
-        """Run the chosen rows of (records, pulses) through the model, a bounded number at a time."""
+        """Run the chosen rows of (records, pulses), or all, through the model, a bounded number at a time."""
+        count = len(records) if rows is None else len(rows)
         step = max(1, min(_STEP_RECORDS, _STEP_SAMPLES // records.shape[-1]))
-        out = np.empty((len(rows), len(CLASSES)), dtype=np.float32)
-        for start in range(0, len(rows), step):
-            chosen = rows[start : start + step]
-            # most often every record is: a slice spares the copy
-            whole = len(chosen) == chosen[-1] - chosen[0] + 1
-            chunk = records[chosen[0] : chosen[-1] + 1] if whole else records[chosen]
+        out = np.empty((count, len(CLASSES)), dtype=np.float32)
+        for start in range(0, count, step):
+            part = slice(start, start + step)
+            chunk = records[part if rows is None else rows[part]]
             feed = model_inputs(chunk, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs)
-            (out[start : start + step],) = self._session.run(["probabilities"], feed)
+            (out[part],) = self._session.run(_OUTPUTS, feed)
         return out
 
 

@@ -29,13 +29,13 @@ def decide(probabilities: NDArray[np.floating], accept: Sequence[float]) -> tupl
         Why a record is "unknown"; "" where it is named.
     """
     best = probabilities.argmax(axis=-1)
-    top = probabilities[np.arange(len(best)), best].astype(np.float64)
-    needed = np.asarray(accept, dtype=np.float64)[best]
+    top = np.maximum.reduce(probabilities, axis=-1)
+    needed = np.array(accept, np.float64)[best]
     named = top >= needed
     labels = _ANSWERS[np.where(named, best, len(CLASSES))]
     reasons = [""] * len(best)
-    for row in np.flatnonzero(~named).tolist():
-        reasons[row] = f"not sure: best {CLASSES[best[row]]} {_below(top[row], needed[row])}"
+    for row in (~named).nonzero()[0].tolist():
+        reasons[row] = f"not sure: best {CLASSES[best[row]]} {_below(float(top[row]), needed[row])}"
     return labels, reasons
 
 

@@ -1,9 +1,14 @@
 """What every array of IQ samples must be, wherever it comes from."""
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import BadInput
+
+_TRUTHS, _NUMBERS = (bool, np.bool_), (int, float, np.integer, np.floating)
+_COMPLEX64 = np.dtype(np.complex64)
 
 
 def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
@@ -30,8 +35,10 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
         raise BadInput(f"{name}: real samples ({given.dtype}): IQ must be complex, I + jQ (complex64)")
     if given.dtype.kind != "c":
         raise BadInput(f"{name}: samples of type {given.dtype}: IQ must be complex, I + jQ (complex64)")
-    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is found below, with its index
-        iq = given.astype(np.complex64, copy=False)
+    iq = given
+    if given.dtype != _COMPLEX64:
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is found below, with its index
+            iq = given.astype(np.complex64)
     if not np.isfinite(np.ascontiguousarray(iq).view(np.float32)).all():  # real numbers: a quarter of the time
         finite = np.isfinite(iq)
         first = np.unravel_index(int(np.argmin(finite)), iq.shape)
@@ -53,12 +60,12 @@ def positive(value: object, name: str) -> float:
     BadInput
         It is not; `name` (with its unit) says what.
     """
-    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
+    if isinstance(value, _TRUTHS) or not isinstance(value, _NUMBERS):
         raise BadInput(f"{name} is {value!r}: it must be a number above 0")
     try:
         number = float(value)
     except OverflowError:
         number = float("inf")
-    if not np.isfinite(number) or number <= 0:
+    if not math.isfinite(number) or number <= 0:
         raise BadInput(f"{name} is {number:g}: it must be a finite number above 0")
     return number
