@@ -24,6 +24,10 @@ _RUN, _LONGEST_SUM = 16, 256
 #: Level of a bin outside the radar's unambiguous span [dB]: lower than any noise, so "not seen" differs from "empty".
 UNSEEN_DB = LOWEST_DB / 2
 
+# The spectrum bins that it takes, the seen axis bins that it gives, and the shares of the former in the latter.
+_Copy = tuple[NDArray[np.intp], slice]
+_Matrix = tuple[slice, slice, NDArray[np.float32]]
+
 
 def axis_edges_mps(bins: int) -> NDArray[np.float64]:
     """Edges of the shared axis [m/s], rising, shape (bins + 1,): equal steps of asinh(v / KNEE_MPS)."""
@@ -81,30 +85,23 @@ class Pooling:
         ndarray of float32, shape (..., bins)
             [dB]
         """
-        out, seen = self._blank(power.shape[:-1])
-        rows = power.size // power.shape[-1]
-        if power.shape[-1] <= COARSE * self.bins and rows > 1:
-            # all spectra under one another: one product of matrices instead of one for each record
-            flat, means = power.reshape(rows, -1), out.reshape(rows, -1)[:, self.seen]
-            for bins, axis_bins, shares in self._matrices:
-                np.matmul(flat[:, bins], shares, out=means[:, axis_bins])
-        elif power.shape[-1] <= COARSE * self.bins:
-            # a product of a single row would be summed in another order than the row is among others
-            twice = np.repeat(power.reshape(1, -1), 2, axis=0)
-            return self.mean_db(twice, per_unit, from_floor=from_floor)[0].reshape(out.shape)
-        else:
-            self._pooled(np.add, power, seen)
-            seen *= self._shares
+        flat = power.reshape(-1, power.shape[-1])
+        rows, seen = self._blank((len(flat),))
+        self._mean(flat, seen)
+        out = rows.reshape(*power.shape[:-1], self.bins)
         if per_unit is not None:
             out *= per_unit
         return self._levels(out, 0.0 if from_floor else LOWEST_DB)
 
-    def peak_db(self, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Largest level of each axis bin over that of noise in as many bins [dB], shape (..., bins)."""
-        out, seen = self._blank(relative_power.shape[:-1])
-        self._pooled(np.maximum, relative_power, seen)
-        seen *= self._per_expected_peak
-        return self._levels(out, LOWEST_DB)
+    def mean_and_peak_db(self, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Mean level of each axis bin, and its largest over that of noise in as many [dB], shape (..., 2, bins)."""
+        flat = relative_power.reshape(-1, relative_power.shape[-1])
+        rows, seen = self._blank((len(flat), 2))
+        self._mean(flat, seen[:, 0])
+        peak = seen[:, 1]
+        self._pooled(np.maximum, flat, peak)
+        peak *= self._per_expected_peak
+        return self._levels(rows, LOWEST_DB).reshape(*relative_power.shape[:-1], 2, self.bins)
 
     def _blank(self, shape: tuple[int, ...]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Room for the axis with 0 where nothing is seen, and the part of it that is to be filled."""
@@ -112,6 +109,24 @@ class Pooling:
         if self.seen.start:
             out[..., : self.seen.start] = out[..., self.seen.stop :] = 0
         return out, out[..., self.seen]
+
+    def _mean(self, power: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+        """Write the mean power of each seen axis bin, in rising velocity; a row a spectrum."""
+        if self.spectrum_bins > COARSE * self.bins:
+            self._pooled(np.add, power, out)
+            out *= self._shares
+        elif len(power) == 1:
+            # a product of a single row would be summed in another order than the row is among others
+            twice = np.empty((2, out.shape[1]), np.float32)
+            self._mean(np.repeat(power, 2, axis=0), twice)
+            out[:] = twice[:1]
+        else:
+            # all spectra under one another: one product of matrices instead of one for each record
+            copies, matrices = self._products
+            for bins, axis_bins in copies:
+                out[:, axis_bins] = power.take(bins, axis=1)
+            for span, axis_bins, shares in matrices:
+                np.matmul(power[:, span], shares, out=out[:, axis_bins])
 
     def _levels(self, out: NDArray[np.float32], lowest_db: float) -> NDArray[np.float32]:
         """Power to level in place: of the whole axis, which lies in one piece and so takes half the time."""
@@ -133,14 +148,15 @@ class Pooling:
         return (1 / self.spans[1]).astype(np.float32)
 
     @cached_property
-    def _matrices(self) -> list[tuple[slice, slice, NDArray[np.float32]]]:
-        """The pooling as matrices: which spectrum bins each takes, which seen axis bins it gives, and the shares.
+    def _products(self) -> tuple[list[_Copy], list[_Matrix]]:
+        """The pooling as copies, where the axis is so fine that there is nothing to add up, and as matrices.
 
         A run of axis bins needs few spectrum bins, so the zeros that are multiplied too do not matter.
         """
         starts, counts = self.spans
         stops = starts + counts
-        out = []
+        copies: list[_Copy] = []
+        matrices: list[_Matrix] = []
         stop = 0
         while stop < len(starts):
             first, stop = stop, min(stop + _RUN, len(starts))
@@ -149,12 +165,17 @@ class Pooling:
             if len(starts) - stop == 1:  # a single column would be summed in another order
                 stop -= 1
             axis_bins = slice(first, stop)
+            if (counts[axis_bins] == 1).all():
+                if copies and copies[-1][1].stop == first:
+                    axis_bins = slice(copies.pop()[1].start, stop)
+                copies.append((starts[axis_bins], axis_bins))
+                continue
             low, high = int(starts[axis_bins].min()), int(stops[axis_bins].max())
             position = np.arange(low, high)[:, None]
             inside = (position >= starts[axis_bins]) & (position < stops[axis_bins])
             shares = np.ascontiguousarray(inside * self._shares[axis_bins], np.float32)
-            out.append((slice(low, high), axis_bins, shares))
-        return out
+            matrices.append((slice(low, high), axis_bins, shares))
+        return copies, matrices
 
     @cached_property
     def expected_peak(self) -> NDArray[np.float32]:

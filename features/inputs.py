@@ -69,14 +69,16 @@ def _inputs(
     out: dict[str, NDArray[np.float32]] = {}
     if "spectrum" in names or "features" in names:
         pool = pooling(spectrum.bins, spectrum.carrier_hz, spectrum.prf_hz, AXIS_BINS)
-        mean = pool.mean_db(spectrum.relative_power)
         parts = parts_db(samples, spectrum, AXIS_BINS)
         change = change_db(parts)
         if "spectrum" in names:
-            peak = pool.peak_db(spectrum.relative_power)
-            out["spectrum"] = np.stack([mean, peak, change], axis=-2)
+            levels = pool.mean_and_peak_db(spectrum.relative_power)
+            mean = levels[..., 0, :]
+            out["spectrum"] = np.concatenate([levels, change[..., None, :]], axis=-2)
+        else:
+            mean = pool.mean_db(spectrum.relative_power)
         if "features" in names:
-            out["features"] = feature_vector(spectrum, mean, parts, change)
+            out["features"] = feature_vector(spectrum, np.ascontiguousarray(mean), parts, change)
     if "image" in names or "joint_features" in names:
         image = stft_image(samples, spectrum)
         if "image" in names:

@@ -77,7 +77,7 @@ def spectrum_picture(iq: NDArray[np.complex64], radar: Radar, *, bins: int = SPE
     """
     spectrum = doppler_spectrum(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
     pool = pooling(spectrum.bins, radar.carrier_hz, radar.prf_hz, bins)
-    return np.stack([pool.mean_db(spectrum.relative_power), pool.peak_db(spectrum.relative_power)], axis=-2)
+    return pool.mean_and_peak_db(spectrum.relative_power)
 
 
 def stft_picture(iq: NDArray[np.complex64], radar: Radar, *, window: int, overlap: float) -> NDArray[np.float32]:

@@ -96,7 +96,7 @@ def to_db(relative_power: Value) -> Value:
 
 
 def pooled(relative_power: Value, pool: Pooling) -> tuple[Value, Value]:
-    """As `Pooling.mean_db` and `Pooling.peak_db`, shape (n, axis bins) each."""
+    """As `Pooling.mean_and_peak_db`, shape (n, axis bins) each."""
     starts, counts = pool.spans
     place = np.arange(counts.max())
     gathered = relative_power.take(starts[:, None] + np.minimum(place, counts[:, None] - 1))
