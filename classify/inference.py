@@ -307,13 +307,13 @@ class Classifier:
         """Run the chosen rows of (records, pulses), or all, through the model, a bounded number at a time."""
         count = len(records) if rows is None else len(rows)
         step = max(1, min(_STEP_RECORDS, _STEP_SAMPLES // records.shape[-1]))
-        out = np.empty((count, len(CLASSES)), dtype=np.float32)
+        out = [np.empty((0, len(CLASSES)), np.float32)]
         for start in range(0, count, step):
             part = slice(start, start + step)
             chunk = records[part if rows is None else rows[part]]
             feed = model_inputs(chunk, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs)
-            (out[part],) = self._session.run(_OUTPUTS, feed)
-        return out
+            out += self._session.run(_OUTPUTS, feed)
+        return out[-1] if len(out) <= 2 else np.concatenate(out)
 
 
 def _open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.InferenceSession:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 CLASSES = ("uav", "bird", "clutter")
 UNKNOWN = "unknown"
 
-_ANSWERS = np.array([*CLASSES, UNKNOWN])
+_LABEL = np.array([*CLASSES, UNKNOWN]).dtype
 
 
 def decide(probabilities: NDArray[np.floating], accept: Sequence[float]) -> tuple[NDArray[np.str_], list[str]]:
@@ -28,15 +28,12 @@ def decide(probabilities: NDArray[np.floating], accept: Sequence[float]) -> tupl
     reasons
         Why a record is "unknown"; "" where it is named.
     """
-    best = probabilities.argmax(axis=-1)
-    top = np.maximum.reduce(probabilities, axis=-1)
-    needed = np.array(accept, np.float64)[best]
-    named = top >= needed
-    labels = _ANSWERS[np.where(named, best, len(CLASSES))]
-    reasons = [""] * len(best)
-    for row in (~named).nonzero()[0].tolist():
-        reasons[row] = f"not sure: best {CLASSES[best[row]]} {_below(float(top[row]), needed[row])}"
-    return labels, reasons
+    labels, reasons = [], []
+    for row, best in zip(probabilities.tolist(), probabilities.argmax(axis=-1).tolist(), strict=True):
+        named = row[best] >= accept[best]
+        labels.append(CLASSES[best] if named else UNKNOWN)
+        reasons.append("" if named else f"not sure: best {CLASSES[best]} {_below(row[best], accept[best])}")
+    return np.array(labels, _LABEL), reasons
 
 
 def decide_by_sets(

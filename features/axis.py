@@ -105,9 +105,7 @@ class Pooling:
 
     def _blank(self, shape: tuple[int, ...]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Room for the axis with 0 where nothing is seen, and the part of it that is to be filled."""
-        out = np.empty((*shape, self.bins), np.float32)
-        if self.seen.start:
-            out[..., : self.seen.start] = out[..., self.seen.stop :] = 0
+        out = np.zeros((*shape, self.bins), np.float32)
         return out, out[..., self.seen]
 
     def _mean(self, power: NDArray[np.float32], out: NDArray[np.float32]) -> None:

@@ -46,7 +46,7 @@ def model_inputs(
     ValueError
         If a name is unknown, there are fewer than `MIN_PULSES` pulses, or a frequency is not positive.
     """
-    unknown = set(names) - set(INPUT_SHAPES)
+    unknown = set(names) - INPUT_SHAPES.keys()
     if unknown:
         raise ValueError(f"model input {sorted(unknown)[0]!r} is unknown: it must be one of {', '.join(INPUT_SHAPES)}")
     samples = np.asarray(iq, np.complex64)
@@ -55,10 +55,12 @@ def model_inputs(
     framed = "image" in names or "joint_features" in names
     high = max(1, BLOCK_SAMPLES // (IMAGE_SHARE if framed else 1) // samples.shape[-1])
     flat = samples.reshape(-1, samples.shape[-1])
-    blocks = [_inputs(flat[i : i + high], carrier_hz, prf_hz, names) for i in range(0, max(1, len(flat)), high)]
-    if len(blocks) > 1:
-        blocks = [{name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}]
-    return {name: rows.reshape(*samples.shape[:-1], *INPUT_SHAPES[name]) for name, rows in blocks[0].items()}
+    if len(flat) <= high:
+        made = _inputs(flat, carrier_hz, prf_hz, names)
+    else:
+        blocks = [_inputs(flat[i : i + high], carrier_hz, prf_hz, names) for i in range(0, len(flat), high)]
+        made = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+    return {name: rows.reshape(samples.shape[:-1] + INPUT_SHAPES[name]) for name, rows in made.items()}
 
 
 def _inputs(

@@ -23,14 +23,15 @@ LOWEST_DB = -20.0
 #: Without any noise (a synthetic line) the floor is this share of the record's power, not what rounding leaves.
 LEAST_FLOOR = np.float32(1e-9)
 
-_TEN, _NO_LIMIT = np.float32(10), np.float32(np.inf)
+# Arrays without axes: to NumPy a number is one more thing to convert at every call.
+_HALF, _ONE, _TEN, _NO_LIMIT = (np.array(value, np.float32) for value in (0.5, 1, 10, np.inf))
 
-_LEAST = np.float32(1e-36)  # under any power that is not 0: divides in its stead
-_SAFE_ENERGY = 1e-14, 1e30  # of a record: neither its lines, at most that strong, nor its floor leave float32
+_LEAST = np.array(1e-36, np.float32)  # under any power that is not 0: divides in its stead
+_SAFE_ENERGY = np.array(1e-14, np.float32), np.array(1e30, np.float32)  # of a record: neither its lines, at most that strong, nor its floor leave float32
 _FLOOR_QUANTILE = 0.25
 _FLOOR_QUANTILE_NORMAL = -0.6744897501960817  # standard normal quantile of 0.25
 _FLOOR_BLOCKS = 64  # a side of the spectrum
-_EMPTY_RATIO = 4.0  # a side this much below the other holds no noise of its own
+_EMPTY_RATIO = np.array(4, np.float32)  # a side this much below the other holds no noise of its own
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ def _window(pulses: int, centred_by_sign: bool) -> NDArray[np.float32]:
 
 def scaled(iq: NDArray[np.complex64], scale: NDArray[np.float32]) -> NDArray[np.complex64]:
     """Samples times a real factor a record: part by part, for half the price of a complex product."""
-    if (scale == 1).all():
+    if np.count_nonzero(scale == _ONE) == scale.size:
         return np.ascontiguousarray(iq)
     return (np.ascontiguousarray(iq).view(np.float32) * scale).view(np.complex64)
 
@@ -224,8 +225,8 @@ def safe_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
     with np.errstate(over="ignore", under="ignore"):
         energy = np.vecdot(parts, parts)
     least, most = _SAFE_ENERGY
-    if ((energy > least) & (energy < most)).all():
-        return np.ones((*energy.shape, 1), np.float32)
+    if np.count_nonzero((energy > least) & (energy < most)) == energy.size:
+        return ones(energy.size).reshape(*energy.shape, 1)
     return unit_scale(iq)
 
 
@@ -259,11 +260,17 @@ def noise_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
     means.partition(rank, axis=-1)
     one, other = means[..., 0, rank], means[..., 1, rank]
     least, most = np.minimum(one, other), np.maximum(one, other)
-    level = np.where(most > _EMPTY_RATIO * least, most, (least + most) / 2)
+    level = np.where(most > _EMPTY_RATIO * least, most, (least + most) * _HALF)
+    return np.divide(level, _quartile_of_noise(size))
+
+
+@lru_cache(maxsize=64)
+def _quartile_of_noise(size: int) -> NDArray[np.float32]:
+    """Lower quartile of the sum of so many neighbouring bins of white noise of unit power."""
     # Wilson and Hilferty's normal approximation to the quantile of a gamma of that many degrees of freedom
     shape_k = max(1.0, size / NOISE_BANDWIDTH_BINS)
     bias = (1 - 1 / (9 * shape_k) + _FLOOR_QUANTILE_NORMAL / (3 * math.sqrt(shape_k))) ** 3
-    return np.divide(level, np.float32(size * bias))
+    return np.array(size * bias, np.float32)
 
 
 def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spectrum:
