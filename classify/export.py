@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import onnx
 import onnxruntime
-from bladewing.features.graph.inputs import IQ, input_graph
+from bladewing.features.graph.inputs import IN_GRAPH, IQ, input_graph
 from bladewing.features.graph.operators import Graph, Value
 from bladewing.models.export import attach_metadata
 from bladewing.models.seal import SEAL_KEY, seal
@@ -74,11 +74,11 @@ def export_raw_iq(
     outside = classifier.envelope.reason(carrier_hz, prf_hz, pulses)
     if outside is not None:
         raise BadInput(f"cannot be exported: {outside}")
-    beyond = set(classifier.inputs) - {"spectrum", "features"}
+    beyond = set(classifier.inputs) - set(IN_GRAPH)
     if beyond:
         raise BadInput(
-            f"{source} reads {sorted(beyond)[0]!r}, of an STFT: only models of 'spectrum' and 'features' can be "
-            "exported: give one of these as --model"
+            f"{source} reads {sorted(beyond)[0]!r}, of an STFT: only models without one can be exported: "
+            "give one of these as --model"
         )
     whole = _whole_graph(content, classifier, carrier_hz, prf_hz, pulses)
     written = _sealed(whole, content, classifier, carrier_hz, prf_hz, pulses)

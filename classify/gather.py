@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 TASK_RECORDS = 10 * RADAR_GROUP
 
 #: Inputs kept as float16 until a batch needs them: dB values of at most 120 keep 0.06 dB.
-_COMPACT = ("spectrum", "image")
+_COMPACT = ("levels", "spectrum", "cadence", "image")
 
 
 @dataclass(frozen=True)

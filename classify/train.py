@@ -296,13 +296,11 @@ def _network(
     from bladewing.models.training_state import ForeignSnapshot
 
     shapes = {key: INPUT_SHAPES[key] for key in LADDER[name].inputs}
-    signal, *evidence = LADDER[name].inputs
-    numbers = shapes[evidence[0]][0] if evidence else 0
-    networks: dict[str, Callable[..., EvidenceNet]] = {
-        "spectrum": partial(SpectrumNet, widen=LADDER[name].widen),
-        "image": ImageNet,
-    }
-    net = networks[signal](shapes[signal], numbers, seed=settings.seed)
+    signal = LADDER[name].inputs[0]
+    image = len(shapes[signal]) == 3
+    net: EvidenceNet = (ImageNet if image else partial(SpectrumNet, widen=LADDER[name].widen))(
+        shapes, seed=settings.seed
+    )
 
     def inputs(part: Gathered) -> dict[str, NDArray]:
         return {key: part.inputs[key] for key in shapes}
@@ -321,7 +319,7 @@ def _network(
             learning_rate=settings.learning_rate,
             weight_decay=settings.weight_decay,
             # no measurement is signed, so only the picture is mirrored
-            augment=VelocityMirror(axes={signal: {"spectrum": -1, "image": -2}[signal]}, odd={}),
+            augment=VelocityMirror(axes={signal: -2 if image else -1}, odd={}),
             snapshot=snapshot,
             on_snapshot=partial(parts.keep_arrays, _epochs_of(name)) if parts else None,
             on_epoch=lambda epoch, epochs, _: on_fraction(epoch / epochs),

@@ -57,8 +57,7 @@ def _frame_power(
     iq: NDArray[np.complex64], spectrum: Spectrum, length: int, count: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Power spectra of frames, shape (..., count, bins), and what brings them into units of the floor, (..., 1, 1)."""
-    floor = spectrum.floor * np.square(spectrum.scale[..., 0], dtype=np.float64)
-    per_unit = per_floor(floor.astype(np.float32))[..., None, None]
+    per_unit = per_floor(spectrum.transform_floor)[..., None, None]
     return centred_power(frames(scaled(iq, spectrum.scale), length, count)), per_unit
 
 

@@ -206,6 +206,7 @@ def _record(spectrum: Spectrum, index: tuple[int, ...]) -> Spectrum:
         spectrum.prf_hz,
         spectrum.pulses,
         spectrum.scale[index],
+        spectrum.transform[index],
     )
 
 

@@ -12,11 +12,17 @@ from numpy.typing import NDArray
 from .change import PARTS
 from .shape import SPEED_BANDS_MPS
 
-#: Bins of the shared velocity axis of the "spectrum" input.
+#: Bins of the shared velocity axis of the "levels" and "spectrum" inputs.
 AXIS_BINS = 256
 
-#: Channels of the "spectrum" input: mean level, peak level over noise, change over the dwell's parts [dB each].
-SPECTRUM_CHANNELS = 3
+#: Channels of the "levels" input: mean level, peak level over noise [dB each].
+LEVEL_CHANNELS = 2
+
+#: Channels of the "spectrum" input: the levels, and their change over the dwell's parts [dB].
+SPECTRUM_CHANNELS = LEVEL_CHANNELS + 1
+
+#: Bins of the shared axis of rates of the "cadence" input.
+CADENCE_BINS = 96
 
 #: Velocity bins and frames of the "image" input.
 IMAGE_BINS, IMAGE_FRAMES = 64, 32
@@ -133,7 +139,9 @@ JOINT_FEATURES = FeatureTable(
 #: Shape of each named model input for one record, float32.
 INPUT_SHAPES: dict[str, tuple[int, ...]] = {
     "features": (len(FEATURES),),
+    "levels": (LEVEL_CHANNELS, AXIS_BINS),
     "spectrum": (SPECTRUM_CHANNELS, AXIS_BINS),
+    "cadence": (2, CADENCE_BINS),
     "joint_features": (len(JOINT_FEATURES),),
     "image": (1, IMAGE_BINS, IMAGE_FRAMES),
 }

@@ -27,7 +27,10 @@ LEAST_FLOOR = np.float32(1e-9)
 _HALF, _ONE, _TEN, _NO_LIMIT = (np.array(value, np.float32) for value in (0.5, 1, 10, np.inf))
 
 _LEAST = np.array(1e-36, np.float32)  # under any power that is not 0: divides in its stead
-_SAFE_ENERGY = np.array(1e-14, np.float32), np.array(1e30, np.float32)  # of a record: neither its lines, at most that strong, nor its floor leave float32
+_SAFE_ENERGY = (
+    np.array(1e-14, np.float32),
+    np.array(1e30, np.float32),
+)  # of a record: neither its lines, at most that strong, nor its floor leave float32
 _FLOOR_QUANTILE = 0.25
 _FLOOR_QUANTILE_NORMAL = -0.6744897501960817  # standard normal quantile of 0.25
 _FLOOR_BLOCKS = 64  # a side of the spectrum
@@ -51,6 +54,8 @@ class Spectrum:
         Pulses of the dwell.
     scale : ndarray of float32, shape (..., 1)
         Power of two by which the samples were scaled before the transform.
+    transform : ndarray of complex64, shape (..., bins)
+        The centred transform of the scaled and windowed samples, whose power this is.
     """
 
     relative_power: NDArray[np.float32]
@@ -59,11 +64,17 @@ class Spectrum:
     prf_hz: float
     pulses: int
     scale: NDArray[np.float32]
+    transform: NDArray[np.complex64]
 
     @property
     def bins(self) -> int:
         """Number of frequency bins."""
         return self.relative_power.shape[-1]
+
+    @property
+    def transform_floor(self) -> NDArray[np.float32]:
+        """Noise power of a bin of `transform`, shape (...)."""
+        return (self.floor * np.square(self.scale[..., 0], dtype=np.float64)).astype(np.float32)
 
     @property
     def wavelength_m(self) -> float:
@@ -156,11 +167,16 @@ def _window(pulses: int, centred_by_sign: bool) -> NDArray[np.float32]:
 
     With alternating signs it also centres the spectrum, which saves the shift.
     """
-    window = np.kaiser(pulses, KAISER_BETA)
-    window /= np.sqrt(np.sum(window**2))
+    window = taper(pulses)
     if centred_by_sign:
         window[1::2] *= -1
     return np.repeat(window.astype(np.float32), 2)
+
+
+def taper(pulses: int) -> NDArray[np.float64]:
+    """Kaiser window of unit noise gain, shape (pulses,)."""
+    window = np.kaiser(pulses, KAISER_BETA)
+    return window / np.sqrt(np.sum(window**2))
 
 
 def scaled(iq: NDArray[np.complex64], scale: NDArray[np.float32]) -> NDArray[np.complex64]:
@@ -184,14 +200,24 @@ def centred_power(iq: NDArray[np.complex64], bins: int | None = None) -> NDArray
     -------
     ndarray of float32, shape (..., bins)
     """
+    return squared(centred_transform(iq, bins))
+
+
+def centred_transform(iq: NDArray[np.complex64], bins: int | None = None) -> NDArray[np.complex64]:
+    """The transform whose power `centred_power` gives, for the same samples; its phases are those of its own start."""
     pulses = iq.shape[-1]
     bins = fft.next_fast_len(pulses) if bins is None else bins
     even = bins % 2 == 0
     parts = iq.astype(np.complex64, copy=False).view(np.float32)
     tapered = (parts * _window(pulses, even)).view(np.complex64)
-    power = np.abs(fft.fft(tapered, n=bins, axis=-1, overwrite_x=True))
-    np.multiply(power, power, out=power)
-    return power if even else fft.fftshift(power, axes=-1)
+    transform = fft.fft(tapered, n=bins, axis=-1, overwrite_x=True)
+    return transform if even else fft.fftshift(transform, axes=-1)
+
+
+def squared(transform: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """Power of complex values."""
+    power = np.abs(transform)
+    return np.multiply(power, power, out=power)
 
 
 #: A record whose largest part is below this has lost its digits among float32's denormal numbers: 9 bits are left here.
@@ -300,9 +326,10 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spec
         if not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
     scale = safe_scale(samples)
-    power = centred_power(scaled(samples, scale))
+    transform = centred_transform(scaled(samples, scale))
+    power = squared(transform)
     floor = noise_floor(power)
     floor = np.maximum(floor, sums(power) * (LEAST_FLOOR / np.float32(power.shape[-1])))
     natural = floor / np.square(scale[..., 0], dtype=np.float64)
     relative = np.multiply(power, per_floor(floor)[..., None], out=power)
-    return Spectrum(relative, natural, float(carrier_hz), float(prf_hz), samples.shape[-1], scale)
+    return Spectrum(relative, natural, float(carrier_hz), float(prf_hz), samples.shape[-1], scale, transform)

@@ -11,7 +11,7 @@ from .axis import axis_velocities_mps
 from .bandwidth import energy_band_mps, noise_threshold_db, threshold_band_hz
 from .change import busy_db, centroid_mps, change_db, swing
 from .chopping import cepstral_chopping
-from .notch import body_line, notch_mask, notch_residual_db, residual, weights
+from .notch import Body, notch_residual_db, residual, weights
 from .schema import FEATURES, FeatureTable
 from .shape import band_levels_db, entropy, ripple_db, symmetry
 from .smearing import smearing_index
@@ -84,6 +84,8 @@ def lay_out(columns: Mapping[str, ArrayLike], table: FeatureTable, shape: tuple[
 
 def feature_vector(
     spectrum: Spectrum,
+    body: Body,
+    mask: NDArray[np.bool_],
     axis_db: NDArray[np.float32],
     parts: NDArray[np.float32],
     change: NDArray[np.float32] | None = None,
@@ -94,6 +96,10 @@ def feature_vector(
     ----------
     spectrum : Spectrum
         Spectra, shape (..., bins).
+    body : Body
+        From `body_line`.
+    mask : ndarray of bool, shape (..., bins)
+        From `notch_mask`.
     axis_db : ndarray of float32, shape (..., axis bins)
         Their mean level on the shared axis.
     parts : ndarray of float32, shape (..., PARTS, axis bins)
@@ -106,8 +112,6 @@ def feature_vector(
     ndarray of float32, shape (..., len(FEATURES))
         Finite, each within its range.
     """
-    body = body_line(spectrum)
-    mask = notch_mask(spectrum, body)
     kept = weights(mask)
     above = residual(spectrum)
     total = sums(above)

@@ -45,9 +45,9 @@ class Rung:
 LADDER: dict[str, Rung] = {
     "features-linear": Rung("linear", ("features",)),
     "features-boosted": Rung("boosted", ("features",)),
-    "spectrum-cnn-fast": Rung("network", ("spectrum",)),
-    "spectrum-cnn": Rung("network", ("spectrum", "features")),
-    "spectrum-cnn-wide": Rung("network", ("spectrum", "features"), widen=2),
+    "spectrum-cnn-fast": Rung("network", ("levels", "cadence")),
+    "spectrum-cnn": Rung("network", ("spectrum", "cadence", "features")),
+    "spectrum-cnn-wide": Rung("network", ("spectrum", "cadence", "features"), widen=2),
     "joint-boosted": Rung("boosted", ("joint_features",)),
     "image-cnn": Rung("network", ("image", "joint_features")),
 }

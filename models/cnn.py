@@ -1,8 +1,8 @@
-"""Two small convolutional networks, each reading a signal, most often beside a vector of measurements.
+"""Two small convolutional networks, each reading a signal, most often beside other evidence.
 
 Both have the same anatomy: strided convolutions over the signal, their mean and their maximum along the axes (how much
-there is of a pattern, and whether it is there at all), a small dense branch over the measurements where there are any,
-and a common head.
+there is of a pattern, and whether it is there at all), a small branch over each other input (a cadence, a vector of
+measurements), and a common head.
 The inputs are standardised inside, by buffers that `EvidenceNet.measure` fills: the exported model eats raw inputs.
 """
 
@@ -17,6 +17,7 @@ from torch.nn.utils.fusion import fuse_conv_bn_eval
 from ._checks import CLASS_COUNT, require_finite
 
 _BRANCH = 32
+_RATES = (16, 24, 32)  # channels of the convolutions over a spectrum of rates
 _HEAD = 48
 _DROPOUT = 0.2
 _CLIP = 8.0  # standard deviations; beyond them an input says no more than "very much"
@@ -92,13 +93,32 @@ class _Residual(nn.Module):
         return torch.relu(values + self.change(values))
 
 
+def _branch(shape: tuple[int, ...]) -> nn.Sequential:
+    """From evidence to `_BRANCH` numbers: dense over measurements (F,), convolutions over a spectrum of rates (C, B).
+
+    Rates keep their place on the axis, as a wing's are not a rotor's: what the convolutions leave goes on bin by bin.
+    """
+    if len(shape) == 1:
+        return nn.Sequential(nn.Linear(shape[0], _BRANCH), nn.ReLU())
+    convolutions = [
+        _Convolution(inputs, outputs, (1, kernel), (1, 2))
+        for inputs, outputs, kernel in zip((shape[0], *_RATES[:-1]), _RATES, (7, 5, 5), strict=True)
+    ]
+    left = shape[1]
+    for _ in convolutions:
+        left = (left + 1) // 2
+    dense = nn.Linear(_RATES[-1] * left, _BRANCH)
+    return nn.Sequential(nn.Unflatten(1, (shape[0], 1)), *convolutions, nn.Flatten(), dense, nn.ReLU())
+
+
 class EvidenceNet(nn.Module):
-    """A signal and a vector of measurements to three scores; the anatomy that both networks share.
+    """A signal and other evidence to three scores; the anatomy that both networks share.
 
     Parameters
     ----------
     shapes
-        The inputs, name to shape of one record: the signal (C, ...) first, then the measurements (F,), if any.
+        The inputs, name to shape of one record: the signal (C, ...) first, then the evidence, if any: a spectrum of
+        rates (C, B), measurements (F,).
     trunk
         From (n, C, H, W) to (n, width, h, w).
     width
@@ -114,8 +134,8 @@ class EvidenceNet(nn.Module):
         )
         self.flat = len(signal) == 2  # one axis: a height of 1 is put in, since 2-D convolutions run faster than 1-D
         self.trunk = trunk
-        self.branch = nn.Sequential(nn.Linear(evidence[0][0], _BRANCH), nn.ReLU()) if evidence else None
-        seen = 2 * width + (_BRANCH if evidence else 0)
+        self.branches = nn.ModuleList(_branch(shape) for shape in evidence)
+        seen = 2 * width + _BRANCH * len(evidence)
         self.head = nn.Sequential(
             nn.Linear(seen, _HEAD), nn.ReLU(), nn.Dropout(_DROPOUT), nn.Linear(_HEAD, CLASS_COUNT)
         )
@@ -188,7 +208,7 @@ class EvidenceNet(nn.Module):
             for weights in self.parameters():
                 weights.copy_(weights.half().float())
 
-    def forward(self, signal: Tensor, evidence: Tensor | None = None) -> Tensor:
+    def forward(self, signal: Tensor, *evidence: Tensor) -> Tensor:
         """Return the scores.
 
         Parameters
@@ -196,81 +216,76 @@ class EvidenceNet(nn.Module):
         signal
             First input, raw, shape (n, C, B) or (n, C, H, W).
         evidence
-            Second input, raw, shape (n, F), if the network reads one.
+            The other inputs, raw, shape (n, C, B) or (n, F), as many as the network reads.
 
         Returns
         -------
         Tensor
             Shape (n, 3), in the order uav, bird, clutter.
         """
-        signal_name, *evidence_name = self.input_shapes
+        signal_name, *names = self.input_shapes
         planes = self.standardise[signal_name](signal)
         maps = self.trunk(planes.unsqueeze(2) if self.flat else planes)
         seen = [maps.mean((2, 3)), maps.amax((2, 3))]
-        if self.branch is not None:
-            assert evidence is not None
-            seen.append(self.branch(self.standardise[evidence_name[0]](evidence)))
+        for name, branch, values in zip(names, self.branches, evidence, strict=True):
+            seen.append(branch(self.standardise[name](values)))
         return self.head(torch.cat(seen, dim=1))
 
 
 class SpectrumNet(EvidenceNet):
-    """1-D network over the velocity spectrum ("spectrum"), beside its measurements ("features") or alone.
+    """1-D network over the velocity spectrum, alone or beside other evidence.
 
-    About 39 000 parameters and 0.8 million multiplications a record of 3 x 256; twice as wide, 134 000 and 2.8 million;
-    half as wide and alone, 11 000 and 0.2 million.
+    XXX parameters.
 
     Parameters
     ----------
-    spectrum_shape
-        Channels and velocity bins (C, B).
-    feature_count
-        Number of measurements F; 0: the network reads the spectrum alone.
+    shapes
+        The inputs, name to shape of one record: the spectrum's channels and velocity bins (C, B) first, then the
+        evidence, if any, as for `EvidenceNet`.
     seed
         Draws the first weights; the global generator of torch is left as it was.
     widen
-        Factor on the channels of every layer, 0.5, 1 or 2.
+        Factor on the channels of the spectrum's layers, 0.5, 1 or 2.
     """
 
-    def __init__(self, spectrum_shape: tuple[int, int], feature_count: int, *, seed: int, widen: float = 1) -> None:
+    def __init__(self, shapes: Mapping[str, tuple[int, ...]], *, seed: int, widen: float = 1) -> None:
         first, second, third, last = (round(widen * channels) for channels in (16, 24, 32, 48))
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             trunk = nn.Sequential(
-                _Convolution(spectrum_shape[0], first, (1, 7), (1, 2)),
+                _Convolution(next(iter(shapes.values()))[0], first, (1, 7), (1, 2)),
                 _Convolution(first, second, (1, 5), (1, 2)),
                 _Convolution(second, third, (1, 5), (1, 2)),
                 _Residual(third, (1, 5)),
                 _Convolution(third, last, (1, 5), (1, 2)),
                 _Residual(last, (1, 5)),
             )
-            beside = {"features": (feature_count,)} if feature_count else {}
-            super().__init__({"spectrum": spectrum_shape, **beside}, trunk, last)
+            super().__init__(shapes, trunk, last)
 
 
 class ImageNet(EvidenceNet):
-    """2-D network over the joint image ("image") beside its measurements ("joint_features").
+    """2-D network over a joint image, alone or beside other evidence.
 
-    About 39 000 parameters and 1.1 million multiplications a record of 1 x 64 x 32.
+    About 39 000 parameters and 1.1 million multiplications a record of 1 x 64 x 32 beside measurements.
 
     Parameters
     ----------
-    image_shape
-        Channels, height and width (C, H, W).
-    feature_count
-        Number of measurements F.
+    shapes
+        The inputs, name to shape of one record: the image's channels, height and width (C, H, W) first, then the
+        evidence, if any, as for `EvidenceNet`.
     seed
         Draws the first weights; the global generator of torch is left as it was.
     """
 
-    def __init__(self, image_shape: tuple[int, int, int], feature_count: int, *, seed: int) -> None:
+    def __init__(self, shapes: Mapping[str, tuple[int, ...]], *, seed: int) -> None:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             trunk = nn.Sequential(
-                _Convolution(image_shape[0], 8, (5, 5), (2, 2)),
+                _Convolution(next(iter(shapes.values()))[0], 8, (5, 5), (2, 2)),
                 _Convolution(8, 16, (3, 3), (2, 2)),
                 _Residual(16, (3, 3)),
                 _Convolution(16, 32, (3, 3), (2, 2)),
                 _Residual(32, (3, 3)),
                 _Convolution(32, 48, (3, 3), (2, 2)),
             )
-            super().__init__({"image": image_shape, "joint_features": (feature_count,)}, trunk, 48)
+            super().__init__(shapes, trunk, 48)

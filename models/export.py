@@ -79,7 +79,7 @@ def export_network(net: "EvidenceNet", input_shapes: Mapping[str, tuple[int, ...
             opset_version=_OPSET,
             input_names=list(net.input_shapes),
             output_names=["scores"],
-            dynamic_shapes=tuple({0: batch} for _ in example),
+            dynamic_shapes=({0: batch}, tuple({0: batch} for _ in example[1:])),
         )
     assert program is not None
     model = program.model_proto  # made anew at each asking

@@ -149,9 +149,8 @@ def network_for(picture: Picture, *, seed: int) -> Any:
     """An untrained network for a picture: one anatomy for spectra, one for pictures with time in them."""
     from bladewing.models.cnn import ImageNet, SpectrumNet
 
-    if len(picture.shape) == 2:
-        return SpectrumNet((picture.shape[0], picture.shape[1]), 4, seed=seed)
-    return ImageNet((picture.shape[0], picture.shape[1], picture.shape[2]), 4, seed=seed)
+    shapes = {"picture": picture.shape, "radar": (4,)}
+    return SpectrumNet(shapes, seed=seed) if len(picture.shape) == 2 else ImageNet(shapes, seed=seed)
 
 
 def network_bytes(net: Any) -> bytes:

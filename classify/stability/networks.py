@@ -2,6 +2,7 @@
 
 import copy
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -20,14 +21,17 @@ from .cell import Cell, sweep
 Inputs = dict[str, NDArray[np.float32]]
 
 _CLIP_GUARD = "standardised inputs are clipped at eight deviations"
-_NETS = {"spectrum": SpectrumNet, "image": ImageNet}
+_NETS: tuple[tuple[type[EvidenceNet], tuple[str, ...]], ...] = (
+    (SpectrumNet, ("spectrum", "cadence", "features")),
+    (ImageNet, ("image", "joint_features")),
+)
 
 
 def cells(quick: bool) -> Iterator[Cell]:
     """Every cell of these stages; `quick` leaves out the second network."""
     yield from _softmax()
-    for signal, evidence in (("spectrum", "features"), ("image", "joint_features"))[: 1 if quick else 2]:
-        yield from _network(signal, evidence)
+    for make, names in _NETS[: 1 if quick else 2]:
+        yield from _network(make, names)
 
 
 def _softmax_error(scores: tuple[float, ...], calibration: Calibration | None = None) -> float:
@@ -57,25 +61,26 @@ def _softmax() -> Iterator[Cell]:
     )
 
 
-def _network(signal: str, evidence: str) -> Iterator[Cell]:
+def _network(make: Any, names: tuple[str, ...]) -> Iterator[Cell]:
     """One network with drawn weights, standardised by real records, in every form it is run in."""
     radar = Radar(9.85e9, 25e3, 1000)
     inputs = model_inputs(
         draw_records(radar, 48, 0, purpose="bench").iq,
         carrier_hz=radar.carrier_hz,
         prf_hz=radar.prf_hz,
-        names=(signal, evidence),
+        names=names,
     )
-    net: EvidenceNet = _NETS[signal](INPUT_SHAPES[signal], INPUT_SHAPES[evidence][0], seed=0)
+    shapes = {name: INPUT_SHAPES[name] for name in names}
+    net: EvidenceNet = make(shapes, seed=0)
     net.measure(inputs)
     exact = copy.deepcopy(net).double().eval()
 
     def reference(given: Inputs) -> NDArray[np.float64]:
         with torch.inference_mode():
-            scores = exact(*(torch.as_tensor(given[name]).double() for name in (signal, evidence)))
+            scores = exact(*(torch.as_tensor(given[name]).double() for name in names))
         return softmax(scores.numpy())
 
-    onnx_bytes = export_network(net, {name: INPUT_SHAPES[name] for name in (signal, evidence)}, Calibration())
+    onnx_bytes = export_network(net, shapes, Calibration())
     forms: dict[str, tuple[float, Callable[[Inputs], NDArray]]] = {
         "float32": (1e-4, lambda given: softmax(network_scores(net, given))),
         "ONNX": (1e-4, _runner(onnx_bytes)),
@@ -83,7 +88,7 @@ def _network(signal: str, evidence: str) -> Iterator[Cell]:
         "int8": (0.1, _runner(in_eight_bits(onnx_bytes))),
     }
     for form, (limit, run) in forms.items():
-        yield from _forms(f"{signal} network, {form}", limit, run, reference, inputs)
+        yield from _forms(f"{names[0]} network, {form}", limit, run, reference, inputs)
 
 
 def _forms(

@@ -133,6 +133,7 @@ def _long(spectrum: Spectrum) -> Spectrum:
         spectrum.prf_hz,
         spectrum.pulses,
         spectrum.scale,
+        spectrum.transform,
     )
 
 

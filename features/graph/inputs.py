@@ -1,4 +1,4 @@
-"""Raw IQ to the model inputs "spectrum" and "features" in graph operators, for one radar and one dwell."""
+"""Raw IQ to the model inputs without an STFT in graph operators, for one radar and one dwell."""
 
 from collections.abc import Collection
 
@@ -9,7 +9,9 @@ from ..change import PARTS, _frame_starts, part_length
 from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
 from ..spectrum import LEAST_FLOOR, Spectrum, doppler_spectrum
 from ..vector import _BANDS, _SIGNIFICANT, radar_columns
+from .cadence import cadence_db
 from .measurements import (
+    Body,
     band_levels_db,
     body_line,
     centroid_mps,
@@ -26,7 +28,10 @@ from .measurements import (
     threshold_width_hz,
 )
 from .operators import Graph, Value
-from .spectrum import centred_power, noise_floor, pooled, pooled_mean, to_db, unit_scale
+from .spectrum import centred_power, centred_transform, noise_floor, pooled, pooled_mean, squared, to_db, unit_scale
+
+#: The model inputs that are made in a graph.
+IN_GRAPH = ("features", "levels", "spectrum", "cadence")
 
 #: Name of the graph's input: float32, shape (records, pulses, 2), I and Q.
 IQ = "iq"
@@ -46,7 +51,7 @@ def input_graph(
     pulses : int
         Pulses of a record, at least `inputs.MIN_PULSES`.
     names : collection of str
-        "spectrum", "features" or both.
+        Some of `IN_GRAPH`.
 
     Returns
     -------
@@ -58,11 +63,11 @@ def input_graph(
     Raises
     ------
     ValueError
-        If a name is not one of the two.
+        If a name is not one of them.
     """
-    unknown = set(names) - {"spectrum", "features"}
+    unknown = set(names) - set(IN_GRAPH)
     if unknown:
-        raise ValueError(f"model input {sorted(unknown)[0]!r} is not made in a graph: only spectrum and features are")
+        raise ValueError(f"model input {sorted(unknown)[0]!r} is not made in a graph: only {', '.join(IN_GRAPH)} are")
     # a spectrum without signal, for what depends on the radar alone
     radar = doppler_spectrum(np.zeros(pulses, np.complex64), carrier_hz=carrier_hz, prf_hz=prf_hz)
     iq = Value(graph, IQ, np.float32)
@@ -72,36 +77,48 @@ def input_graph(
     packed = iq.transpose(0, 2, 1)
     packed = graph.where(live.reshape(-1, 1, 1), packed, 0.0) * unit_scale(largest).reshape(-1, 1, 1)
 
-    power = centred_power(packed, pulses, radar.bins)
+    transform = centred_transform(packed, pulses, radar.bins)
+    power = squared(transform)
     floor = noise_floor(power, radar.bins).at_least(power.mean() * float(LEAST_FLOOR))
     safe = graph.where(floor > 0.0, floor, 1.0)
     relative_power = power / safe
     mean, peak = pooled(relative_power, pooling(radar.bins, radar.carrier_hz, radar.prf_hz, AXIS_BINS))
 
-    length = part_length(pulses)
-    starts, _ = _frame_starts(pulses, length, PARTS)
-    frames = graph.concat(*(packed.slice(start, start + length) for start in starts), axis=1).reshape(-1, 2, length)
-    bins = doppler_spectrum(np.zeros(length, np.complex64), carrier_hz=carrier_hz, prf_hz=prf_hz).bins
-    parts = centred_power(frames, length, bins).reshape(-1, PARTS, bins) / safe.reshape(-1, 1, 1)
-    pool = pooling(bins, radar.carrier_hz, radar.prf_hz, AXIS_BINS)
-    parts_db = pooled_mean(parts, pool).at_least(0.0)
-    away = parts_db - parts_db.sum(-2) / PARTS
-    change = ((away * away).sum(-2, keep=False) / PARTS).apply("Sqrt")
+    out = {"levels": graph.concat(*(row.reshape(-1, 1, AXIS_BINS) for row in (mean, peak)), axis=1)}
+    if "features" in names or "cadence" in names:
+        level_db = to_db(relative_power)
+        body = body_line(radar, relative_power, level_db)
+        kept = notch_weights(radar, body)
+    if "cadence" in names:
+        out["cadence"] = cadence_db(radar, transform, safe, kept)
+    if "spectrum" in names or "features" in names:
+        length = part_length(pulses)
+        starts, _ = _frame_starts(pulses, length, PARTS)
+        frames = graph.concat(*(packed.slice(start, start + length) for start in starts), axis=1)
+        bins = doppler_spectrum(np.zeros(length, np.complex64), carrier_hz=carrier_hz, prf_hz=prf_hz).bins
+        parts = centred_power(frames.reshape(-1, 2, length), length, bins).reshape(-1, PARTS, bins)
+        pool = pooling(bins, radar.carrier_hz, radar.prf_hz, AXIS_BINS)
+        parts_db = pooled_mean(parts / safe.reshape(-1, 1, 1), pool).at_least(0.0)
+        away = parts_db - parts_db.sum(-2) / PARTS
+        change = ((away * away).sum(-2, keep=False) / PARTS).apply("Sqrt")
+        out["spectrum"] = graph.concat(out["levels"], change.reshape(-1, 1, AXIS_BINS), axis=1)
+        if "features" in names:
+            out["features"] = _feature_vector(radar, relative_power, level_db, body, kept, mean, parts_db, change)
+    return {name: out[name] for name in INPUT_SHAPES if name in names}, live
 
-    out = {}
-    if "spectrum" in names:
-        out["spectrum"] = graph.concat(*(row.reshape(-1, 1, AXIS_BINS) for row in (mean, peak, change)), axis=1)
-    if "features" in names:
-        out["features"] = _feature_vector(radar, relative_power, mean, parts_db, change)
-    return {name: out[name] for name in INPUT_SHAPES if name in out}, live
 
-
-def _feature_vector(radar: Spectrum, relative_power: Value, axis_db: Value, parts_db: Value, change: Value) -> Value:
+def _feature_vector(
+    radar: Spectrum,
+    relative_power: Value,
+    level_db: Value,
+    body: Body,
+    kept: Value,
+    axis_db: Value,
+    parts_db: Value,
+    change: Value,
+) -> Value:
     """As `vector.feature_vector`, without its NaN: a feature that has no value is 0."""
     graph, bins = relative_power.graph, radar.bins
-    level_db = to_db(relative_power)
-    body = body_line(radar, relative_power, level_db)
-    kept = notch_weights(radar, body)
     over = (relative_power - 1.0).at_least(0.0)
     excess = over * kept
     energy = excess * (excess > float(_SIGNIFICANT)).to(np.float32)

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from .. import spectrum as definition
 from ..axis import UNSEEN_DB, Pooling
+from ..cadence import CadencePlan
 from .operators import Value
 
 
@@ -56,13 +57,26 @@ def dft(packed: Value, length: int, count: int, *, real: bool = False) -> tuple[
     return laid_out(full.slice(0, wanted)), laid_out(full.slice(wanted, 2 * wanted))
 
 
+def centred_transform(packed: Value, pulses: int, bins: int) -> tuple[Value, Value]:
+    """As `spectrum.centred_transform`: from samples (n, 2, pulses) to two parts (n, bins)."""
+    even = bins % 2 == 0
+    parts = dft((packed * definition._window(pulses, even)[::2]).pad(0, bins - pulses), bins, bins)
+    half = (bins + 1) // 2
+    if even:
+        return parts
+    re, im = (packed.graph.concat(part.slice(half, bins), part.slice(0, half)) for part in parts)
+    return re, im
+
+
+def squared(parts: tuple[Value, Value]) -> Value:
+    """As `spectrum.squared`."""
+    re, im = parts
+    return re * re + im * im
+
+
 def centred_power(packed: Value, pulses: int, bins: int) -> Value:
     """As `spectrum.centred_power`: from samples (n, 2, pulses) to power (n, bins)."""
-    even = bins % 2 == 0
-    re, im = dft((packed * definition._window(pulses, even)[::2]).pad(0, bins - pulses), bins, bins)
-    power = re * re + im * im
-    half = (bins + 1) // 2
-    return power if even else packed.graph.concat(power.slice(half, bins), power.slice(0, half))
+    return squared(centred_transform(packed, pulses, bins))
 
 
 def unit_scale(largest: Value) -> Value:
@@ -95,7 +109,7 @@ def to_db(relative_power: Value) -> Value:
     return relative_power.at_least(10 ** (definition.LOWEST_DB / 10)).apply("Log") * (10 / np.log(10))
 
 
-def pooled(relative_power: Value, pool: Pooling) -> tuple[Value, Value]:
+def pooled(relative_power: Value, pool: Pooling | CadencePlan) -> tuple[Value, Value]:
     """As `Pooling.mean_and_peak_db`, shape (n, axis bins) each."""
     starts, counts = pool.spans
     place = np.arange(counts.max())
@@ -113,5 +127,5 @@ def pooled_mean(relative_power: Value, pool: Pooling) -> Value:
     return _place((total / counts.astype(np.float64)).to(np.float32), pool)
 
 
-def _place(relative_power: Value, pool: Pooling) -> Value:
+def _place(relative_power: Value, pool: Pooling | CadencePlan) -> Value:
     return to_db(relative_power).pad(pool.seen.start, pool.bins - pool.seen.stop, UNSEEN_DB)

@@ -12,7 +12,7 @@ import pytest
 from bladewing.classify import BadInput, Classifier
 from bladewing.classify.cli import main
 from bladewing.classify.export import PRODUCT, TOLERANCE, export_raw_iq
-from bladewing.features.graph.inputs import IQ, input_graph
+from bladewing.features.graph.inputs import IN_GRAPH, IQ, input_graph
 from bladewing.features.graph.operators import Graph
 from bladewing.features.inputs import model_inputs
 from bladewing.features.schema import FEATURES, INPUT_SHAPES
@@ -72,7 +72,7 @@ def run(session: onnxruntime.InferenceSession, iq: np.ndarray) -> tuple[np.ndarr
 @pytest.mark.parametrize("radar", RADARS, ids=lambda radar: f"{radar['pulses']}")
 def test_the_graph_makes_the_inputs_that_python_makes(radar):
     graph = Graph()
-    inputs, live = input_graph(graph, **radar, names=INPUT_SHAPES.keys() & {"spectrum", "features"})
+    inputs, live = input_graph(graph, **radar, names=IN_GRAPH)
     outputs = [graph.name(value, name) for name, value in {**inputs, "live": live}.items()]
     shapes = {**INPUT_SHAPES, "live": (1,)}
     kinds = {np.dtype(bool): TensorProto.BOOL, np.dtype(np.float32): TensorProto.FLOAT}
@@ -90,14 +90,15 @@ def test_the_graph_makes_the_inputs_that_python_makes(radar):
     iq = records(60, **radar)
     session = onnxruntime.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
     feed = {IQ: iq.view(np.float32).reshape(*iq.shape, 2)}
-    found = dict(
-        zip(("spectrum", "features", "live"), session.run(["spectrum", "features", "live"], feed), strict=True)
-    )
-    expected = model_inputs(iq, carrier_hz=radar["carrier_hz"], prf_hz=radar["prf_hz"])
+    found = dict(zip((*IN_GRAPH, "live"), session.run([*IN_GRAPH, "live"], feed), strict=True))
+    expected = model_inputs(iq, carrier_hz=radar["carrier_hz"], prf_hz=radar["prf_hz"], names=IN_GRAPH)
     assert found["live"].all()
     # what does not change over the dwell is the small difference of large squares
     np.testing.assert_allclose(found["spectrum"][:, :2], expected["spectrum"][:, :2], atol=2e-3)
     np.testing.assert_allclose(found["spectrum"][:, 2], expected["spectrum"][:, 2], atol=0.05)
+    np.testing.assert_allclose(found["levels"], expected["levels"], atol=2e-3)
+    # a weak line of the power over time stands beside strong ones in the same sums
+    np.testing.assert_allclose(found["cadence"], expected["cadence"], atol=0.05)
     # a threshold or a choice of peaks that rounding decides may fall the other way in a rare record
     scale = FEATURES.high - FEATURES.low
     off = np.abs(found["features"] - expected["features"]) / scale > 1e-4

@@ -26,6 +26,7 @@ from onnx import helper
 
 CALIBRATION = Calibration(0.7, (0.3, -0.5, 0.2))
 FEATURES = 6
+SHAPES = {"spectrum": (3, 64), "features": (FEATURES,)}
 KINDS = ("features-linear", "features-boosted", "spectrum-cnn-fast", "spectrum-cnn", "image-cnn")
 
 
@@ -53,9 +54,11 @@ def exported():
     return {
         "features-linear": _tabular(train_linear, "features"),
         "features-boosted": _tabular(train_boosted, "joint_features"),
-        "spectrum-cnn-fast": _network(SpectrumNet((3, 64), 0, seed=0)),
-        "spectrum-cnn": _network(SpectrumNet((3, 64), FEATURES, seed=0)),
-        "image-cnn": _network(ImageNet((1, 32, 16), FEATURES, seed=0)),
+        "spectrum-cnn-fast": _network(SpectrumNet({"levels": (2, 64), "cadence": (2, 32)}, seed=0)),
+        "spectrum-cnn": _network(
+            SpectrumNet({"spectrum": (3, 64), "cadence": (2, 24), "features": (FEATURES,)}, seed=0)
+        ),
+        "image-cnn": _network(ImageNet({"image": (1, 32, 16), "joint_features": (FEATURES,)}, seed=0)),
     }
 
 
@@ -138,12 +141,16 @@ def test_a_full_ensemble_stays_under_300_kb_and_a_network_under_200():
     model = train_boosted(x, y, seed=0)
     assert model.n_iter_ > 60
     assert len(export_tabular(model, 8, "features", CALIBRATION)) < 300_000
-    for net in (SpectrumNet((3, 256), 60, seed=0), ImageNet((1, 64, 32), 60, seed=0)):
-        assert sum(p.numel() for p in net.parameters()) * 4 < 180_000
+    nets = (
+        SpectrumNet({"spectrum": (3, 256), "cadence": (2, 96), "features": (60,)}, seed=0),
+        ImageNet({"image": (1, 64, 32), "joint_features": (60,)}, seed=0),
+    )
+    for net in nets:
+        assert sum(p.numel() for p in net.parameters()) * 2 < 130_000  # stored in half precision
 
 
 def test_wrong_shapes_are_refused():
-    net = SpectrumNet((3, 64), FEATURES, seed=0)
+    net = SpectrumNet(SHAPES, seed=0)
     with pytest.raises(ValueError, match="the network was made for"):
         export_network(net, {"spectrum": (3, 128), "features": (FEATURES,)}, CALIBRATION)
     x = np.random.default_rng(0).normal(size=(60, 2)).astype(np.float32)
@@ -156,7 +163,7 @@ def test_an_export_with_a_fixed_batch_is_refused(monkeypatch):
     export = torch.onnx.export
     monkeypatch.setattr(torch.onnx, "export", lambda *a, **options: export(*a, **(options | {"dynamic_shapes": None})))
     with pytest.raises(ValueError, match="only the batch free"):
-        export_network(SpectrumNet((3, 64), FEATURES, seed=0), {"spectrum": (3, 64), "features": (6,)}, CALIBRATION)
+        export_network(SpectrumNet(SHAPES, seed=0), SHAPES, CALIBRATION)
 
 
 @pytest.mark.parametrize("dims", [(2, 4), ("batch", "other"), ("batch", 5)])

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 BINS, FEATURES = 32, 4
+SHAPES = {"spectrum": (2, BINS), "features": (FEATURES,)}
 
 
 def _spectra(count, seed):
@@ -39,7 +40,7 @@ def _images(count, seed):
 
 def _trained(seed=0, epochs=2, **options):
     inputs, y = _spectra(300, 1)
-    net = SpectrumNet((2, BINS), FEATURES, seed=seed)
+    net = SpectrumNet(SHAPES, seed=seed)
     result = train_network(net, inputs, y, _spectra(100, 2), seed=seed, epochs=epochs, batch=64, **options)
     return net, result
 
@@ -47,9 +48,9 @@ def _trained(seed=0, epochs=2, **options):
 @pytest.mark.parametrize(
     ("draw", "make"),
     [
-        (_spectra, lambda: SpectrumNet((2, BINS), FEATURES, seed=0)),
-        (_spectra, lambda: SpectrumNet((2, BINS), 0, seed=0)),
-        (_images, lambda: ImageNet((1, 16, 16), FEATURES, seed=0)),
+        (_spectra, lambda: SpectrumNet(SHAPES, seed=0)),
+        (_spectra, lambda: SpectrumNet({"spectrum": (2, BINS)}, seed=0)),
+        (_images, lambda: ImageNet({"image": (1, 16, 16), "joint_features": (FEATURES,)}, seed=0)),
     ],
 )
 def test_a_net_learns_what_its_signal_tells(draw, make):
@@ -61,6 +62,23 @@ def test_a_net_learns_what_its_signal_tells(draw, make):
     assert accuracy > 0.9  # chance is 0.33 with a spread of 0.03
 
 
+def test_a_net_learns_at_what_rate_something_comes_and_goes():
+    rng = np.random.default_rng(0)
+    y = rng.integers(0, 3, 900)
+    cadence = rng.normal(size=(900, 2, 24))
+    for place in (0, 1):  # the same pattern at one of three rates: only its place tells
+        cadence[np.arange(900), :, 4 + 7 * y + place] += 5
+    inputs = {
+        "spectrum": rng.normal(size=(900, 2, BINS)).astype(np.float32),
+        "cadence": cadence.astype(np.float32),
+        "features": rng.normal(size=(900, FEATURES)).astype(np.float32),
+    }
+    parts = [{name: values[rows] for name, values in inputs.items()} for rows in (slice(0, 600), slice(600, 900))]
+    net = SpectrumNet({name: values.shape[1:] for name, values in inputs.items()}, seed=0)
+    train_network(net, parts[0], y[:600], (parts[1], y[600:]), seed=0, epochs=8, batch=64)
+    assert (network_scores(net, parts[1]).argmax(axis=1) == y[600:]).mean() > 0.9
+
+
 def test_a_net_learns_what_its_measurements_tell():
     rng = np.random.default_rng(0)
     y = rng.integers(0, 3, 600)
@@ -68,7 +86,7 @@ def test_a_net_learns_what_its_measurements_tell():
         "spectrum": rng.normal(size=(600, 2, BINS)).astype(np.float32),
         "features": (rng.normal(size=(600, FEATURES)) + 4 * np.eye(FEATURES)[y]).astype(np.float32),
     }
-    net = SpectrumNet((2, BINS), FEATURES, seed=0)
+    net = SpectrumNet(SHAPES, seed=0)
     train_network(net, inputs, y, (inputs, y), seed=0, epochs=4, batch=64)
     assert (network_scores(net, inputs).argmax(axis=1) == y).mean() > 0.9
 
@@ -155,7 +173,7 @@ def test_training_stops_where_the_validation_loss_no_longer_falls():
             with torch.no_grad():
                 net.head[-1].weight.mul_(-10.0)
 
-    net = SpectrumNet((2, BINS), FEATURES, seed=0)
+    net = SpectrumNet(SHAPES, seed=0)
     inputs, y = _spectra(300, 1)
     snapshots = []
     options = {"seed": 0, "epochs": 9, "batch": 64, "on_epoch": worsen, "on_snapshot": snapshots.append}
@@ -165,7 +183,7 @@ def test_training_stops_where_the_validation_loss_no_longer_falls():
     losses = [epoch["validation_loss"] for epoch in result.epochs]
     assert min(losses) == losses[result.best_epoch - 1]
     # interrupted just then, it has nothing left to do
-    again = SpectrumNet((2, BINS), FEATURES, seed=0)
+    again = SpectrumNet(SHAPES, seed=0)
     stopped = train_network(again, inputs, y, _spectra(100, 2), patience=3, snapshot=snapshots[-1], **options)
     assert stopped.stopped_early
     assert _without_seconds(stopped) == _without_seconds(result)
@@ -205,7 +223,7 @@ def test_the_best_state_is_kept_when_the_last_epochs_are_ruined():
                 for parameter in net.parameters():
                     parameter.add_(50 * torch.randn(parameter.shape, generator=torch.Generator().manual_seed(0)))
 
-    net = SpectrumNet((2, BINS), FEATURES, seed=0)
+    net = SpectrumNet(SHAPES, seed=0)
     inputs, y = _spectra(300, 1)
     validation = _spectra(100, 2)
     result = train_network(net, inputs, y, validation, seed=0, epochs=4, batch=64, on_epoch=ruin)
@@ -222,14 +240,14 @@ def test_the_best_state_is_kept_when_the_last_epochs_are_ruined():
 
 def test_training_measures_its_records_and_not_those_of_the_validation():
     net, _ = _trained(epochs=1)
-    fresh = SpectrumNet((2, BINS), FEATURES, seed=0)
+    fresh = SpectrumNet(SHAPES, seed=0)
     fresh.measure(_spectra(300, 1)[0])
     for name, values in fresh.standardise.state_dict().items():
         assert torch.equal(net.standardise.state_dict()[name], values), name
 
 
 def test_a_training_that_never_gives_a_number_says_so():
-    net = SpectrumNet((2, BINS), FEATURES, seed=0)
+    net = SpectrumNet(SHAPES, seed=0)
     inputs, y = _spectra(64, 1)
     with pytest.raises(FloatingPointError, match="learning_rate inf is too high"):
         train_network(net, inputs, y, _spectra(64, 2), seed=0, epochs=1, batch=32, learning_rate=float("inf"))
@@ -241,7 +259,7 @@ def test_half_precision_in_memory_gives_what_its_values_give_in_full():
     full = {name: values.astype(np.float32) for name, values in half.items()}
     states = []
     for given_inputs in (half, full):
-        net = SpectrumNet((2, BINS), FEATURES, seed=0)
+        net = SpectrumNet(SHAPES, seed=0)
         train_network(net, given_inputs, y, (given_inputs, y), seed=0, epochs=1, batch=32)
         states.append(network_scores(net, given_inputs))
     assert np.array_equal(*states)
@@ -254,7 +272,7 @@ def test_half_precision_in_memory_gives_what_its_values_give_in_full():
 )
 def test_scaled_inputs_measured_anew_give_the_same_scores(scale, shift):
     inputs, _ = _spectra(64, 1)
-    net = SpectrumNet((2, BINS), FEATURES, seed=0)
+    net = SpectrumNet(SHAPES, seed=0)
     net.measure(inputs)
     scores = network_scores(net, inputs)
     column = np.array([scale]).T
@@ -328,7 +346,7 @@ def test_the_mirror_turns_some_records_whole_and_leaves_the_others():
 def _refuse_network(change):
     inputs, y = _spectra(60, 1)
     arguments = {"inputs": inputs, "y": y, "validation": (dict(inputs), y), "seed": 0, "epochs": 1} | change(inputs, y)
-    train_network(SpectrumNet((2, BINS), FEATURES, seed=0), **arguments)
+    train_network(SpectrumNet(SHAPES, seed=0), **arguments)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,171 @@
+"""Cadence: at what rates the power outside the notches comes and goes within the dwell.
+
+A blade's flash lasts a hundredth of its period and stands out of the noise there by a hundred times what its lines do
+on the mean, so the power over time shows rotors that the levels of the spectrum do not.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from .axis import UNSEEN_DB
+from .notch import Mask, weights
+from .schema import CADENCE_BINS
+from .spectrum import Spectrum, per_floor, squared, sums, taper, to_db
+
+#: Range of the shared axis of rates [Hz]: from slow wings to the tenth flash of the fastest propeller.
+CADENCE_RANGE_HZ = (1.5, 6000.0)
+
+#: The window is undone where it is at least this share of its largest value: beyond, rounding would be blown up.
+LEAST_TAPER = 0.03
+
+#: Power over its mean that counts at most: a spoilt pulse is one sample, a flash is many.
+CLIP = 16.0
+
+#: The mean power counts as at least this share of the noise floor: less is what rounding leaves of a lone line.
+LEAST_MEAN = 0.1
+
+#: Equivalent noise bandwidth of the Hann taper [lines].
+_HANN_LINES = 1.5
+
+
+@dataclass(frozen=True)
+class CadencePlan:
+    """What the cadence of one radar's dwell needs besides the samples.
+
+    Parameters
+    ----------
+    span : slice
+        Samples that are looked at: those that the window leaves enough of.
+    per_taper : ndarray of float32, shape (samples,)
+        One over the square of the window there.
+    hann : ndarray of float32, shape (samples,)
+        Taper of the power over time, of unit noise gain.
+    spans : tuple of ndarray of int, shape (seen,) each
+        First line of each bin of the axis, and how many it holds, at least 1: where the axis is finer than the lines
+        the nearest one is repeated.
+    seen : slice
+        Bins of the axis from the first line to half the PRF.
+    bins : int
+        Length of the axis.
+    """
+
+    span: slice
+    per_taper: NDArray[np.float32]
+    hann: NDArray[np.float32]
+    spans: tuple[NDArray[np.intp], NDArray[np.intp]]
+    seen: slice
+    bins: int
+
+    @property
+    def expected_peak(self) -> NDArray[np.float32]:
+        """Mean of the largest of so many exponentials, a bin."""
+        independent = np.maximum(self.spans[1] / _HANN_LINES, 1)
+        return np.maximum(np.log(independent) + np.euler_gamma, 1).astype(np.float32)
+
+
+def cadence_edges_hz(bins: int = CADENCE_BINS) -> NDArray[np.float64]:
+    """Edges of the shared axis of rates [Hz], rising by equal ratios, shape (bins + 1,)."""
+    return np.geomspace(*CADENCE_RANGE_HZ, bins + 1)
+
+
+@lru_cache(maxsize=64)
+def cadence_plan(pulses: int, prf_hz: float, bins: int = CADENCE_BINS) -> CadencePlan:
+    """Plan for a dwell.
+
+    Parameters
+    ----------
+    pulses : int
+        Pulses of the dwell, at least 8.
+    prf_hz : float
+        Pulse repetition frequency [Hz].
+    bins : int
+        Length of the shared axis.
+
+    Returns
+    -------
+    CadencePlan
+    """
+    window = taper(pulses)
+    inside = np.flatnonzero(window >= LEAST_TAPER * window.max())
+    count = fft.prev_fast_len(len(inside), real=True)
+    first = int(inside[0]) + (len(inside) - count) // 2
+    span = slice(first, first + count)
+    hann = np.hanning(count + 2)[1:-1]
+    hann /= np.sqrt(np.sum(hann**2))
+
+    line_hz, last = prf_hz / count, count // 2
+    edges = cadence_edges_hz(bins) / line_hz  # in lines
+    middle = np.sqrt(edges[:-1] * edges[1:])
+    within = np.flatnonzero((middle >= 1) & (middle <= last))
+    seen = slice(int(within[0]), int(within[-1]) + 1) if len(within) else slice(0, 0)
+    low, high = (np.ceil(part).astype(np.intp) for part in (edges[:-1][seen], edges[1:][seen]))
+    nearest = np.rint(middle[seen]).astype(np.intp)
+    starts = np.minimum(np.where(high > low, low, nearest), last)
+    counts = np.maximum(np.minimum(high, last + 1) - starts, 1) if len(starts) else starts
+    return CadencePlan(
+        span, (1 / window[span] ** 2).astype(np.float32), hann.astype(np.float32), (starts, counts), seen, bins
+    )
+
+
+def power_over_time(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
+    """Power outside the notches over time, over its mean; the ends of the dwell, which the window dims, left out.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Spectra, shape (..., bins).
+    mask : ndarray of bool or float32, shape (..., bins)
+        From `notch_mask`, or its `weights`: body and rest would be all there is to see.
+
+    Returns
+    -------
+    ndarray of float32, shape (..., samples)
+        Mean 1, less where hardly anything is left. Noise gives the exponential law.
+    """
+    plan = cadence_plan(spectrum.pulses, spectrum.prf_hz)
+    # a centred spectrum gives samples of alternating sign: their power is the same
+    samples = fft.ifft(spectrum.transform * weights(mask), axis=-1, overwrite_x=True)[..., plan.span]
+    power = squared(samples)
+    power *= plan.per_taper
+    mean = sums(power) * np.float32(1 / power.shape[-1])
+    power *= per_floor(np.maximum(mean, spectrum.transform_floor * np.float32(LEAST_MEAN)))[..., None]
+    return power
+
+
+def cadence_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
+    """Spectrum of the power over time on a shared axis of rates: steady noise gives 0 dB at every rate.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Spectra, shape (..., bins).
+    mask : ndarray of bool or float32, shape (..., bins)
+        From `notch_mask`, or its `weights`.
+
+    Returns
+    -------
+    ndarray of float32, shape (..., 2, CADENCE_BINS)
+        Mean level of the lines in each bin of the axis, and the largest over that of noise in as many [dB];
+        `UNSEEN_DB` at rates that the dwell does not tell or the PRF does not hold.
+    """
+    plan = cadence_plan(spectrum.pulses, spectrum.prf_hz)
+    power = power_over_time(spectrum, mask)
+    np.minimum(power, np.float32(CLIP), out=power)
+    power -= (sums(power) * np.float32(1 / power.shape[-1]))[..., None]
+    power *= plan.hann
+    lines = squared(fft.rfft(power, axis=-1, overwrite_x=True))
+    out = np.full((*lines.shape[:-1], 2, plan.bins), UNSEEN_DB, np.float32)
+    starts, counts = plan.spans
+    if len(starts):
+        reach = lines[..., : starts[-1] + counts[-1]]
+        mean, peak = out[..., 0, plan.seen], out[..., 1, plan.seen]
+        np.add.reduceat(reach, starts, axis=-1, out=mean)
+        mean /= counts.astype(np.float32)
+        np.maximum.reduceat(reach, starts, axis=-1, out=peak)
+        peak /= plan.expected_peak
+        out[..., plan.seen] = to_db(out[..., plan.seen])
+    return out
