@@ -24,6 +24,7 @@ CHAIN = (
     "impulses",
     "flicker",
     "mains",
+    "bursts",
     "colour",
     "high_pass",
     "image",
@@ -104,7 +105,7 @@ class ReceiverBounds:
         reaches = self._missed * float(np.prod([self.gain(name) for name in before], initial=1.0))
         if effect in ("fading", "phase_noise"):
             spread = self._multiplier(effect)
-        elif effect in ("dc", "impulses", "flicker", "mains"):
+        elif effect in ("dc", "impulses", "flicker", "mains", "bursts"):
             spread = 0.0
         else:
             spread = 1 + self.gain(effect)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Uniform numbers a record owns; the widest target (a wind turbine) takes 372 of them.
-WIDTH = 448
+#: Uniform numbers a record owns; a wind turbine behind its receiver, the widest, takes 452 of them.
+WIDTH = 464
 
 #: What a steady body's acceleration is of a manoeuvring one's. Half of all bodies are steady, whatever they are: if one
 #: class alone accelerated, a line that bends would be all there is to learn of it.
@@ -126,6 +126,9 @@ LAWS: dict[str, Law] = {
     "impulse_db": Law("uniform", 10.0, 45.0, "dB", "a spoilt pulse over noise"),
     "high_pass_hz": Law("log", 3.0, 150.0, "Hz", "capacitor-coupled audio front ends; clutter cancellers"),
     "mains_db": Law("uniform", -25.0, 15.0, "dB", "mains lines together over noise"),
+    "burst_hz": Law("log", 10.0, 1000.0, "Hz", "ignition, switched supplies, other radars; or the mains' rate"),
+    "burst_share": Law("log", 0.003, 0.3, "1", "share of its period that a burst lasts"),
+    "burst_db": Law("uniform", -25.0, 5.0, "dB", "mean power of the bursts over noise; seen in a measured CW module"),
     "tilt_db": Law("uniform", -25.0, 0.0, "dB", "receiver band edges under its middle"),
     "hump_db": Law("uniform", 0.0, 5.0, "dB", "half the swing of a smooth hump in the receiver's band"),
     "hump_turns": Law("log", 0.2, 8.0, "1", "humps across half the band, from one slope to several swells"),

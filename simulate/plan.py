@@ -42,6 +42,7 @@ WORDS = {
     "impulses": ("spoilt pulses", "none"),
     "flicker": ("1/f noise", "white noise alone"),
     "mains": ("mains lines", "none"),
+    "bursts": ("bursts of noise", "none"),
     "colour": ("a band that is not flat", "a flat band"),
     "high_pass": ("a stop band about velocity zero", "none"),
     "image": ("I/Q imbalance", "balanced channels"),

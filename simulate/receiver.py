@@ -24,6 +24,7 @@ FAULT_CHANCE = {
     "flicker": 0.25,
     "phase_noise": 0.25,
     "mains": 0.25,
+    "bursts": 0.2,
     "colour": 0.5,
     "image": 0.3,
     "real_only": 0.03,
@@ -72,6 +73,12 @@ class Receiver:
         self.full_scale_db = draws.value("full_scale_db")
         self.bits = np.rint(draws.value("adc_bits"))
         self.gain_db = draws.value("gain_db")
+        # a rectifier's bursts come once or twice a period of the mains, others at any rate
+        periods = np.where(draws.chance(0.7), 2.0, 1.0)
+        self.burst_hz = np.where(draws.chance(0.5), periods * self.mains_hz, draws.value("burst_hz"))
+        self.burst_share = draws.value("burst_share")
+        self.burst_db = draws.value("burst_db")
+        self.burst_phase = draws.value("phase_rad")
 
     def receive(
         self,
@@ -126,6 +133,9 @@ class Receiver:
         rows = np.flatnonzero(self.on["mains"])
         if len(rows):
             iq[rows] += self._mains(radar, rows)
+        rows = np.flatnonzero(self.on["bursts"])
+        if len(rows):
+            iq[rows] += self._bursts(radar, rows, normals_of("bursts")(rows))
         self._filter(iq, radar)
         rows = np.flatnonzero(self.on["image"])
         iq[rows] += (10 ** (self.image_db[rows] / 20)).astype(np.float32)[:, None] * iq[rows].conj()
@@ -155,6 +165,14 @@ class Receiver:
         amplitude *= np.sqrt(2 * 10 ** (self.mains_db[rows, None] / 10) / (amplitude**2).sum(axis=1, keepdims=True))
         cosine = self.mains_phase[rows] + TWO_PI / 4
         return PulseGrid(radar).sines(Sine(amplitude, order * self.mains_hz[rows, None], cosine))
+
+    def _bursts(self, radar: Radar, rows: NDArray[np.intp], normals: Normals) -> NDArray[np.complex64]:
+        """Noise that comes and goes at a steady rate: in time like a rotor's flashes, in Doppler like nothing."""
+        white = normals(2 * radar.pulses).view(np.complex64)
+        turns = self.burst_hz[rows, None] * radar.times_s + self.burst_phase[rows, None] / TWO_PI
+        share = self.burst_share[rows, None]
+        amplitude = np.sqrt(10 ** (self.burst_db[rows, None] / 10) / (2 * share))
+        return white * np.where(turns % 1 < share, amplitude, 0.0).astype(np.float32)
 
     def _filter(self, iq: NDArray[np.complex64], radar: Radar) -> None:
         """The band's shape: not flat, falling towards its edges with smooth humps anywhere, and blind at rest.

@@ -3,6 +3,7 @@
 import numpy as np
 
 from .. import cadence as definition
+from ..axis import UNSEEN_DB
 from ..spectrum import Spectrum
 from .operators import Value
 from .spectrum import dft, pooled, squared
@@ -21,7 +22,7 @@ def cadence_db(radar: Spectrum, transform: tuple[Value, Value], floor: Value, ke
     count = plan.span.stop - plan.span.start
     lines = squared(dft((power - power.mean()) * plan.hann, count, count // 2 + 1, real=True))
     if not len(plan.spans[0]):  # the dwell tells no rate of the axis
-        nothing = np.full((1, 2, plan.bins), definition.UNSEEN_DB, np.float32)
+        nothing = np.full((1, 2, plan.bins), UNSEEN_DB, np.float32)
         return lines.slice(0, 1).reshape(-1, 1, 1) * 0.0 + nothing
     mean_db, peak_db = (row.reshape(-1, 1, plan.bins) for row in pooled(lines, plan))
     return graph.concat(mean_db, peak_db, axis=1)
