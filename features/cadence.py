@@ -128,7 +128,7 @@ def power_over_time(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     """
     plan = cadence_plan(spectrum.pulses, spectrum.prf_hz)
     # a centred spectrum gives samples of alternating sign: their power is the same
-    samples = fft.ifft(spectrum.transform * weights(mask), axis=-1, overwrite_x=True)[..., plan.span]
+    samples = fft.ifft(spectrum.transform * weights(mask), overwrite_x=True)[..., plan.span]
     power = squared(samples)
     power *= plan.per_taper
     mean = sums(power) * np.float32(1 / power.shape[-1])
@@ -157,7 +157,7 @@ def cadence_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     np.minimum(power, np.float32(CLIP), out=power)
     power -= (sums(power) * np.float32(1 / power.shape[-1]))[..., None]
     power *= plan.hann
-    lines = squared(fft.rfft(power, axis=-1, overwrite_x=True))
+    lines = squared(fft.rfft(power, overwrite_x=True))
     out = np.full((*lines.shape[:-1], 2, plan.bins), UNSEEN_DB, np.float32)
     starts, counts = plan.spans
     if len(starts):

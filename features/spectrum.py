@@ -27,10 +27,8 @@ LEAST_FLOOR = np.float32(1e-9)
 _HALF, _ONE, _TEN, _NO_LIMIT = (np.array(value, np.float32) for value in (0.5, 1, 10, np.inf))
 
 _LEAST = np.array(1e-36, np.float32)  # under any power that is not 0: divides in its stead
-_SAFE_ENERGY = (
-    np.array(1e-14, np.float32),
-    np.array(1e30, np.float32),
-)  # of a record: neither its lines, at most that strong, nor its floor leave float32
+# Energies of a record: neither its lines, at most that strong, nor its floor leave float32.
+_SAFE_ENERGY = np.array(1e-14, np.float32), np.array(1e30, np.float32)
 _FLOOR_QUANTILE = 0.25
 _FLOOR_QUANTILE_NORMAL = -0.6744897501960817  # standard normal quantile of 0.25
 _FLOOR_BLOCKS = 64  # a side of the spectrum
@@ -210,7 +208,7 @@ def centred_transform(iq: NDArray[np.complex64], bins: int | None = None) -> NDA
     even = bins % 2 == 0
     parts = iq.astype(np.complex64, copy=False).view(np.float32)
     tapered = (parts * _window(pulses, even)).view(np.complex64)
-    transform = fft.fft(tapered, n=bins, axis=-1, overwrite_x=True)
+    transform = fft.fft(tapered, bins if bins != pulses else None, overwrite_x=True)
     return transform if even else fft.fftshift(transform, axes=-1)
 
 
@@ -227,7 +225,7 @@ LEAST_PART = 2.0**-140
 def largest_part(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
     """Largest real or imaginary part of each record, by magnitude, shape (...)."""
     parts = np.ascontiguousarray(iq).view(np.float32)
-    return np.maximum(np.maximum.reduce(parts, axis=-1), -np.minimum.reduce(parts, axis=-1))
+    return np.maximum.reduce(np.abs(parts), axis=-1)
 
 
 def unit_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
