@@ -228,6 +228,12 @@ def test_the_receivers_parts_do_what_their_values_say():
     on_lines = np.zeros(len(lines), bool)
     on_lines[12 : 12 * 12 + 1 : 12] = on_lines[-12 : -12 * 12 - 1 : -12] = True
     assert lines[~on_lines].sum() < 1e-9
+    values = {"burst_hz": 40.0, "burst_share": 0.05, "burst_db": 6.0}
+    bursts = np.array([empty(effects=["bursts"], values=values).render(seed).iq for seed in range(20)])
+    assert np.mean(abs(bursts) ** 2) == pytest.approx(10**0.6, rel=0.1)
+    assert np.mean(bursts != 0) == pytest.approx(0.05, abs=0.002)
+    for gate in bursts != 0:  # 5000 pulses hold 8 periods of 625
+        np.testing.assert_array_equal(gate[625:], gate[:-625])
     noise = {"noise": True, "effects": ["converter"], "values": {"adc_bits": 6.0, "full_scale_db": 0.0}}
     coarse = empty(**noise).render(1).iq
     assert len(np.unique(coarse.real)) <= 2**6 + 1
