@@ -55,7 +55,7 @@ def export_raw_iq(
     pulses
         Pulses of a record.
     model
-        As for `Classifier.load`; one that reads "spectrum" and "features" only.
+        As for `Classifier.load`; one that reads `IN_GRAPH` only.
 
     Returns
     -------

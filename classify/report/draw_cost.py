@@ -99,7 +99,9 @@ def stages(report: Mapping[str, Any]) -> list[Panel]:
 def stage_name(row: Mapping[str, Any]) -> str:
     """Name a step of the chain for people."""
     inputs = {
+        "levels": "level input",
         "spectrum": "spectrum input",
+        "cadence": "cadence input",
         "image": "STFT image",
         "features": "features",
         "joint_features": "joint features",
