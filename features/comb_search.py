@@ -9,6 +9,7 @@ from scipy import fft
 
 from .chopping import CHOPPING_RANGE_HZ
 from .flashes import flash_evidence
+from .octaves import coarsest, over_neighbours
 from .periodogram import BLOCK_BINS, LINE_DB, NEIGHBOUR_SHARE, Periodogram
 
 #: Lines nearer than this are not told apart [bins].
@@ -292,6 +293,7 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     if low * 1.5 >= high:
         return None
     evidence = line_evidence(data.power, int(BLOCK_BINS * len(data.power) / data.pulses))
+    evidence = over_neighbours(evidence, int(BLOCK_BINS * len(data.power) / data.pulses))
     bins = np.arange(len(data.power)) / len(data.power)
     evidence[:, ~data.usable(bins)] = 0.0
     tried = [(coarse_spacings(data, evidence, centre), centre) for centre in data.centres]
@@ -324,7 +326,7 @@ def best_candidate(data: Periodogram) -> Candidate | None:
         place = (float(spacings[index]), float(centres[index]), int(lows[index]), int(highs[index]))
         flash = flash_evidence(data, *place)
         found.append(Candidate(*place, float(scores[index]) + min(flash, share * float(scores[index]))))
-    return _centred(data, evidence, max(found, key=lambda c: c.score))
+    return _centred(data, evidence, found[coarsest([c.spacing for c in found], [c.score for c in found])])
 
 
 def _centred(data: Periodogram, evidence: NDArray[np.float32], found: Candidate) -> Candidate:
