@@ -1,4 +1,4 @@
-"""Which of a comb's multiples and fractions is the rotor's: several rotors' lines fill all places at the high orders."""
+"""Which of a comb's multiples and fractions is the rotor's: several rotors' lines fill all places further out."""
 
 from collections.abc import Sequence
 
