@@ -19,6 +19,9 @@ LINE_DB = 17.0
 #: Noise alone seldom has so strong a bin [dB] in the notch about velocity zero; a background's skirt has.
 SKIRT_DB = 9.0
 
+#: It shows right beside a hovering body's lobe, at so many bins; further out lie the first lines of rotors.
+SKIRT_BINS = LOBE_BINS + 2.5
+
 #: So many bins beside what was taken out the noise is thinner: it would lower the level of its block.
 THINNED_BINS = 4
 
@@ -269,7 +272,8 @@ def _prepare(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram:
     rest_db = float(spectrum.level_db[middle - 1 : middle + 2].max())
     rest_half = half_bins(NOTCH_MPS)
     offset = np.abs(spectrum.frequency_hz) * pulses / spectrum.prf_hz
-    skirt = (offset <= rest_half) & (np.abs(np.arange(spectrum.bins) - body.index) > LOBE_BINS + 1)
+    # it falls with the offset: what stands further out alone is a rotor's line
+    skirt = (offset <= min(rest_half, SKIRT_BINS)) & (np.abs(np.arange(spectrum.bins) - body.index) > LOBE_BINS + 1)
     # the only strong line, at rest, without a skirt: a body that hovers, not a background
     hovers = (
         abs(turns(body)) * pulses <= rest_half
