@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .chopping import CHOPPING_RANGE_HZ
+from .comb_sums import MOST_SNRS, running_sums
 from .flashes import flash_evidence
 from .periodogram import BLOCK_BINS, LINE_DB, NEIGHBOUR_SHARE, Periodogram
 
@@ -227,6 +228,28 @@ def score(
     return best, -reach[0], reach[1]
 
 
+def heights(
+    evidence: NDArray[np.float32], spacings: NDArray[np.float64], centres: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """The scores of many combs, as `score` gives them, without their reaches, shape (candidates,) [nats]."""
+    size = evidence.shape[-1]
+    rising = np.argsort(spacings)
+    # half a turn more on each side: a line beyond half the PRF is the alias on the other
+    wide = np.concatenate([evidence[:, size // 2 :], evidence, evidence[:, : size // 2 + 1]], axis=1)
+    start = (centres[rising] % 1.0) * size + (size - size // 2)
+    step = spacings[rising] * size
+    sides = np.zeros((2, len(step), MOST_SNRS), np.float32)
+    both = np.zeros((len(step), MOST_SNRS), np.float32)
+    for sums in running_sums(wide, np.stack([start, start]), np.stack([-step, step]), size / 2):
+        some = sums.shape[2]
+        np.maximum(sides[:, :some], sums.max(axis=0), out=sides[:, :some])
+        np.maximum(both[:some], (sums[:, 0] + sums[:, 1]).max(axis=0), out=both[:some])
+    best = np.maximum(both, sides.sum(axis=0) - np.float32(UNEVEN_COST)).max(axis=1)
+    out = np.empty_like(best)
+    out[rising] = best
+    return out
+
+
 def _score_alike(
     evidence: NDArray[np.float32],
     spacings: NDArray[np.float64],
@@ -304,7 +327,7 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     factors = 1 + np.arange(-COARSE_STEPS, COARSE_STEPS + 1) / data.pulses
     spacings = np.concatenate([np.outer(s, factors).ravel() for s, _ in tried])
     centres = np.concatenate([np.full(len(s) * len(factors), c) for s, c in tried])
-    scores, _, _ = score(evidence, spacings, centres)
+    scores = heights(evidence, spacings, centres)
     if not len(scores):
         return None
     chosen = _families(spacings, scores, centres, data.pulses)
