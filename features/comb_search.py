@@ -25,6 +25,9 @@ MAX_PERIODS = 12
 PER_BAND = 4
 OCTAVES = (1.0, 0.5, 2.0, 1 / 3, 3.0)
 
+#: Of so many highest sums these are taken.
+CLOSER_LOOKS = 400
+
 #: Line powers over noise that a comb may have, and the share of its lines that may be missing.
 LINE_SNRS = (1.2, 6.0, 40.0)
 MISSING_SHARE = 0.15
@@ -139,19 +142,25 @@ def coarse_spacings(data: Periodogram, evidence: NDArray[np.float32], centre: fl
     size = len(data.power)
     offset = np.arange(size) / size - centre
     distance = np.abs(offset - np.rint(offset))
-    ripple = evidence[0]
     turn = np.exp(-2j * np.pi * centre * np.arange(data.pulses))
     found: list[float] = []
-    for share in BANDS:
-        inside = distance <= share / 2
-        part = np.where(inside, ripple - ripple[inside].mean(), 0.0)
-        correlation = fft.ifft(part)[: data.pulses] * turn
-        sums = np.add.reduceat(correlation.real[grid.lags], grid.starts) * grid.weight
+    for correlation in _correlations(evidence[0], distance, BANDS, data.pulses):
+        sums = np.add.reduceat((correlation * turn).real[grid.lags], grid.starts) * grid.weight
         found += _apart(grid.periods, sums, 2 * MAX_PERIODS / data.pulses)
     spacings = (1 / np.array(found))[:, None] * np.array(OCTAVES)
     spacings = np.unique(spacings.ravel())
     spacings = spacings[(spacings >= low) & (spacings <= high)]
     return spacings[np.diff(np.log(spacings), prepend=-np.inf) > 1 / data.pulses]
+
+
+def _correlations(
+    ripple: NDArray[np.float32], distance: NDArray[np.float64], shares: tuple[float, ...], lags: int
+) -> NDArray[np.complex64]:
+    """Autocorrelations of a spectrum within shares of the span about a place, shape (shares, lags)."""
+    inside = distance <= np.array(shares)[:, None] / 2
+    part = np.where(inside, ripple, np.float32(0))
+    part -= inside * (part.sum(axis=1, keepdims=True) / inside.sum(axis=1, keepdims=True, dtype=np.float32))
+    return np.asarray(fft.rfft(part)[:, :lags].conj() / np.float32(len(ripple)), np.complex64)
 
 
 def free_spacings(data: Periodogram, evidence: NDArray[np.float32]) -> list[tuple[float, float]]:
@@ -167,10 +176,7 @@ def free_spacings(data: Periodogram, evidence: NDArray[np.float32]) -> list[tupl
     number = np.arange(1, MAX_PERIODS + 1)
     steering = np.exp(-2j * np.pi * np.outer(np.arange(48) / 48, number))
     found = []
-    for share in BANDS[1:]:
-        inside = distance <= share / 2
-        part = np.where(inside, evidence[0] - evidence[0][inside].mean(), 0.0)
-        correlation = fft.ifft(part)[: data.pulses]
+    for correlation in _correlations(evidence[0], distance, BANDS[1:], data.pulses):
         sums = np.add.reduceat(np.abs(correlation[grid.lags]), grid.starts) * grid.weight
         for period in _apart(grid.periods, sums, 2 * MAX_PERIODS / data.pulses):
             used = number[: max(1, int(0.9 * data.pulses / period))]
@@ -183,7 +189,8 @@ def free_spacings(data: Periodogram, evidence: NDArray[np.float32]) -> list[tupl
 def _apart(periods: NDArray[np.float64], sums: NDArray[np.float64], least: float) -> list[float]:
     """Periods of the highest sums, each further from the others than `least`, relative."""
     taken: list[float] = []
-    for index in np.argsort(sums)[:-400:-1]:
+    highest = np.argpartition(sums, max(len(sums) - CLOSER_LOOKS, 0))[-CLOSER_LOOKS:]
+    for index in highest[np.argsort(-sums[highest])]:
         period = periods[index]
         if all(abs(period / other - 1) > least for other in taken):
             taken.append(float(period))
@@ -339,12 +346,16 @@ def best_candidate(data: Periodogram) -> Candidate | None:
         [np.repeat(centres[i] + np.array(s) / data.pulses, len(fine)) for i, s in zip(chosen, shifts, strict=True)]
     )
     spacings = np.concatenate([np.tile(spacings[i] * fine, len(s)) for i, s in zip(chosen, shifts, strict=True)])
-    scores, lows, highs = score(evidence, spacings, centres)
+    scores = heights(evidence, spacings, centres)
+    finest = np.array([np.where(family == number, scores, -np.inf).argmax() for number in range(len(chosen))])
+    scores, lows, highs = score(evidence, spacings[finest], centres[finest])
     share = REST_FLASH_SHARE if data.rest_half > 0 else FLASH_SHARE
-    found = []
-    for number in range(len(chosen)):
-        index = int(np.where(family == number, scores, -np.inf).argmax())
-        place = (float(spacings[index]), float(centres[index]), int(lows[index]), int(highs[index]))
+    found: list[Candidate] = []
+    for index in np.argsort(-scores, kind="stable"):
+        most = max((other.score for other in found), default=-np.inf)
+        if (1 + share) * scores[index] < most:  # flashes can not make it the best
+            break
+        place = (float(spacings[finest[index]]), float(centres[finest[index]]), int(lows[index]), int(highs[index]))
         flash = flash_evidence(data, *place)
         found.append(Candidate(*place, float(scores[index]) + min(flash, share * float(scores[index]))))
     return _centred(data, evidence, max(found, key=lambda c: c.score))

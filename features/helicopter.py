@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .comb import Comb
 from .comb_fit import MARGIN_ORDERS, CombFit, fit_combs
-from .comb_search import FINE_STEPS, Candidate, line_evidence, score, spacing_limits
+from .comb_search import FINE_STEPS, Candidate, heights, line_evidence, score, spacing_limits
 from .comb_sums import MOST_SNRS, running_sums
 from .lines import sum_of_lines
 from .periodogram import BLOCK_BINS, LEAST_LEVEL, Periodogram, local_level
@@ -217,12 +217,11 @@ def _loudest(
     )
     if not len(spacings):
         return None
-    heights = _heights(evidence, spacings, centre)
-    loudest = spacings[np.argsort(heights)[: -CLOSER - 1 : -1]]
+    loudest = spacings[np.argsort(_even_heights(evidence, spacings, centre))[: -CLOSER - 1 : -1]]
     return _closest(rest, evidence, loudest, centre)
 
 
-def _heights(evidence: NDArray[np.float32], spacings: NDArray[np.float64], centre: float) -> NDArray[np.float32]:
+def _even_heights(evidence: NDArray[np.float32], spacings: NDArray[np.float64], centre: float) -> NDArray[np.float32]:
     """Best evidence of each spacing, rising, with both sides equally far; at least 0."""
     size = evidence.shape[-1]
     # both sides at once: the spectrum folded about the centre
@@ -248,6 +247,6 @@ def _closest(
     """The best of spacings and of those near them."""
     factors = 1 + 0.25 / rest.pulses * np.arange(-2 * FINE_STEPS, 2 * FINE_STEPS + 1)
     tried = np.outer(spacings, factors).ravel()
-    heights, lows, highs = score(evidence, tried, np.full(len(tried), centre))
-    index = int(heights.argmax())
-    return Candidate(float(tried[index]), centre, int(lows[index]), int(highs[index]), float(heights[index]))
+    best = tried[[heights(evidence, tried, np.full(len(tried), centre)).argmax()]]
+    (height,), (low,), (high,) = score(evidence, best, np.array([centre]))
+    return Candidate(float(best[0]), centre, int(low), int(high), float(height))

@@ -132,11 +132,9 @@ class Periodogram:
         """Local level of samples that lines were taken from, as a function of the frequency [cycles a sample]."""
         size = len(self.power)
         power = squared(_spectrum(rest, size, tapered=False))
-        level = local_level(
-            power, _kept(size, self.blocked, THINNED_BINS / self.pulses), 1.0, int(BLOCK_BINS * size / self.pulses)
-        )
-        level = np.maximum(level, LEAST_LEVEL)
-        return lambda frequency: level[np.rint(frequency * size).astype(np.intp) % size]
+        keep = _kept(size, self.blocked, THINNED_BINS / self.pulses)
+        level = _level_at_bins(power, keep, 1.0, int(BLOCK_BINS * size / self.pulses))
+        return lambda frequency: np.maximum(level(np.rint(frequency * size) % size), LEAST_LEVEL)
 
     def left(self, samples: NDArray[np.complex128]) -> "Periodogram":
         """What is left of the same record, at the same local level."""
@@ -197,22 +195,30 @@ def local_level(power: NDArray[np.float64], keep: NDArray[np.bool_], floor: floa
     block : int
         Bins of a block.
     """
+    return _level_at_bins(power, keep, floor, block)(np.arange(len(power)))
+
+
+def _level_at_bins(
+    power: NDArray[np.float64], keep: NDArray[np.bool_], floor: float, block: int
+) -> Callable[[NDArray], NDArray[np.float64]]:
+    """`local_level` as a function of the bin."""
     size = len(power)
     count = max(4, size // block)
     length = size // count
     # the few bins that whole blocks leave over are skipped, evenly
     starts = (np.arange(count) * size) // count
     inside = starts[:, None] + np.arange(length)
-    held = np.where(keep[inside], power[inside], np.inf)
-    number = keep[inside].sum(axis=1)
+    kept = keep[inside]
+    held = np.where(kept, power[inside], np.inf)
+    number = kept.sum(axis=1)
     held.sort(axis=1)
     levels = held[np.arange(count), np.minimum(number // 4, length - 1)] / LEVEL_QUANTILE
     known = np.flatnonzero(number >= length / 3)
     if not len(known):
-        return np.full(size, floor)
-    levels = np.maximum(levels, 0.1 * floor)
-    middles = starts + length / 2
-    return np.exp(np.interp(np.arange(size), middles[known], np.log(levels[known]), period=size))
+        return lambda bins: np.full(np.shape(bins), floor)
+    logs = np.log(np.maximum(levels[known], 0.1 * floor))
+    middles = (starts + length / 2)[known]
+    return lambda bins: np.exp(np.interp(bins, middles, logs, period=size))
 
 
 def without_clicks(samples: NDArray[np.complex128]) -> NDArray[np.complex128]:
