@@ -10,7 +10,7 @@ from scipy import fft
 from .chopping import CHOPPING_RANGE_HZ
 from .comb_sums import MOST_SNRS, running_sums
 from .flashes import flash_evidence
-from .periodogram import BLOCK_BINS, LINE_DB, NEIGHBOUR_SHARE, Periodogram
+from .periodogram import LINE_DB, Periodogram
 
 #: Lines nearer than this are not told apart [bins].
 MIN_SPACING_BINS = 3.0
@@ -27,13 +27,6 @@ OCTAVES = (1.0, 0.5, 2.0, 1 / 3, 3.0)
 
 #: Of so many highest sums these are taken.
 CLOSER_LOOKS = 400
-
-#: Line powers over noise that a comb may have, and the share of its lines that may be missing.
-LINE_SNRS = (1.2, 6.0, 40.0)
-MISSING_SHARE = 0.15
-
-#: No single line speaks for more than this [nats]: a lone line is no comb.
-LINE_CAP = 5.0
 
 #: Flashes speak for a comb by at most so many times what the powers of its lines do: they must not make one of what
 #: hardly is one.
@@ -108,31 +101,6 @@ def spacing_limits(pulses: int, prf_hz: float) -> tuple[float, float]:
     """Smallest and largest spacing sought [cycles a sample]; empty where the first is not below the second."""
     low, high = CHOPPING_RANGE_HZ
     return max(low / prf_hz, MIN_SPACING_BINS / pulses), min(high / prf_hz, 0.2)
-
-
-def line_evidence(power: NDArray[np.float64], block: int) -> NDArray[np.float32]:
-    """Log likelihood ratio of a line against noise in every bin [nats], shape (len(LINE_SNRS), bins).
-
-    Line and noise are complex Gaussian of the variances 1 + snr and 1, or the line is missing. Lines far below the
-    strongest of their neighbourhood are leaks or an imbalance of the blades and count less.
-
-    Parameters
-    ----------
-    power : ndarray, shape (bins,)
-        Power over noise, FFT order.
-    block : int
-        Bins of a neighbourhood.
-    """
-    from scipy.ndimage import maximum_filter1d  # here, because predicting needs no such import
-
-    strongest = maximum_filter1d(power, block, mode="wrap")
-    held = power / (1 + NEIGHBOUR_SHARE * np.maximum(strongest - 10, 0))
-    held = np.minimum(held, 60.0).astype(np.float32)
-    out = np.empty((len(LINE_SNRS), len(power)), np.float32)
-    for row, snr in zip(out, LINE_SNRS, strict=True):
-        present = np.exp(held * np.float32(snr / (1 + snr))) * np.float32((1 - MISSING_SHARE) / (1 + snr))
-        row[:] = np.minimum(np.log(np.float32(MISSING_SHARE) + present), LINE_CAP)
-    return out
 
 
 def coarse_spacings(data: Periodogram, evidence: NDArray[np.float32], centre: float) -> NDArray[np.float64]:
@@ -224,14 +192,39 @@ def score(
     low, high : ndarray of int, shape (candidates,)
         Outermost orders.
     """
-    best = np.zeros(len(spacings))
-    reach = np.zeros((2, len(spacings)), np.intp)
+    size = evidence.shape[-1]
     widest = (0.5 / spacings).astype(np.intp)
-    octave = np.floor(2 * np.log2(widest)).astype(np.intp)  # combs of about as many lines are summed together
-    for group in np.unique(octave):
-        rows = np.flatnonzero(octave == group)
-        own_best, own_reach = _score_alike(evidence, spacings[rows], centres[rows], widest[rows], even)
-        best[rows], reach[:, rows] = own_best, own_reach
+    order = np.arange(1, widest.max(initial=0) + 1)
+    beyond = order > widest[:, None]
+    step = (spacings * size)[:, None] * order
+    middle = (centres * size)[:, None]
+    places = [np.rint(middle + sign * step).astype(np.intp) for sign in (-1, 1)]
+    number = np.arange(len(spacings))
+    best = np.full(len(spacings), -np.inf, np.float32)
+    reach = np.zeros((2, len(spacings)), np.intp)
+    for row in evidence:
+        sides = [row.take(place, mode="wrap") for place in places]
+        for side in sides:
+            side[beyond] = 0.0
+        if not even:
+            for side in sides:
+                side.cumsum(axis=1, out=side)
+        # a rotor's lines reach equally far to both sides; other reaches cost as much as the choice of two ends gives
+        both = sides[0] + sides[1]
+        if even:
+            both.cumsum(axis=1, out=both)
+        last = both.argmax(axis=1)
+        total = np.maximum(both[number, last], 0)
+        ends = np.stack([last, last]) + 1
+        if not even:
+            apart = np.stack([side.argmax(axis=1) for side in sides])
+            peaks = np.stack([np.maximum(side[number, end], 0) for side, end in zip(sides, apart, strict=True)])
+            uneven = peaks.sum(axis=0) - np.float32(UNEVEN_COST)
+            ends = np.where(uneven > total, np.where(peaks > 0, apart + 1, 0), ends)
+            total = np.maximum(total, uneven)
+        better = total > best
+        best[better] = total[better]
+        reach[:, better] = ends[:, better]
     return best, -reach[0], reach[1]
 
 
@@ -257,49 +250,6 @@ def heights(
     return out
 
 
-def _score_alike(
-    evidence: NDArray[np.float32],
-    spacings: NDArray[np.float64],
-    centres: NDArray[np.float64],
-    widest: NDArray[np.intp],
-    even: bool,
-) -> tuple[NDArray[np.float32], NDArray[np.intp]]:
-    """`score` of combs of about as many lines, `widest` at most: the score and how far each side reaches."""
-    size = evidence.shape[-1]
-    order = np.arange(1, widest.max() + 1)
-    beyond = order > widest[:, None]
-    step = (spacings * size)[:, None] * order
-    middle = (centres * size)[:, None]
-    places = [np.rint(middle + sign * step).astype(np.intp) for sign in (-1, 1)]
-    number = np.arange(len(spacings))
-    best = np.full(len(spacings), -np.inf, np.float32)
-    reach = np.zeros((2, len(spacings)), np.intp)
-    for row in evidence:
-        sides = [row.take(place, mode="wrap") for place in places]
-        for side in sides:
-            side[beyond] = 0.0
-        if not even:
-            for side in sides:
-                side.cumsum(axis=1, out=side)
-        # a rotor's lines reach equally far to both sides; other reaches cost as much as the choice of two ends gives
-        both = sides[0] + sides[1]
-        if even:
-            both.cumsum(axis=1, out=both)
-        last = both.argmax(axis=1)
-        total = np.maximum(both[number, last], 0)
-        ends = np.stack([last, last]) + 1
-        if not even:
-            apart = np.stack([side.argmax(axis=1) for side in sides])
-            heights = np.stack([np.maximum(side[number, end], 0) for side, end in zip(sides, apart, strict=True)])
-            uneven = heights.sum(axis=0) - np.float32(UNEVEN_COST)
-            ends = np.where(uneven > total, np.where(heights > 0, apart + 1, 0), ends)
-            total = np.maximum(total, uneven)
-        better = total > best
-        best[better] = total[better]
-        reach[:, better] = ends[:, better]
-    return best, reach
-
-
 def _families(
     spacings: NDArray[np.float64], scores: NDArray[np.float64], centres: NDArray[np.float64], pulses: int
 ) -> list[int]:
@@ -321,9 +271,7 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     low, high = spacing_limits(data.pulses, data.prf_hz)
     if low * 1.5 >= high:
         return None
-    evidence = line_evidence(data.power, int(BLOCK_BINS * len(data.power) / data.pulses))
-    bins = np.arange(len(data.power)) / len(data.power)
-    evidence[:, ~data.usable(bins)] = 0.0
+    evidence = data.evidence
     tried = [(coarse_spacings(data, evidence, centre), centre) for centre in data.centres]
     if data.rest_half > 0:
         for spacing, centre in free_spacings(data, evidence):

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from .comb import Comb
 from .comb_fit import MARGIN_ORDERS, CombFit, fit_combs
-from .comb_search import FINE_STEPS, Candidate, heights, line_evidence, score, spacing_limits
+from .comb_search import FINE_STEPS, Candidate, heights, score, spacing_limits
 from .comb_sums import MOST_SNRS, running_sums
+from .evidence import line_evidence
 from .lines import sum_of_lines
 from .periodogram import BLOCK_BINS, LEAST_LEVEL, Periodogram, local_level
 from .rotors import Rotors, judged, separate_rotors

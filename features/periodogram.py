@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .evidence import line_evidence
 from .lines import LineSpace
 from .notch import LOBE_BINS, NOTCH_MPS, Body, body_line
 from .slow_lines import remove_bands
@@ -43,9 +44,6 @@ TAPER_BETA = 3.0
 #: A click: one sample so many times over the noise, and over both beside it; fewer in a record than a rotor's flashes.
 #: A flash is as long as the rotor's band is narrow: its samples beside are as strong.
 CLICK_POWER, CLICK_OVER_BESIDE, MOST_CLICKS = 25.0, 4.0, 5
-
-#: A line weaker than its neighbourhood by this factor in power is a leak or an imbalance, not a line of the comb.
-NEIGHBOUR_SHARE = 0.03
 
 
 @dataclass(frozen=True)
@@ -101,6 +99,14 @@ class Periodogram:
     def lines(self) -> LineSpace:
         """The samples, to be read at any frequency."""
         return LineSpace(self.samples)
+
+    @cached_property
+    def evidence(self) -> NDArray[np.float32]:
+        """Evidence of a line in every bin [nats], 0 where it cannot be seen, shape (line SNRs, bins)."""
+        size = len(self.power)
+        out = line_evidence(self.power, int(BLOCK_BINS * size / self.pulses))
+        out[:, ~self.usable(np.arange(size) / size)] = 0.0
+        return out
 
     def at(self, frequency: NDArray[np.floating]) -> NDArray[np.float64]:
         """Power over the local level at frequencies [cycles a sample], any shape; aliases are folded."""
