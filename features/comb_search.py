@@ -295,7 +295,8 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     )
     spacings = np.concatenate([np.tile(spacings[i] * fine, len(s)) for i, s in zip(chosen, shifts, strict=True)])
     scores = heights(evidence, spacings, centres)
-    finest = np.array([np.where(family == number, scores, -np.inf).argmax() for number in range(len(chosen))])
+    loudest_first = np.argsort(-scores, kind="stable")
+    finest = loudest_first[np.unique(family[loudest_first], return_index=True)[1]]
     scores, lows, highs = score(evidence, spacings[finest], centres[finest])
     share = REST_FLASH_SHARE if data.rest_half > 0 else FLASH_SHARE
     found: list[Candidate] = []

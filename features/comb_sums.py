@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-#: Orders summed at once: what they hold stays in the cache.
-ORDERS_AT_ONCE = 16
+#: Lines summed at once: they must stay in the cache. And orders at least and at most.
+LINES_AT_ONCE, ORDERS_AT_ONCE = 8000, (16, 64)
 
 #: Line SNRs whose evidence is summed side by side, at most: they are taken from the table as one complex number.
 MOST_SNRS = 4
@@ -40,9 +40,13 @@ def running_sums(
     nearest = starts + 0.5
     outermost = reach / np.abs(steps[0])
     before = np.zeros((*starts.shape, MOST_SNRS), np.float32)
-    for first in range(1, int(outermost.max(initial=0)) + 1, ORDERS_AT_ONCE):
-        order = np.arange(first, first + ORDERS_AT_ONCE)[:, None, None]
-        some, every = np.searchsorted(-outermost, [-order[0, 0, 0], -order[-1, 0, 0]], side="right")
+    first, last = 1, int(outermost.max(initial=0))
+    while first <= last:
+        some = int(np.searchsorted(-outermost, -first, side="right"))
+        count = int(np.clip(LINES_AT_ONCE // (len(starts) * some), *ORDERS_AT_ONCE))
+        order = np.arange(first, min(first + count, last + 1))[:, None, None]
+        first += len(order)
+        every = int(np.searchsorted(-outermost, -order[-1, 0, 0], side="right"))
         place = order * steps[:, :some]
         place += nearest[:, :some]
         seen = lines.take(place.astype(np.intp), mode="clip")

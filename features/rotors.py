@@ -77,12 +77,10 @@ def _strongest(data: Periodogram, centre: float, rates: NDArray[np.float64]) -> 
     size = len(data.power)
     powers, _, reach = score(data.evidence, rates, np.full(len(rates), centre), even=True)
     order = np.arange(1, reach.max() + 1)
-    flashes = np.zeros(len(rates))
-    for sign in (-1, 1):
-        frequency = centre + sign * rates[:, None] * order
-        seen = data.usable(frequency) & (order <= reach[:, None])
-        place = np.rint(frequency * size).astype(np.intp) % size
-        flashes += flash_nats(np.where(seen, data.amplitude[place], 0))
+    frequency = centre + np.array([-1, 1])[:, None, None] * rates[:, None] * order
+    seen = data.usable(frequency) & (order <= reach[:, None])
+    place = np.rint(frequency * size).astype(np.intp) % size
+    flashes = flash_nats(np.where(seen, data.amplitude[place], 0)).sum(axis=0)
     sums = powers + flashes
     best = int(sums.argmax())
     return float(rates[best]), int(reach[best]), float(sums[best])
