@@ -140,9 +140,9 @@ def fit_combs(
         if number == 0:
             snr = np.maximum(smooth(np.abs(seen) ** 2 * pulses / level) - 1, 1e-3)
         held_back = 1 / (snr * (1 + (snr / CLEAR_SNR) ** 2)) + LEAST_RIDGE
-        factor, failed = lapack.dpotrf(plain + np.diag(held_back))
+        factor, failed = lapack.dpotrf((plain + np.diag(held_back)).T, overwrite_a=True)
         if failed:  # what is tabulated of the notch is a little off where nearly all was taken out
-            factor, _ = lapack.dpotrf(plain + np.diag(held_back + NOTCH_RIDGE))
+            factor, _ = lapack.dpotrf((plain + np.diag(held_back + NOTCH_RIDGE)).T, overwrite_a=True)
         amplitudes: NDArray[np.complex128] = whole(lapack.dpotrs(factor, parts(seen))[0])[:, 0]
         left = seen - times(plain, amplitudes)
         snr = np.maximum(smooth(np.abs(amplitudes + left) ** 2 * pulses / level) - 1, 1e-3)

@@ -76,7 +76,7 @@ class LineSpace:
             Time counts from the middle of the record, in samples.
         """
         bins, weight = _taps(frequency, len(self.samples))
-        seen = (self._spectra[:, bins] * weight).sum(axis=-1) / len(self.samples)
+        seen = np.einsum("lt,klt->kl", weight, self._spectra.take(bins, axis=1)) / len(self.samples)
         return seen[0], seen[1]
 
 
@@ -100,29 +100,28 @@ def line_products(
     With D the Dirichlet kernel of the frequencies' difference: D, D' / 2 pi and -D'' / 4 pi^2. The second is the mean
     of conj(line k) x time x line l without its factor -j; it is antisymmetric.
     """
-    top_sine, top_cosine = _differences(np.pi * pulses * frequency)
-    low_sine, low_cosine = _differences(np.pi * frequency)
-    near = np.abs(low_sine) < 1e-5 / pulses
-    low_sine[near] = 1.0
+    top_sine, top_cosine = _differences(np.pi * pulses * frequency, 1 / pulses, 0.5)
+    low_sine, low_cosine = _differences(np.pi * frequency, 1.0, 1.0)
+    near = np.flatnonzero(np.abs(low_sine) < 1e-5 / pulses)
+    np.put(low_sine, near, 1.0)
     over = np.divide(1, low_sine, out=low_sine)
     plain = np.multiply(top_sine, over, out=top_sine)
-    plain /= pulses
-    plain[near] = 1.0
+    np.put(plain, near, 1.0)
     ratio = np.multiply(low_cosine, over, out=low_cosine)
-    first = np.multiply(top_cosine, over, out=top_cosine)  # D' / pi
-    first -= plain * ratio
-    first[near] = 0.0
-    ratio *= first
-    second = (pulses**2 - 1) / 4 * plain  # -D'' / 4 pi^2
-    ratio /= 2
-    second += ratio
-    second[near] = (pulses**2 - 1) / 12
-    first /= 2
+    first = np.multiply(top_cosine, over, out=top_cosine)
+    second = plain / 2
+    first -= second * ratio
+    np.put(first, near, 0.0)
+    second *= (pulses**2 - 1) / 2
+    second += np.multiply(ratio, first, out=ratio)
+    np.put(second, near, (pulses**2 - 1) / 12)
     return plain, first, second
 
 
-def _differences(angle: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sines and cosines of the angles' differences, column less row: products of rank two."""
+def _differences(
+    angle: NDArray[np.floating], sine_scale: float, cosine_scale: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Scaled sines and cosines of the angles' differences, column less row: products of rank two."""
     sine, cosine = np.sin(angle), np.cos(angle)
     rows = np.stack([cosine, sine], axis=1)
-    return rows @ np.stack([sine, -cosine]), rows @ np.stack([cosine, sine])
+    return rows @ (sine_scale * np.stack([sine, -cosine])), rows @ (cosine_scale * np.stack([cosine, sine]))

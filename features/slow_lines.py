@@ -160,7 +160,7 @@ def without_bands(
         sign = 1 - 2 * (turns % 2) * (pulses % 2 == 0)
         gaps = (place - first)[:, None] - nodes
         weights = gaps[:, _OTHER_NODES].prod(axis=-1) * _NODE_SCALES * sign[:, None]
-        about = table[first[:, None] + nodes].reshape(*gaps.shape, -1)
+        about = table.take(first[:, None] + nodes, axis=0).reshape(*gaps.shape, -1)
         held = (weights[:, None, :] @ about).reshape(-1, *table.shape[1:])
         plains.append(held[:, 0])
         timeds.append(held[:, 1])
