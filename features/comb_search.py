@@ -25,9 +25,6 @@ MAX_PERIODS = 12
 PER_BAND = 4
 OCTAVES = (1.0, 0.5, 2.0, 1 / 3, 3.0)
 
-#: Of so many highest sums these are taken.
-CLOSER_LOOKS = 400
-
 #: Flashes speak for a comb by at most so many times what the powers of its lines do: they must not make one of what
 #: hardly is one.
 #: Beside a static background, where supplies click, it is less.
@@ -157,13 +154,10 @@ def free_spacings(data: Periodogram, evidence: NDArray[np.float32]) -> list[tupl
 def _apart(periods: NDArray[np.float64], sums: NDArray[np.float64], least: float) -> list[float]:
     """Periods of the highest sums, each further from the others than `least`, relative."""
     taken: list[float] = []
-    highest = np.argpartition(sums, max(len(sums) - CLOSER_LOOKS, 0))[-CLOSER_LOOKS:]
-    for index in highest[np.argsort(-sums[highest])]:
-        period = periods[index]
-        if all(abs(period / other - 1) > least for other in taken):
-            taken.append(float(period))
-            if len(taken) == PER_BAND:
-                break
+    left = sums.copy()
+    while len(taken) < PER_BAND and np.isfinite(left[index := int(left.argmax())]):
+        taken.append(float(periods[index]))
+        left[np.abs(periods / periods[index] - 1) <= least] = -np.inf
     return taken
 
 
@@ -255,14 +249,11 @@ def _families(
 ) -> list[int]:
     """The best of each family of neighbouring spacings about one centre, best family first."""
     taken: list[int] = []
-    for index in np.argsort(-scores)[:400]:
-        if all(
-            abs(spacings[index] / spacings[other] - 1) > 6 / pulses or abs(centres[index] - centres[other]) * pulses > 2
-            for other in taken
-        ):
-            taken.append(int(index))
-            if len(taken) == FAMILIES:
-                break
+    left = scores.copy()
+    while len(taken) < FAMILIES and np.isfinite(left[index := int(left.argmax())]):
+        taken.append(index)
+        near = np.abs(spacings / spacings[index] - 1) <= 6 / pulses
+        left[near & (np.abs(centres - centres[index]) * pulses <= 2)] = -np.inf
     return taken
 
 
