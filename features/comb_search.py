@@ -219,12 +219,12 @@ def score(
         better = total > best
         best[better] = total[better]
         reach[:, better] = ends[:, better]
-    return best, -reach[0], reach[1]
+    return best.astype(np.float64), -reach[0], reach[1]
 
 
 def heights(
     evidence: NDArray[np.float32], spacings: NDArray[np.float64], centres: NDArray[np.float64]
-) -> NDArray[np.float32]:
+) -> NDArray[np.float64]:
     """The scores of many combs, as `score` gives them, without their reaches, shape (candidates,) [nats]."""
     size = evidence.shape[-1]
     rising = np.argsort(spacings)
@@ -239,7 +239,7 @@ def heights(
         np.maximum(sides[:, :some], sums.max(axis=0), out=sides[:, :some])
         np.maximum(both[:some], (sums[:, 0] + sums[:, 1]).max(axis=0), out=both[:some])
     best = np.maximum(both, sides.sum(axis=0) - np.float32(UNEVEN_COST)).max(axis=1)
-    out = np.empty_like(best)
+    out = np.empty(len(best))
     out[rising] = best
     return out
 

@@ -257,13 +257,13 @@ def prepare(iq: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float) -> P
     Periodogram or None
         None for a record without power.
     """
-    spectrum = doppler_spectrum(iq, carrier_hz=carrier_hz, prf_hz=prf_hz)
+    return prepared(iq, doppler_spectrum(iq, carrier_hz=carrier_hz, prf_hz=prf_hz))
+
+
+def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | None:
+    """`prepare` for a record whose spectrum is known."""
     if not spectrum.floor > 0:
         return None
-    return _prepare(iq, spectrum)
-
-
-def _prepare(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram:
     pulses = spectrum.pulses
     bin_mps = spectrum.prf_hz / pulses * spectrum.wavelength_m / 2
     widest = pulses / 16  # a slow radar must keep something to look at
