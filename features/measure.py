@@ -12,7 +12,7 @@ from .comb_fit import CombFit
 from .helicopter import find_gear
 from .lines import LineSpace
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
-from .periodogram import Periodogram, prepare
+from .periodogram import Periodogram, prepared
 from .rotor_band import LEAK_SHARE, fit_edge
 from .rotors import MAX_ROTORS, Rotors
 from .smearing import smearing_index
@@ -217,7 +217,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     out["gear_reason"] = "no comb"
     if 0 < largest_part(iq) < LEAST_PART:
         return out | {"reason": "no digits left in samples this small: raise the gain"}
-    data = prepare(iq, carrier_hz=spectrum.carrier_hz, prf_hz=spectrum.prf_hz)
+    data = prepared(iq, spectrum)
     if data is None:
         return out | {"reason": "no signal"}
     body = body_line(spectrum)

@@ -11,9 +11,9 @@ from scipy import fft
 
 from .comb import Comb
 from .comb_fit import CombFit, fit_combs
-from .comb_search import line_evidence, score
+from .comb_search import score
 from .flashes import flash_nats
-from .periodogram import BLOCK_BINS, LINE_DB, Periodogram, squared
+from .periodogram import LINE_DB, Periodogram, squared
 
 #: Rotors looked for at most.
 MAX_ROTORS = 8
@@ -82,16 +82,12 @@ class Rotors:
 def _strongest(data: Periodogram, centre: float, rates: NDArray[np.float64]) -> tuple[float, int, float]:
     """Rate whose lines speak loudest by their powers and their flashes, how far they reach, and their evidence."""
     size = len(data.power)
-    evidence = line_evidence(data.power, int(BLOCK_BINS * size / data.pulses))
-    evidence[:, ~data.usable(np.arange(size) / size)] = 0.0
-    powers, _, reach = score(evidence, rates, np.full(len(rates), centre), even=True)
+    powers, _, reach = score(data.evidence, rates, np.full(len(rates), centre), even=True)
     order = np.arange(1, reach.max() + 1)
-    flashes = np.zeros(len(rates))
-    for sign in (-1, 1):
-        frequency = centre + sign * rates[:, None] * order
-        seen = data.usable(frequency) & (order <= reach[:, None])
-        place = np.rint(frequency * size).astype(np.intp) % size
-        flashes += flash_nats(np.where(seen, data.amplitude[place], 0))
+    frequency = centre + np.array([-1, 1])[:, None, None] * rates[:, None] * order
+    seen = data.usable(frequency) & (order <= reach[:, None])
+    place = np.rint(frequency * size).astype(np.intp) % size
+    flashes = flash_nats(np.where(seen, data.amplitude[place], 0)).sum(axis=0)
     sums = powers + flashes
     best = int(sums.argmax())
     return float(rates[best]), int(reach[best]), float(sums[best])

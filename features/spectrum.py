@@ -27,7 +27,10 @@ LEAST_FLOOR = np.float32(1e-9)
 _HALF, _ONE, _TEN, _NO_LIMIT = (np.array(value, np.float32) for value in (0.5, 1, 10, np.inf))
 
 _LEAST = np.array(1e-36, np.float32)  # under any power that is not 0: divides in its stead
-_SAFE_ENERGY = np.array(1e-14, np.float32), np.array(1e30, np.float32)  # of a record: neither its lines, at most that strong, nor its floor leave float32
+_SAFE_ENERGY = (
+    np.array(1e-14, np.float32),
+    np.array(1e30, np.float32),
+)  # of a record: neither its lines, at most that strong, nor its floor leave float32
 _FLOOR_QUANTILE = 0.25
 _FLOOR_QUANTILE_NORMAL = -0.6744897501960817  # standard normal quantile of 0.25
 _FLOOR_BLOCKS = 64  # a side of the spectrum
