@@ -32,6 +32,9 @@ MAINS_SCORE = 70.0
 #: Every k-th line stronger than the others by this factor in power: unequal blades, k to a turn.
 UNEQUAL_FACTOR = 4.0
 
+#: Among the outer half of the lines alone, they must be by this.
+OUTER_FACTOR = 2.5
+
 #: And so much must speak for two kinds of lines [nats]: near the noise every other one is strong by chance.
 UNEQUAL_NATS = 8.0
 
@@ -79,18 +82,28 @@ def strong_multiple(orders: NDArray[np.intp], power: NDArray[np.float64]) -> int
         Power of each line over the noise [1].
     """
     best, factor = 1, UNEQUAL_FACTOR
+    outer = np.abs(orders) > np.median(np.abs(orders))
     for multiple in (2, 3, 4):
         strong = orders % multiple == 0
         # the outermost lines are edges; four of each kind tell them apart
         if strong.sum() < 4 or (~strong).sum() < 4:
             continue
         means = np.maximum([power[strong].mean(), power[~strong].mean()], 1e-9)
-        ratio = max(means[0] - 1, 0) / max(means[1] - 1, 0.1)
+        ratio = _contrast(means[0], means[1])
+        # several rotors' lines lie in one another at the low orders and may cancel at some; further out they part
+        if outer[strong].any() and outer[~strong].any():
+            parted = _contrast(power[outer & strong].mean(), power[outer & ~strong].mean())
+            ratio = ratio if parted > OUTER_FACTOR else 0.0
         # log likelihood ratio of two means of exponentials against one
         nats = len(power) * np.log(power.mean()) - strong.sum() * np.log(means[0]) - (~strong).sum() * np.log(means[1])
         if ratio > factor and nats > UNEQUAL_NATS:
             best, factor = multiple, ratio
     return best
+
+
+def _contrast(strong: float, weak: float) -> float:
+    """Ratio of two mean powers without their noise."""
+    return max(strong - 1, 0) / max(weak - 1, 0.1)
 
 
 def of_mains(fit: CombFit, data: Periodogram, score: float) -> bool:

@@ -1,6 +1,6 @@
 """Combs fitted line by line, several at once: spacings and centre below the bin, with the variance the bound gives."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .lines import line_products, sum_of_lines
 from .periodogram import Periodogram
-from .slow_lines import remove_bands, without_bands
+from .slow_lines import parts, remove_bands, times, whole, without_bands
 
 #: Gauss-Newton steps at most, and the step below which they end, in standard deviations.
 STEPS = 8
@@ -62,19 +62,17 @@ class CombFit:
         return np.asarray(self.centre + self.spacing * self.orders, np.float64)
 
 
-def _times(matrix: NDArray[np.float64], columns: NDArray[np.complexfloating]) -> NDArray[np.complex128]:
-    """Real matrix times complex columns; numpy would turn the matrix into a complex one each time."""
-    return _whole(matrix @ _parts(columns)).reshape(columns.shape)
+def _smoother(comb: NDArray[np.intp], order: NDArray[np.intp]) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Means over neighbouring orders of the same comb; combs one after the other, orders rising."""
+    place = order + comb * (2 * np.abs(order).max() + 4 * SMOOTHED_ORDERS)
+    first = np.searchsorted(place, place - SMOOTHED_ORDERS)
+    last = np.searchsorted(place, place + SMOOTHED_ORDERS, side="right")
 
+    def smooth(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        sums = np.concatenate([[0.0], np.cumsum(values)])
+        return np.asarray((sums[last] - sums[first]) / (last - first), np.float64)
 
-def _parts(columns: NDArray[np.complexfloating]) -> NDArray[np.float64]:
-    """Real and imaginary parts as columns of their own."""
-    return np.ascontiguousarray(columns).view(np.float64).reshape(len(columns), -1)
-
-
-def _whole(parts: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """The way back from `_parts`, shape (rows, columns)."""
-    return np.ascontiguousarray(parts).view(np.complex128)
+    return smooth
 
 
 def fit_combs(
@@ -110,7 +108,7 @@ def fit_combs(
         A fit for each spacing and the samples that the lines leave. None where a comb has fewer than three usable
         lines.
     """
-    from scipy.linalg import cho_factor, cho_solve  # here, because predicting needs no such import
+    from scipy.linalg import lapack  # here, because predicting needs no such import
 
     pulses = data.pulses
     which, orders = [], []
@@ -130,8 +128,7 @@ def fit_combs(
     design = np.zeros((len(order), 1 + count))
     design[:, 0] = 1.0
     design[np.arange(len(order)), 1 + comb] = order
-    near = (comb[:, None] == comb) & (np.abs(order[:, None] - order) <= SMOOTHED_ORDERS)
-    share = near / near.sum(axis=1, keepdims=True)
+    smooth = _smoother(comb, order)
     limit = np.concatenate([[0.5], 0.5 / np.array([max(1, np.abs(own).max()) for own in orders])]) / pulses
     level = data.level_at(centre + values[1 + comb] * order)
     relevelled = False
@@ -141,23 +138,22 @@ def fit_combs(
         plain, first, second = products = line_products(frequency, pulses)
         without_bands(products, frequency, pulses, data.bands)
         if number == 0:
-            snr = np.maximum(share @ (np.abs(seen) ** 2 * pulses / level) - 1, 1e-3)
+            snr = np.maximum(smooth(np.abs(seen) ** 2 * pulses / level) - 1, 1e-3)
         held_back = 1 / (snr * (1 + (snr / CLEAR_SNR) ** 2)) + LEAST_RIDGE
-        try:
-            factor = cho_factor(plain + np.diag(held_back))
-        except np.linalg.LinAlgError:  # what is tabulated of the notch is a little off where nearly all was taken out
-            factor = cho_factor(plain + np.diag(held_back + NOTCH_RIDGE))
-        amplitudes: NDArray[np.complex128] = _whole(cho_solve(factor, _parts(seen)))[:, 0]
-        left = seen - _times(plain, amplitudes)
-        snr = np.maximum(share @ (np.abs(amplitudes + left) ** 2 * pulses / level) - 1, 1e-3)
-        slope = moment - 1j * _times(first.T, amplitudes)
+        factor, failed = lapack.dpotrf((plain + np.diag(held_back)).T, overwrite_a=True)
+        if failed:  # what is tabulated of the notch is a little off where nearly all was taken out
+            factor, _ = lapack.dpotrf((plain + np.diag(held_back + NOTCH_RIDGE)).T, overwrite_a=True)
+        amplitudes: NDArray[np.complex128] = whole(lapack.dpotrs(factor, parts(seen))[0])[:, 0]
+        left = seen - times(plain, amplitudes)
+        snr = np.maximum(smooth(np.abs(amplitudes + left) ** 2 * pulses / level) - 1, 1e-3)
+        slope = moment - 1j * times(first.T, amplitudes)
         weighed = np.where(used, amplitudes, 0.0) / np.sqrt(level)
         # the score of each line's frequency, and the Fisher matrix of centre and spacings
         pull = (weighed.conj() * slope).imag / np.sqrt(level) * (4 * np.pi * pulses)
         sway = np.asarray(weighed[:, None] * design, np.complex128)
-        leaked = _times(first, sway)
-        kept = _whole(cho_solve(factor, _parts(leaked)))
-        fisher = (sway.conj().T @ _times(second, sway) - leaked.conj().T @ kept).real
+        leaked = times(first, sway)
+        kept = whole(lapack.dpotrs(factor, parts(leaked))[0])
+        fisher = (sway.conj().T @ times(second, sway) - leaked.conj().T @ kept).real
         fisher *= 8 * np.pi**2 * pulses
         fisher[np.diag_indices_from(fisher)] *= 1 + 1e-9
         step = np.linalg.solve(fisher, design.T @ pull)

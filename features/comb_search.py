@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .chopping import CHOPPING_RANGE_HZ
+from .comb_sums import MOST_SNRS, running_sums
 from .flashes import flash_evidence
-from .periodogram import BLOCK_BINS, LINE_DB, NEIGHBOUR_SHARE, Periodogram
+from .octaves import MULTIPLE_SHARE, coarsest
+from .periodogram import LINE_DB, Periodogram
 
 #: Lines nearer than this are not told apart [bins].
 MIN_SPACING_BINS = 3.0
@@ -23,13 +25,6 @@ MAX_PERIODS = 12
 #: Candidates taken from each band, and the other octaves tried for each.
 PER_BAND = 4
 OCTAVES = (1.0, 0.5, 2.0, 1 / 3, 3.0)
-
-#: Line powers over noise that a comb may have, and the share of its lines that may be missing.
-LINE_SNRS = (1.2, 6.0, 40.0)
-MISSING_SHARE = 0.15
-
-#: No single line speaks for more than this [nats]: a lone line is no comb.
-LINE_CAP = 5.0
 
 #: Flashes speak for a comb by at most so many times what the powers of its lines do: they must not make one of what
 #: hardly is one.
@@ -106,31 +101,6 @@ def spacing_limits(pulses: int, prf_hz: float) -> tuple[float, float]:
     return max(low / prf_hz, MIN_SPACING_BINS / pulses), min(high / prf_hz, 0.2)
 
 
-def line_evidence(power: NDArray[np.float64], block: int) -> NDArray[np.float32]:
-    """Log likelihood ratio of a line against noise in every bin [nats], shape (len(LINE_SNRS), bins).
-
-    Line and noise are complex Gaussian of the variances 1 + snr and 1, or the line is missing. Lines far below the
-    strongest of their neighbourhood are leaks or an imbalance of the blades and count less.
-
-    Parameters
-    ----------
-    power : ndarray, shape (bins,)
-        Power over noise, FFT order.
-    block : int
-        Bins of a neighbourhood.
-    """
-    from scipy.ndimage import maximum_filter1d  # here, because predicting needs no such import
-
-    strongest = maximum_filter1d(power, block, mode="wrap")
-    held = power / (1 + NEIGHBOUR_SHARE * np.maximum(strongest - 10, 0))
-    held = np.minimum(held, 60.0).astype(np.float32)
-    out = np.empty((len(LINE_SNRS), len(power)), np.float32)
-    for row, snr in zip(out, LINE_SNRS, strict=True):
-        present = np.exp(held * np.float32(snr / (1 + snr))) * np.float32((1 - MISSING_SHARE) / (1 + snr))
-        row[:] = np.minimum(np.log(np.float32(MISSING_SHARE) + present), LINE_CAP)
-    return out
-
-
 def coarse_spacings(data: Periodogram, evidence: NDArray[np.float32], centre: float) -> NDArray[np.float64]:
     """Spacings worth a closer look [cycles a sample], best of every band first, with their octaves."""
     low, high = spacing_limits(data.pulses, data.prf_hz)
@@ -138,19 +108,25 @@ def coarse_spacings(data: Periodogram, evidence: NDArray[np.float32], centre: fl
     size = len(data.power)
     offset = np.arange(size) / size - centre
     distance = np.abs(offset - np.rint(offset))
-    ripple = evidence[0]
     turn = np.exp(-2j * np.pi * centre * np.arange(data.pulses))
     found: list[float] = []
-    for share in BANDS:
-        inside = distance <= share / 2
-        part = np.where(inside, ripple - ripple[inside].mean(), 0.0)
-        correlation = fft.ifft(part)[: data.pulses] * turn
-        sums = np.add.reduceat(correlation.real[grid.lags], grid.starts) * grid.weight
+    for correlation in _correlations(evidence[0], distance, BANDS, data.pulses):
+        sums = np.add.reduceat((correlation * turn).real[grid.lags], grid.starts) * grid.weight
         found += _apart(grid.periods, sums, 2 * MAX_PERIODS / data.pulses)
     spacings = (1 / np.array(found))[:, None] * np.array(OCTAVES)
     spacings = np.unique(spacings.ravel())
     spacings = spacings[(spacings >= low) & (spacings <= high)]
     return spacings[np.diff(np.log(spacings), prepend=-np.inf) > 1 / data.pulses]
+
+
+def _correlations(
+    ripple: NDArray[np.float32], distance: NDArray[np.float64], shares: tuple[float, ...], lags: int
+) -> NDArray[np.complex64]:
+    """Autocorrelations of a spectrum within shares of the span about a place, shape (shares, lags)."""
+    inside = distance <= np.array(shares)[:, None] / 2
+    part = np.where(inside, ripple, np.float32(0))
+    part -= inside * (part.sum(axis=1, keepdims=True) / inside.sum(axis=1, keepdims=True, dtype=np.float32))
+    return np.asarray(fft.rfft(part)[:, :lags].conj() / np.float32(len(ripple)), np.complex64)
 
 
 def free_spacings(data: Periodogram, evidence: NDArray[np.float32]) -> list[tuple[float, float]]:
@@ -166,10 +142,7 @@ def free_spacings(data: Periodogram, evidence: NDArray[np.float32]) -> list[tupl
     number = np.arange(1, MAX_PERIODS + 1)
     steering = np.exp(-2j * np.pi * np.outer(np.arange(48) / 48, number))
     found = []
-    for share in BANDS[1:]:
-        inside = distance <= share / 2
-        part = np.where(inside, evidence[0] - evidence[0][inside].mean(), 0.0)
-        correlation = fft.ifft(part)[: data.pulses]
+    for correlation in _correlations(evidence[0], distance, BANDS[1:], data.pulses):
         sums = np.add.reduceat(np.abs(correlation[grid.lags]), grid.starts) * grid.weight
         for period in _apart(grid.periods, sums, 2 * MAX_PERIODS / data.pulses):
             used = number[: max(1, int(0.9 * data.pulses / period))]
@@ -182,12 +155,10 @@ def free_spacings(data: Periodogram, evidence: NDArray[np.float32]) -> list[tupl
 def _apart(periods: NDArray[np.float64], sums: NDArray[np.float64], least: float) -> list[float]:
     """Periods of the highest sums, each further from the others than `least`, relative."""
     taken: list[float] = []
-    for index in np.argsort(sums)[:-400:-1]:
-        period = periods[index]
-        if all(abs(period / other - 1) > least for other in taken):
-            taken.append(float(period))
-            if len(taken) == PER_BAND:
-                break
+    left = sums.copy()
+    while len(taken) < PER_BAND and np.isfinite(left[index := int(left.argmax())]):
+        taken.append(float(periods[index]))
+        left[np.abs(periods / periods[index] - 1) <= least] = -np.inf
     return taken
 
 
@@ -216,27 +187,9 @@ def score(
     low, high : ndarray of int, shape (candidates,)
         Outermost orders.
     """
-    best = np.zeros(len(spacings))
-    reach = np.zeros((2, len(spacings)), np.intp)
-    widest = (0.5 / spacings).astype(np.intp)
-    octave = np.floor(2 * np.log2(widest)).astype(np.intp)  # combs of about as many lines are summed together
-    for group in np.unique(octave):
-        rows = np.flatnonzero(octave == group)
-        own_best, own_reach = _score_alike(evidence, spacings[rows], centres[rows], widest[rows], even)
-        best[rows], reach[:, rows] = own_best, own_reach
-    return best, -reach[0], reach[1]
-
-
-def _score_alike(
-    evidence: NDArray[np.float32],
-    spacings: NDArray[np.float64],
-    centres: NDArray[np.float64],
-    widest: NDArray[np.intp],
-    even: bool,
-) -> tuple[NDArray[np.float32], NDArray[np.intp]]:
-    """`score` of combs of about as many lines, `widest` at most: the score and how far each side reaches."""
     size = evidence.shape[-1]
-    order = np.arange(1, widest.max() + 1)
+    widest = (0.5 / spacings).astype(np.intp)
+    order = np.arange(1, widest.max(initial=0) + 1)
     beyond = order > widest[:, None]
     step = (spacings * size)[:, None] * order
     middle = (centres * size)[:, None]
@@ -260,14 +213,36 @@ def _score_alike(
         ends = np.stack([last, last]) + 1
         if not even:
             apart = np.stack([side.argmax(axis=1) for side in sides])
-            heights = np.stack([np.maximum(side[number, end], 0) for side, end in zip(sides, apart, strict=True)])
-            uneven = heights.sum(axis=0) - np.float32(UNEVEN_COST)
-            ends = np.where(uneven > total, np.where(heights > 0, apart + 1, 0), ends)
+            peaks = np.stack([np.maximum(side[number, end], 0) for side, end in zip(sides, apart, strict=True)])
+            uneven = peaks.sum(axis=0) - np.float32(UNEVEN_COST)
+            ends = np.where(uneven > total, np.where(peaks > 0, apart + 1, 0), ends)
             total = np.maximum(total, uneven)
         better = total > best
         best[better] = total[better]
         reach[:, better] = ends[:, better]
-    return best, reach
+    return best.astype(np.float64), -reach[0], reach[1]
+
+
+def heights(
+    evidence: NDArray[np.float32], spacings: NDArray[np.float64], centres: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The scores of many combs, as `score` gives them, without their reaches, shape (candidates,) [nats]."""
+    size = evidence.shape[-1]
+    rising = np.argsort(spacings)
+    # half a turn more on each side: a line beyond half the PRF is the alias on the other
+    wide = np.concatenate([evidence[:, size // 2 :], evidence, evidence[:, : size // 2 + 1]], axis=1)
+    start = (centres[rising] % 1.0) * size + (size - size // 2)
+    step = spacings[rising] * size
+    sides = np.zeros((2, len(step), MOST_SNRS), np.float32)
+    both = np.zeros((len(step), MOST_SNRS), np.float32)
+    for sums in running_sums(wide, np.stack([start, start]), np.stack([-step, step]), size / 2):
+        some = sums.shape[2]
+        np.maximum(sides[:, :some], sums.max(axis=0), out=sides[:, :some])
+        np.maximum(both[:some], (sums[:, 0] + sums[:, 1]).max(axis=0), out=both[:some])
+    best = np.maximum(both, sides.sum(axis=0) - np.float32(UNEVEN_COST)).max(axis=1)
+    out = np.empty(len(best))
+    out[rising] = best
+    return out
 
 
 def _families(
@@ -275,14 +250,11 @@ def _families(
 ) -> list[int]:
     """The best of each family of neighbouring spacings about one centre, best family first."""
     taken: list[int] = []
-    for index in np.argsort(-scores)[:400]:
-        if all(
-            abs(spacings[index] / spacings[other] - 1) > 6 / pulses or abs(centres[index] - centres[other]) * pulses > 2
-            for other in taken
-        ):
-            taken.append(int(index))
-            if len(taken) == FAMILIES:
-                break
+    left = scores.copy()
+    while len(taken) < FAMILIES and np.isfinite(left[index := int(left.argmax())]):
+        taken.append(index)
+        near = np.abs(spacings / spacings[index] - 1) <= 6 / pulses
+        left[near & (np.abs(centres - centres[index]) * pulses <= 2)] = -np.inf
     return taken
 
 
@@ -291,9 +263,7 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     low, high = spacing_limits(data.pulses, data.prf_hz)
     if low * 1.5 >= high:
         return None
-    evidence = line_evidence(data.power, int(BLOCK_BINS * len(data.power) / data.pulses))
-    bins = np.arange(len(data.power)) / len(data.power)
-    evidence[:, ~data.usable(bins)] = 0.0
+    evidence = data.contrast
     tried = [(coarse_spacings(data, evidence, centre), centre) for centre in data.centres]
     if data.rest_half > 0:
         for spacing, centre in free_spacings(data, evidence):
@@ -304,7 +274,7 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     factors = 1 + np.arange(-COARSE_STEPS, COARSE_STEPS + 1) / data.pulses
     spacings = np.concatenate([np.outer(s, factors).ravel() for s, _ in tried])
     centres = np.concatenate([np.full(len(s) * len(factors), c) for s, c in tried])
-    scores, _, _ = score(evidence, spacings, centres)
+    scores = heights(evidence, spacings, centres)
     if not len(scores):
         return None
     chosen = _families(spacings, scores, centres, data.pulses)
@@ -316,15 +286,20 @@ def best_candidate(data: Periodogram) -> Candidate | None:
         [np.repeat(centres[i] + np.array(s) / data.pulses, len(fine)) for i, s in zip(chosen, shifts, strict=True)]
     )
     spacings = np.concatenate([np.tile(spacings[i] * fine, len(s)) for i, s in zip(chosen, shifts, strict=True)])
-    scores, lows, highs = score(evidence, spacings, centres)
+    scores = heights(evidence, spacings, centres)
+    loudest_first = np.argsort(-scores, kind="stable")
+    finest = loudest_first[np.unique(family[loudest_first], return_index=True)[1]]
+    scores, lows, highs = score(evidence, spacings[finest], centres[finest])
     share = REST_FLASH_SHARE if data.rest_half > 0 else FLASH_SHARE
-    found = []
-    for number in range(len(chosen)):
-        index = int(np.where(family == number, scores, -np.inf).argmax())
-        place = (float(spacings[index]), float(centres[index]), int(lows[index]), int(highs[index]))
+    found: list[Candidate] = []
+    for index in np.argsort(-scores, kind="stable"):
+        most = max((other.score for other in found), default=-np.inf)
+        if (1 + share) * scores[index] < MULTIPLE_SHARE * most:  # flashes can not bring it near the best
+            break
+        place = (float(spacings[finest[index]]), float(centres[finest[index]]), int(lows[index]), int(highs[index]))
         flash = flash_evidence(data, *place)
         found.append(Candidate(*place, float(scores[index]) + min(flash, share * float(scores[index]))))
-    return _centred(data, evidence, max(found, key=lambda c: c.score))
+    return _centred(data, evidence, found[coarsest([c.spacing for c in found], [c.score for c in found])])
 
 
 def _centred(data: Periodogram, evidence: NDArray[np.float32], found: Candidate) -> Candidate:

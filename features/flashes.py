@@ -19,6 +19,11 @@ LEAST_LINES = 5
 OVERSAMPLING = 4
 
 
+def _squared(amplitudes: NDArray[np.complexfloating]) -> NDArray[np.floating]:
+    """Power of amplitudes, in their own precision."""
+    return np.asarray(amplitudes.real**2 + amplitudes.imag**2)
+
+
 def flash_nats(amplitudes: NDArray[np.complexfloating]) -> NDArray[np.float64]:
     """Evidence of equal phase steps in the lines of one side [nats].
 
@@ -37,9 +42,9 @@ def flash_nats(amplitudes: NDArray[np.complexfloating]) -> NDArray[np.float64]:
         At least 0.
     """
     lines = np.count_nonzero(amplitudes, axis=-1)
-    total = (np.abs(amplitudes) ** 2).sum(axis=-1, dtype=np.float64)
+    total = _squared(amplitudes).sum(axis=-1, dtype=np.float64)
     size = fft.next_fast_len(OVERSAMPLING * amplitudes.shape[-1])
-    peak = (np.abs(fft.fft(amplitudes, size, axis=-1)) ** 2).max(axis=-1)
+    peak = _squared(fft.fft(amplitudes, size, axis=-1)).max(axis=-1)
     share = np.minimum(peak / np.maximum(total * lines, 1e-30), 1 - 1e-9)
     nats = -(lines - 1) * np.log1p(-share) - np.log(2.0 * np.maximum(lines, 1))
     return np.where(lines >= LEAST_LINES, np.maximum(nats, 0.0), 0.0)
@@ -63,8 +68,11 @@ def flash_evidence(data: Periodogram, spacing: float, centre: float, low: int, h
         frequency = centre + sign * spacing * np.arange(1, reach + 1)
         seen = data.amplitude[np.rint(frequency * size).astype(np.intp) % size]
         sides.append(np.where(data.usable(frequency), seen, 0))
-    apart = sum(float(flash_nats(side)) for side in sides if len(side) >= LEAST_LINES)
     left, right = sides
+    if len(left) == len(right):
+        apart = float(flash_nats(np.stack(sides)).sum())
+    else:
+        apart = sum(float(flash_nats(side)) for side in sides if len(side) >= LEAST_LINES)
     # J_-n = (-1)^n J_n: one step for both sides, with half a turn more on the one where the blades are of odd number
     turned = left * (-1.0) ** np.arange(1, len(left) + 1)
     both = np.stack([np.concatenate([side[::-1], [0], right]) for side in (left, turned)])

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from .comb import Comb
 from .comb_fit import MARGIN_ORDERS, CombFit, fit_combs
-from .comb_search import FINE_STEPS, Candidate, line_evidence, score, spacing_limits
+from .comb_search import FINE_STEPS, Candidate, heights, score, spacing_limits
+from .comb_sums import MOST_SNRS, running_sums
+from .evidence import line_evidence
 from .lines import sum_of_lines
 from .periodogram import BLOCK_BINS, LEAST_LEVEL, Periodogram, local_level
 from .rotors import Rotors, judged, separate_rotors
@@ -41,9 +43,6 @@ MEETING_BINS = 1.5
 
 #: Candidates looked at closely.
 CLOSER = 4
-
-#: Spacings scored together at most: their sums must stay in the cache.
-ROWS_AT_ONCE = 128
 
 
 @dataclass(frozen=True)
@@ -219,35 +218,21 @@ def _loudest(
     )
     if not len(spacings):
         return None
-    heights = _heights(evidence, spacings, centre)
-    loudest = spacings[np.argsort(heights)[: -CLOSER - 1 : -1]]
+    loudest = spacings[np.argsort(_even_heights(evidence, spacings, centre))[: -CLOSER - 1 : -1]]
     return _closest(rest, evidence, loudest, centre)
 
 
-def _heights(evidence: NDArray[np.float32], spacings: NDArray[np.float64], centre: float) -> NDArray[np.float32]:
-    """Best evidence of each spacing, rising, with both sides equally far."""
+def _even_heights(evidence: NDArray[np.float32], spacings: NDArray[np.float64], centre: float) -> NDArray[np.float32]:
+    """Best evidence of each spacing, rising, with both sides equally far; at least 0."""
     size = evidence.shape[-1]
     # both sides at once: the spectrum folded about the centre
     middle, away = round(centre * size), np.arange(size // 2 + 1)
     folded = evidence.take(middle + away, axis=1, mode="wrap") + evidence.take(middle - away, axis=1, mode="wrap")
-    out = np.empty(len(spacings), np.float32)
-    start = 0
-    while start < len(spacings):  # combs of about as many lines are summed together
-        stop = min(int(np.searchsorted(spacings, 1.3 * spacings[start])), start + ROWS_AT_ONCE)
-        widest = (0.5 / spacings[start:stop]).astype(np.intp)
-        # orders first: their running sums then go over whole rows at a time
-        order = np.arange(1, widest[0] + 1)[:, None]
-        beyond = order > widest
-        place = np.rint((spacings[start:stop] * size) * np.where(beyond, 0, order)).astype(np.intp)
-        best = np.full(stop - start, -np.inf, np.float32)
-        for row in folded:
-            seen = row.take(place, mode="clip")
-            seen[beyond] = 0.0
-            seen.cumsum(axis=0, out=seen)
-            np.maximum(best, seen.max(axis=0), out=best)
-        out[start:stop] = best
-        start = stop
-    return out
+    best = np.zeros((len(spacings), MOST_SNRS), np.float32)
+    for sums in running_sums(folded, np.zeros((1, len(spacings))), spacings[None] * size, size / 2):
+        held = best[: sums.shape[2]]
+        np.maximum(held, sums[:, 0].max(axis=0), out=held)
+    return np.asarray(best.max(axis=1), np.float32)
 
 
 def _geometric(low: float, high: float, pulses: int) -> NDArray[np.float64]:
@@ -263,6 +248,6 @@ def _closest(
     """The best of spacings and of those near them."""
     factors = 1 + 0.25 / rest.pulses * np.arange(-2 * FINE_STEPS, 2 * FINE_STEPS + 1)
     tried = np.outer(spacings, factors).ravel()
-    heights, lows, highs = score(evidence, tried, np.full(len(tried), centre))
-    index = int(heights.argmax())
-    return Candidate(float(tried[index]), centre, int(lows[index]), int(highs[index]), float(heights[index]))
+    best = tried[[heights(evidence, tried, np.full(len(tried), centre)).argmax()]]
+    (height,), (low,), (high,) = score(evidence, best, np.array([centre]))
+    return Candidate(float(best[0]), centre, int(low), int(high), float(height))

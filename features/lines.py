@@ -33,11 +33,12 @@ def _taps(frequency: NDArray[np.floating], pulses: int) -> tuple[NDArray[np.intp
     """Bins about each frequency and their weights, shape (lines, taps); time counts from the middle of the record."""
     size, _ = _kernel(pulses)
     place = frequency * size
-    bins = np.floor(place).astype(np.intp)[:, None] + np.arange(1 - _TAPS // 2, 1 + _TAPS // 2)
-    away = 2 * (place[:, None] - bins) / _TAPS
-    weight = _bell(away)
-    turn = np.exp(1j * np.pi * (pulses - 1) / size * (bins % (2 * size)))
-    return bins % size, weight * turn
+    first = np.floor(place).astype(np.intp)
+    tap = np.arange(1 - _TAPS // 2, 1 + _TAPS // 2)
+    weight = _bell(2 / _TAPS * ((place - first)[:, None] - tap))
+    turn = 1j * np.pi * (pulses - 1) / size
+    turns = np.exp(turn * (first % (2 * size)))[:, None] * np.exp(turn * tap)
+    return (first[:, None] + tap) % size, weight * turns
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ class LineSpace:
             Time counts from the middle of the record, in samples.
         """
         bins, weight = _taps(frequency, len(self.samples))
-        seen = (self._spectra[:, bins] * weight).sum(axis=-1) / len(self.samples)
+        seen = np.einsum("lt,klt->kl", weight, self._spectra.take(bins, axis=1)) / len(self.samples)
         return seen[0], seen[1]
 
 
@@ -99,20 +100,28 @@ def line_products(
     With D the Dirichlet kernel of the frequencies' difference: D, D' / 2 pi and -D'' / 4 pi^2. The second is the mean
     of conj(line k) x time x line l without its factor -j; it is antisymmetric.
     """
-    turns = np.pi * frequency
-    outer, inner = np.exp(1j * pulses * turns), np.exp(1j * turns)
-    top = np.outer(outer.conj(), outer)  # angle pi N (f_l - f_k)
-    low = np.outer(inner.conj(), inner)
-    near = np.abs(low.imag) < 1e-5 / pulses
-    over = 1 / np.where(near, 1.0, low.imag)
-    plain = top.imag * over
-    plain /= pulses
-    plain[near] = 1.0
-    ratio = low.real * over
-    first = top.real * over  # D' / pi
-    first -= plain * ratio
-    first[near] = 0.0
-    second = (1 - pulses**2) * plain  # D'' / pi^2
-    second -= 2 * ratio * first
-    second[near] = -(pulses**2 - 1) / 3
-    return plain, first / 2, -second / 4
+    top_sine, top_cosine = _differences(np.pi * pulses * frequency, 1 / pulses, 0.5)
+    low_sine, low_cosine = _differences(np.pi * frequency, 1.0, 1.0)
+    near = np.flatnonzero(np.abs(low_sine) < 1e-5 / pulses)
+    np.put(low_sine, near, 1.0)
+    over = np.divide(1, low_sine, out=low_sine)
+    plain = np.multiply(top_sine, over, out=top_sine)
+    np.put(plain, near, 1.0)
+    ratio = np.multiply(low_cosine, over, out=low_cosine)
+    first = np.multiply(top_cosine, over, out=top_cosine)
+    second = plain / 2
+    first -= second * ratio
+    np.put(first, near, 0.0)
+    second *= (pulses**2 - 1) / 2
+    second += np.multiply(ratio, first, out=ratio)
+    np.put(second, near, (pulses**2 - 1) / 12)
+    return plain, first, second
+
+
+def _differences(
+    angle: NDArray[np.floating], sine_scale: float, cosine_scale: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Scaled sines and cosines of the angles' differences, column less row: products of rank two."""
+    sine, cosine = np.sin(angle), np.cos(angle)
+    rows = np.stack([cosine, sine], axis=1)
+    return rows @ (sine_scale * np.stack([sine, -cosine])), rows @ (cosine_scale * np.stack([cosine, sine]))

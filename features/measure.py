@@ -12,7 +12,7 @@ from .comb_fit import CombFit
 from .helicopter import find_gear
 from .lines import LineSpace
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
-from .periodogram import Periodogram, prepare
+from .periodogram import Periodogram, prepared
 from .rotor_band import LEAK_SHARE, fit_edge
 from .rotors import MAX_ROTORS, Rotors
 from .smearing import smearing_index
@@ -36,7 +36,7 @@ SEVERAL_LEAK = 0.02
 
 #: Of the sums of all about an order: variance over the square where the rotors' lines lie in one another (four of equal
 #: power, both sides), and what an edge is off by at least [lines].
-AROUND_SCATTER, AROUND_LINES = 0.4, 0.05
+AROUND_SCATTER, AROUND_LINES = 0.4, 0.035
 
 #: Rotors that are not told apart differ by about so much in their rates, relative.
 LEAST_SPREAD = 0.02
@@ -217,7 +217,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     out["gear_reason"] = "no comb"
     if 0 < largest_part(iq) < LEAST_PART:
         return out | {"reason": "no digits left in samples this small: raise the gain"}
-    data = prepare(iq, carrier_hz=spectrum.carrier_hz, prf_hz=spectrum.prf_hz)
+    data = prepared(iq, spectrum)
     if data is None:
         return out | {"reason": "no signal"}
     body = body_line(spectrum)
@@ -352,33 +352,29 @@ def _surer(lines: tuple[float, float], around: tuple[float, float]) -> tuple[flo
 
 
 def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | None) -> tuple[float, float]:
-    """Edge and its standard deviation by all that lies about each order: rotors that are not told apart count too.
-
-    What they hold between the lines lifts the local level as well, which therefore counts up to the floor only.
-    """
+    """Edge and its standard deviation by all that lies about each order: rotors that are not told apart count too."""
     nominal, centre = float(np.mean([rotors.rates.min(), rotors.rates.max()])), rotors.fits[0].centre
     size, pulses = len(data.power), data.pulses
     order = np.arange(1, int(0.49 / nominal) + 1)
     spread = max(rotors.spread, LEAST_SPREAD * nominal)
     half_bins = min(nominal * pulses / 2, 1 + comb.last / comb.per_turn * spread * pulses)
     half = int(half_bins * size / pulses)
-    level = data.level_of(rotors.rest)
-    total, noise, number = np.zeros(len(order)), np.zeros(len(order)), np.zeros(len(order))
+    # what lies between the lines lifts the local level: the noise is that of most of the span, and the floor at most
+    bins = np.arange(size) / size
+    floor = min(float(np.median(data.level_of(rotors.rest)(bins)[data.usable(bins)])), 1.0)
+    total, number = np.zeros(len(order)), np.zeros(len(order))
     for sign in (-1, 1):
         middle = np.rint((centre + sign * order * nominal) * size).astype(np.intp)
         frequency = (middle[:, None] + np.arange(-half, half + 1)) / size
         usable = data.usable(frequency)
-        # what lies between the lines lifts the local level as well, which therefore counts up to the floor only
-        floor = np.minimum(level(frequency), 1.0)
         power = data.at(frequency) * data.level_at(frequency)
         total += np.where(usable, power, 0.0).sum(axis=1) * pulses / size
-        noise += np.where(usable, floor, 0.0).sum(axis=1) * pulses / size
         number += usable.sum(axis=1) * pulses / size
     seen = number > 2
     count = number[seen]
-    scatter = np.asarray(AROUND_SCATTER / (1 + 2 * order[seen] * spread * pulses), np.float64)
-    edge, std = fit_edge(
-        order[seen], total[seen] / count, noise[seen] / count, count, blades, scatter=scatter, leak=SEVERAL_LEAK
-    )
+    noise = np.full(len(count), floor)
+    # once the lines part, what they have of one another falls with the square of their distance
+    scatter = np.asarray(AROUND_SCATTER / (1 + (2 * order[seen] * rotors.spread * pulses) ** 2), np.float64)
+    edge, std = fit_edge(order[seen], total[seen] / count, noise, count, blades, scatter=scatter, leak=SEVERAL_LEAK)
     fastest = float(max(nominal, rotors.rates.max()))
     return edge * fastest, float(np.hypot(std, AROUND_LINES)) * fastest

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .evidence import line_evidence
 from .lines import LineSpace
 from .notch import LOBE_BINS, NOTCH_MPS, Body, body_line
+from .octaves import over_neighbours
 from .slow_lines import remove_bands
 from .spectrum import NOISE_BANDWIDTH_BINS, Spectrum, doppler_spectrum
 
@@ -18,6 +20,9 @@ LINE_DB = 17.0
 
 #: Noise alone seldom has so strong a bin [dB] in the notch about velocity zero; a background's skirt has.
 SKIRT_DB = 9.0
+
+#: It shows right beside a hovering body's lobe, at so many bins; further out lie the first lines of rotors.
+SKIRT_BINS = LOBE_BINS + 2.5
 
 #: So many bins beside what was taken out the noise is thinner: it would lower the level of its block.
 THINNED_BINS = 4
@@ -43,9 +48,6 @@ TAPER_BETA = 3.0
 #: A click: one sample so many times over the noise, and over both beside it; fewer in a record than a rotor's flashes.
 #: A flash is as long as the rotor's band is narrow: its samples beside are as strong.
 CLICK_POWER, CLICK_OVER_BESIDE, MOST_CLICKS = 25.0, 4.0, 5
-
-#: A line weaker than its neighbourhood by this factor in power is a leak or an imbalance, not a line of the comb.
-NEIGHBOUR_SHARE = 0.03
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,31 @@ class Periodogram:
         """The samples, to be read at any frequency."""
         return LineSpace(self.samples)
 
+    @cached_property
+    def evidence(self) -> NDArray[np.float32]:
+        """Evidence of a line in every bin [nats], 0 where it cannot be seen, shape (line SNRs, bins)."""
+        return self._evidence * self._seen
+
+    @cached_property
+    def contrast(self) -> NDArray[np.float32]:
+        """The same over what any place near by has, where lines fill that: see `octaves.over_neighbours`."""
+        return over_neighbours(self._evidence, self._block) * self._seen
+
+    @cached_property
+    def _evidence(self) -> NDArray[np.float32]:
+        return line_evidence(self.power, self._block)
+
+    @property
+    def _block(self) -> int:
+        """Bins of a neighbourhood."""
+        return int(BLOCK_BINS * len(self.power) / self.pulses)
+
+    @property
+    def _seen(self) -> NDArray[np.bool_]:
+        """Where a line can be seen."""
+        size = len(self.power)
+        return self.usable(np.arange(size) / size)
+
     def at(self, frequency: NDArray[np.floating]) -> NDArray[np.float64]:
         """Power over the local level at frequencies [cycles a sample], any shape; aliases are folded."""
         size = len(self.power)
@@ -132,11 +159,9 @@ class Periodogram:
         """Local level of samples that lines were taken from, as a function of the frequency [cycles a sample]."""
         size = len(self.power)
         power = squared(_spectrum(rest, size, tapered=False))
-        level = local_level(
-            power, _kept(size, self.blocked, THINNED_BINS / self.pulses), 1.0, int(BLOCK_BINS * size / self.pulses)
-        )
-        level = np.maximum(level, LEAST_LEVEL)
-        return lambda frequency: level[np.rint(frequency * size).astype(np.intp) % size]
+        keep = _kept(size, self.blocked, THINNED_BINS / self.pulses)
+        level = _level_at_bins(power, keep, 1.0, int(BLOCK_BINS * size / self.pulses))
+        return lambda frequency: np.maximum(level(np.rint(frequency * size) % size), LEAST_LEVEL)
 
     def left(self, samples: NDArray[np.complex128]) -> "Periodogram":
         """What is left of the same record, at the same local level."""
@@ -197,22 +222,30 @@ def local_level(power: NDArray[np.float64], keep: NDArray[np.bool_], floor: floa
     block : int
         Bins of a block.
     """
+    return _level_at_bins(power, keep, floor, block)(np.arange(len(power)))
+
+
+def _level_at_bins(
+    power: NDArray[np.float64], keep: NDArray[np.bool_], floor: float, block: int
+) -> Callable[[NDArray], NDArray[np.float64]]:
+    """`local_level` as a function of the bin."""
     size = len(power)
     count = max(4, size // block)
     length = size // count
     # the few bins that whole blocks leave over are skipped, evenly
     starts = (np.arange(count) * size) // count
     inside = starts[:, None] + np.arange(length)
-    held = np.where(keep[inside], power[inside], np.inf)
-    number = keep[inside].sum(axis=1)
+    kept = keep[inside]
+    held = np.where(kept, power[inside], np.inf)
+    number = kept.sum(axis=1)
     held.sort(axis=1)
     levels = held[np.arange(count), np.minimum(number // 4, length - 1)] / LEVEL_QUANTILE
     known = np.flatnonzero(number >= length / 3)
     if not len(known):
-        return np.full(size, floor)
-    levels = np.maximum(levels, 0.1 * floor)
-    middles = starts + length / 2
-    return np.exp(np.interp(np.arange(size), middles[known], np.log(levels[known]), period=size))
+        return lambda bins: np.full(np.shape(bins), floor)
+    logs = np.log(np.maximum(levels[known], 0.1 * floor))
+    middles = (starts + length / 2)[known]
+    return lambda bins: np.exp(np.interp(bins, middles, logs, period=size))
 
 
 def without_clicks(samples: NDArray[np.complex128]) -> NDArray[np.complex128]:
@@ -245,13 +278,13 @@ def prepare(iq: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float) -> P
     Periodogram or None
         None for a record without power.
     """
-    spectrum = doppler_spectrum(iq, carrier_hz=carrier_hz, prf_hz=prf_hz)
+    return prepared(iq, doppler_spectrum(iq, carrier_hz=carrier_hz, prf_hz=prf_hz))
+
+
+def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | None:
+    """`prepare` for a record whose spectrum is known."""
     if not spectrum.floor > 0:
         return None
-    return _prepare(iq, spectrum)
-
-
-def _prepare(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram:
     pulses = spectrum.pulses
     bin_mps = spectrum.prf_hz / pulses * spectrum.wavelength_m / 2
     widest = pulses / 16  # a slow radar must keep something to look at
@@ -269,7 +302,8 @@ def _prepare(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram:
     rest_db = float(spectrum.level_db[middle - 1 : middle + 2].max())
     rest_half = half_bins(NOTCH_MPS)
     offset = np.abs(spectrum.frequency_hz) * pulses / spectrum.prf_hz
-    skirt = (offset <= rest_half) & (np.abs(np.arange(spectrum.bins) - body.index) > LOBE_BINS + 1)
+    # it falls with the offset: what stands further out alone is a rotor's line
+    skirt = (offset <= min(rest_half, SKIRT_BINS)) & (np.abs(np.arange(spectrum.bins) - body.index) > LOBE_BINS + 1)
     # the only strong line, at rest, without a skirt: a body that hovers, not a background
     hovers = (
         abs(turns(body)) * pulses <= rest_half

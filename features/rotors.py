@@ -11,9 +11,9 @@ from scipy import fft
 
 from .comb import Comb
 from .comb_fit import CombFit, fit_combs
-from .comb_search import line_evidence, score
+from .comb_search import score
 from .flashes import flash_nats
-from .periodogram import BLOCK_BINS, LINE_DB, Periodogram, squared
+from .periodogram import LINE_DB, Periodogram, squared
 
 #: Rotors looked for at most.
 MAX_ROTORS = 8
@@ -41,6 +41,10 @@ LEAST_FLASH_LINES = 6
 LEFT_OVER, LEFT_SHARE = 0.3, 0.05
 LEAST_BINS = 100
 
+#: As does what is left where it comes, with so many of its deviations, to the mean rotor found: one more like it would
+#: not have been seen.
+HIDDEN_DEVIATIONS = 1.5
+
 #: Rates nearer than this are one: so many bins apart at the outermost order.
 RESOLVED_BINS = 0.9
 
@@ -62,6 +66,8 @@ class Rotors:
         Their lines.
     rest : ndarray of complex128, shape (pulses,)
         Samples that these leave.
+    next_rate : float
+        The rate that speaks loudest in these, be it of a rotor or not [cycles a sample].
     """
 
     rates: NDArray[np.float64]
@@ -70,21 +76,18 @@ class Rotors:
     spread: float
     fits: list[CombFit]
     rest: NDArray[np.complex128]
+    next_rate: float
 
 
 def _strongest(data: Periodogram, centre: float, rates: NDArray[np.float64]) -> tuple[float, int, float]:
     """Rate whose lines speak loudest by their powers and their flashes, how far they reach, and their evidence."""
     size = len(data.power)
-    evidence = line_evidence(data.power, int(BLOCK_BINS * size / data.pulses))
-    evidence[:, ~data.usable(np.arange(size) / size)] = 0.0
-    powers, _, reach = score(evidence, rates, np.full(len(rates), centre), even=True)
+    powers, _, reach = score(data.evidence, rates, np.full(len(rates), centre), even=True)
     order = np.arange(1, reach.max() + 1)
-    flashes = np.zeros(len(rates))
-    for sign in (-1, 1):
-        frequency = centre + sign * rates[:, None] * order
-        seen = data.usable(frequency) & (order <= reach[:, None])
-        place = np.rint(frequency * size).astype(np.intp) % size
-        flashes += flash_nats(np.where(seen, data.amplitude[place], 0))
+    frequency = centre + np.array([-1, 1])[:, None, None] * rates[:, None] * order
+    seen = data.usable(frequency) & (order <= reach[:, None])
+    place = np.rint(frequency * size).astype(np.intp) % size
+    flashes = flash_nats(np.where(seen, data.amplitude[place], 0)).sum(axis=0)
     sums = powers + flashes
     best = int(sums.argmax())
     return float(rates[best]), int(reach[best]), float(sums[best])
@@ -111,21 +114,36 @@ def _flashes_twice(fit: CombFit, per_turn: int) -> bool:
     return len(shares) == 2 and min(shares) > SECOND_FLASH_SHARE / 2 and sum(shares) > 2 * SECOND_FLASH_SHARE
 
 
-def _left_over(rest: Periodogram, fits: list[CombFit], edge: float) -> bool:
-    """True where more is left within the band than the noise beyond it."""
+def _left_over(rest: Periodogram, fits: list[CombFit], edge: float) -> tuple[bool, bool]:
+    """What is left within the band against the noise beyond it: whether it is clearly more, whether it may be a rotor.
+
+    Fitted lines take noise out with them: each as much as it was let free, those that lie in one another only once.
+    """
     frequency = fft.fftfreq(rest.pulses)
     away = np.abs(frequency - fits[0].centre)
     away = np.abs(away - np.rint(away))
     usable = rest.usable(frequency)
-    within = usable & (away < 0.9 * edge) & (away > 2 * fits[0].spacing)
+    low, high = 2 * fits[0].spacing, 0.9 * edge
+    within = usable & (away < high) & (away > low)
     beyond = usable & (away > 1.1 * edge)
     if within.sum() < LEAST_BINS or beyond.sum() < LEAST_BINS:
-        return False
+        return False, False
     power = squared(fft.fft(rest.samples)) / rest.pulses
     noise = float(power[beyond].mean())
     over = float(power[within].mean()) - noise
     lines = sum(float((np.abs(fit.amplitudes) ** 2).sum()) for fit in fits) * rest.pulses
-    return over > LEFT_OVER * noise and over * within.sum() > LEFT_SHARE * lines
+    clear = over > LEFT_OVER * noise and over * within.sum() > LEFT_SHARE * lines
+    range_bins = float(np.ptp([fit.spacing for fit in fits])) * rest.pulses
+    held, taken = 0.0, 0.0
+    for fit in fits:
+        order = np.abs(fit.orders)
+        inside = (order * fit.spacing < high) & (order * fit.spacing > low)
+        held += float((np.abs(fit.amplitudes[inside]) ** 2).sum()) * rest.pulses / len(fits)
+        apart = np.minimum(1.0, (1 + order[inside] * range_bins) / len(fits))
+        taken += float((apart * fit.snr[inside] / (1 + fit.snr[inside])).sum())
+    deviation = noise * float(np.sqrt(1 / within.sum() + 1 / beyond.sum()))
+    most = over + noise * taken / within.sum() + HIDDEN_DEVIATIONS * deviation
+    return clear, most * within.sum() > held
 
 
 def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
@@ -152,14 +170,14 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
             centre = line
     reach = max(comb.last // comb.per_turn, int(np.clip(round(edge / nominal), 1, 0.45 / nominal)))
     resolution = RESOLVED_BINS / (reach * data.pulses)
-    alone = Rotors(np.array([nominal]), np.array([comb.chopping_std]), True, 0.0, [comb.fit], comb.rest)
+    alone = Rotors(np.array([nominal]), np.array([comb.chopping_std]), True, 0.0, [comb.fit], comb.rest, nominal)
     if reach * RATE_SPREAD * nominal * data.pulses < 2:
         return alone
     rates = np.arange(nominal * (1 - RATE_SPREAD), nominal * (1 + RATE_SPREAD), resolution / 4)
     fits: list[CombFit] = []
     reaches: list[int] = []
     rest = data
-    first, spread = 0.0, 0.0
+    first, spread, rate = 0.0, 0.0, nominal
     resolved = True
     while len(fits) < MAX_ROTORS:
         rate, far, evidence = _strongest(rest, centre, rates)
@@ -190,7 +208,7 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
     if len(found) > 1 and np.diff(found).min() < resolution:
         return replace(alone, resolved=False, spread=float(np.ptp(found)))
     spread = float(np.ptp(found)) if resolved else max(spread, float(np.ptp(found)))
-    return Rotors(found, np.array([fit.spacing_std for fit in fits]), resolved, spread, fits, rest.samples)
+    return Rotors(found, np.array([fit.spacing_std for fit in fits]), resolved, spread, fits, rest.samples, rate)
 
 
 def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float) -> Rotors:
@@ -207,8 +225,12 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float) -> Rotors
         return rotors
     several = len(rotors.fits) > 1
     twice = any(_flashes_twice(fit, 1 if several else comb.per_turn) for fit in rotors.fits)
-    # what a single rotor leaves may be a change of its rate
-    if not twice and not (several and _left_over(data.left(rotors.rest), rotors.fits, edge)):
+    clear, hidden = _left_over(data.left(rotors.rest), rotors.fits, edge)
+    # a little that a single rotor leaves may be a change of its rate
+    if not (twice or hidden or (several and clear)):
         return rotors
     reach = max(int(np.abs(rotors.fits[0].orders).max()), 1)
-    return replace(rotors, resolved=False, spread=max(rotors.spread, RESOLVED_BINS / (reach * data.pulses)))
+    spread = max(rotors.spread, RESOLVED_BINS / (reach * data.pulses))
+    if hidden and not several:
+        spread = max(spread, abs(rotors.next_rate - float(rotors.rates[0])))
+    return replace(rotors, resolved=False, spread=spread)

@@ -25,6 +25,21 @@ _OTHER_NODES = np.array([[other for other in range(6) if other != node] for node
 _NODE_SCALES = 1 / (_NODES[:, None] - _NODES[_OTHER_NODES]).prod(axis=1)
 
 
+def times(matrix: NDArray[np.float64], columns: NDArray[np.complexfloating]) -> NDArray[np.complex128]:
+    """Real matrix times complex columns; numpy would turn the matrix into a complex one each time."""
+    return whole(matrix @ parts(columns)).reshape(len(matrix), *columns.shape[1:])
+
+
+def parts(columns: NDArray[np.complexfloating]) -> NDArray[np.float64]:
+    """Real and imaginary parts as columns of their own."""
+    return np.ascontiguousarray(columns).view(np.float64).reshape(len(columns), -1)
+
+
+def whole(both: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """The way back from `parts`, shape (rows, columns)."""
+    return np.ascontiguousarray(both).view(np.complex128)
+
+
 @lru_cache(maxsize=32)
 def slepian(pulses: int, half_bins: float) -> NDArray[np.float64]:
     """Orthonormal sequences that hold the signals within so many bins of frequency 0, shape (sequences, pulses).
@@ -65,10 +80,9 @@ def remove_bands(samples: NDArray[np.complex128], bands: Iterable[tuple[float, f
     """
     bands = tuple(bands)
     pulses = len(samples)
-    time = np.arange(pulses) - (pulses - 1) / 2
-    turns = [np.exp(2j * np.pi * centre * time) for centre, _ in bands]
+    turns = [_turn(pulses, centre) for centre, _ in bands]
     bases = [slepian(pulses, float(half)) for _, half in bands]
-    seen = [basis @ (samples * turn.conj()) for basis, turn in zip(bases, turns, strict=True)]
+    seen = [times(basis, samples * turn.conj()) for basis, turn in zip(bases, turns, strict=True)]
     if len(bands) > 1:
         # jointly: taken out one after the other, each band would keep what the first took of the second's strong line
         factor = np.concatenate([np.where(_odd(basis), 1j, 1) for basis in bases])
@@ -76,8 +90,16 @@ def remove_bands(samples: NDArray[np.complex128], bands: Iterable[tuple[float, f
         seen = np.split(together, np.cumsum([len(basis) for basis in bases])[:-1])
     out = samples
     for amplitudes, basis, turn in zip(seen, bases, turns, strict=True):
-        out = out - turn * (amplitudes @ basis)
+        out = out - turn * times(basis.T, amplitudes)
     return np.asarray(out, np.complex128)
+
+
+@lru_cache(maxsize=4)
+def _turn(pulses: int, frequency: float) -> NDArray[np.complex128]:
+    """The unit line of a frequency [cycles a sample], time from the middle of the record."""
+    out = np.exp(2j * np.pi * frequency * (np.arange(pulses) - (pulses - 1) / 2))
+    out.setflags(write=False)
+    return out
 
 
 def _odd(basis: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -138,7 +160,8 @@ def without_bands(
         sign = 1 - 2 * (turns % 2) * (pulses % 2 == 0)
         gaps = (place - first)[:, None] - nodes
         weights = gaps[:, _OTHER_NODES].prod(axis=-1) * _NODE_SCALES * sign[:, None]
-        held = np.einsum("ln,lnks->lks", weights, table[first[:, None] + nodes])
+        about = table.take(first[:, None] + nodes, axis=0).reshape(*gaps.shape, -1)
+        held = (weights[:, None, :] @ about).reshape(-1, *table.shape[1:])
         plains.append(held[:, 0])
         timeds.append(held[:, 1])
     if not plains:

@@ -1,0 +1,58 @@
+"""Running sums of what speaks for the lines of many combs, order by order."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Lines summed at once: they must stay in the cache. And orders at least and at most.
+LINES_AT_ONCE, ORDERS_AT_ONCE = 8000, (16, 64)
+
+#: Line SNRs whose evidence is summed side by side, at most: they are taken from the table as one complex number.
+MOST_SNRS = 4
+
+
+def running_sums(
+    evidence: NDArray[np.float32], starts: NDArray[np.float64], steps: NDArray[np.float64], reach: float
+) -> Iterator[NDArray[np.float32]]:
+    """Sum the evidence of the lines of combs, from the first order to each further one.
+
+    Parameters
+    ----------
+    evidence : ndarray of float32, shape (line SNRs, bins)
+        Of each bin, at most `MOST_SNRS` line SNRs.
+    starts : ndarray, shape (sides, combs)
+        Place of each comb's order 0 [bins].
+    steps : ndarray, shape (sides, combs)
+        From line to line [bins]; their sizes rise, and are the same on every side.
+    reach : float
+        Lines up to so far from order 0 count [bins].
+
+    Yields
+    ------
+    ndarray of float32, shape (orders, sides, combs, MOST_SNRS)
+        Sums out to each of the next orders, of the first combs only: of those that still have lines within reach.
+        Past its last line a comb's sums stay as they are; 0 where there is no such line SNR.
+    """
+    table = np.zeros((evidence.shape[1], MOST_SNRS), np.float32)
+    table[:, : len(evidence)] = evidence.T
+    lines = table.view(np.complex128)[:, 0]
+    nearest = starts + 0.5
+    outermost = reach / np.abs(steps[0])
+    before = np.zeros((*starts.shape, MOST_SNRS), np.float32)
+    first, last = 1, int(outermost.max(initial=0))
+    while first <= last:
+        some = int(np.searchsorted(-outermost, -first, side="right"))
+        count = int(np.clip(LINES_AT_ONCE // (len(starts) * some), *ORDERS_AT_ONCE))
+        order = np.arange(first, min(first + count, last + 1))[:, None, None]
+        first += len(order)
+        every = int(np.searchsorted(-outermost, -order[-1, 0, 0], side="right"))
+        place = order * steps[:, :some]
+        place += nearest[:, :some]
+        seen = lines.take(place.astype(np.intp), mode="clip")
+        seen[..., every:] *= order <= outermost[every:some]
+        sums = seen.view(np.float32).reshape(*seen.shape, MOST_SNRS)
+        for inner, outer in zip((before[:, :some], *sums[:-1]), sums, strict=True):
+            outer += inner
+        before = sums[-1]
+        yield sums

@@ -1,0 +1,41 @@
+"""What speaks for a line in each bin of a periodogram."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Line powers over noise that a comb may have, and the share of its lines that may be missing.
+LINE_SNRS = (1.2, 6.0, 40.0)
+MISSING_SHARE = 0.15
+
+#: No single line speaks for more than this [nats]: a lone line is no comb.
+LINE_CAP = 5.0
+
+#: A line weaker than its neighbourhood by this factor in power is a leak or an imbalance, not a line of the comb.
+NEIGHBOUR_SHARE = 0.03
+
+
+def line_evidence(power: NDArray[np.floating], block: int) -> NDArray[np.float32]:
+    """Log likelihood ratio of a line against noise in every bin [nats], shape (len(LINE_SNRS), bins).
+
+    Line and noise are complex Gaussian of the variances 1 + snr and 1, or the line is missing. Lines far below the
+    strongest of their neighbourhood are leaks or an imbalance of the blades and count less.
+
+    Parameters
+    ----------
+    power : ndarray, shape (bins,)
+        Power over noise, FFT order.
+    block : int
+        Bins of a neighbourhood.
+    """
+    from scipy.ndimage import maximum_filter1d  # here, because predicting needs no such import
+
+    power = power.astype(np.float32)
+    strongest = maximum_filter1d(power, block, mode="wrap")
+    held = power / (1 + np.float32(NEIGHBOUR_SHARE) * np.maximum(strongest - 10, 0))
+    held = np.minimum(held, np.float32(60))
+    snr = np.array(LINE_SNRS, np.float32)[:, None]
+    out = np.exp(held * (snr / (1 + snr)))
+    out *= (1 - MISSING_SHARE) / (1 + snr)
+    out += np.float32(MISSING_SHARE)
+    np.log(out, out=out)
+    return np.asarray(np.minimum(out, np.float32(LINE_CAP), out=out), np.float32)

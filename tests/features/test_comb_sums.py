@@ -1,0 +1,36 @@
+"""Sums of evidence along combs: against plain loops, and the quick scores against the full ones."""
+
+import numpy as np
+import pytest
+from bladewing.features.comb_search import heights, score
+from bladewing.features.comb_sums import MOST_SNRS, running_sums
+
+
+@pytest.mark.parametrize("combs", [1, 40, 900])
+def test_running_sums_are_those_of_a_loop(combs):
+    rng = np.random.default_rng(combs)
+    bins, reach = 2000, 900.0
+    evidence = rng.standard_normal((3, bins)).astype(np.float32)
+    steps = np.sort(rng.uniform(7, 120, (1, combs)))
+    starts = rng.uniform(5, 90, (1, combs))
+    blocks = list(running_sums(evidence, starts, steps, reach))
+    for comb in {0, combs // 2, combs - 1}:
+        order = np.arange(1, int(reach / steps[0, comb]) + 1)
+        places = np.floor(starts[0, comb] + order * steps[0, comb] + 0.5).astype(int)
+        own = np.concatenate([block[:, 0, comb] for block in blocks if comb < block.shape[2]])
+        np.testing.assert_allclose(own[: len(order), :3], evidence[:, places].cumsum(axis=1).T, atol=1e-3)
+        # nothing is added past the last line, nor for a line SNR that is not there
+        np.testing.assert_array_equal(own[len(order) :], own[[len(order) - 1]].repeat(len(own) - len(order), axis=0))
+        assert own.shape[1] == MOST_SNRS
+        assert not own[:, 3:].any()
+
+
+def test_heights_are_the_scores():
+    rng = np.random.default_rng(5)
+    evidence = (rng.standard_normal((3, 4001)) - 0.2).astype(np.float32)
+    spacings = np.exp(rng.uniform(np.log(0.004), np.log(0.2), 300))
+    centres = rng.uniform(-0.7, 0.7, 300)
+    expected, low, high = score(evidence, spacings, centres)
+    np.testing.assert_allclose(heights(evidence, spacings, centres), expected, atol=1e-3)
+    assert np.any(-low != high)  # some of them reach unequally far
+    assert len(heights(evidence, spacings[:0], centres[:0])) == 0
