@@ -75,6 +75,30 @@ def _smoother(comb: NDArray[np.intp], order: NDArray[np.intp]) -> Callable[[NDAr
     return smooth
 
 
+def _fisher(
+    weighed: NDArray[np.complex128],
+    design: NDArray[np.float64],
+    factor: NDArray[np.float64],
+    first: NDArray[np.float64],
+    second: NDArray[np.float64],
+    pulses: int,
+) -> NDArray[np.float64]:
+    """Fisher matrix of centre and spacings with the amplitudes eliminated, these over the rms of the noise about them.
+
+    The other arguments are those of `fit_combs`: the factored products of the lines, and their first and second
+    moments.
+    """
+    from scipy.linalg import lapack
+
+    sway = np.asarray(weighed[:, None] * design, np.complex128)
+    leaked = times(first, sway)
+    kept = whole(lapack.dpotrs(factor, parts(leaked))[0])
+    fisher = (sway.conj().T @ times(second, sway) - leaked.conj().T @ kept).real
+    fisher *= 8 * np.pi**2 * pulses
+    fisher[np.diag_indices_from(fisher)] *= 1 + 1e-9
+    return np.asarray(fisher, np.float64)
+
+
 def fit_combs(
     data: Periodogram,
     centre: float,
@@ -147,15 +171,9 @@ def fit_combs(
         left = seen - times(plain, amplitudes)
         snr = np.maximum(smooth(np.abs(amplitudes + left) ** 2 * pulses / level) - 1, 1e-3)
         slope = moment - 1j * times(first.T, amplitudes)
-        weighed = np.where(used, amplitudes, 0.0) / np.sqrt(level)
         # the score of each line's frequency, and the Fisher matrix of centre and spacings
-        pull = (weighed.conj() * slope).imag / np.sqrt(level) * (4 * np.pi * pulses)
-        sway = np.asarray(weighed[:, None] * design, np.complex128)
-        leaked = times(first, sway)
-        kept = whole(lapack.dpotrs(factor, parts(leaked))[0])
-        fisher = (sway.conj().T @ times(second, sway) - leaked.conj().T @ kept).real
-        fisher *= 8 * np.pi**2 * pulses
-        fisher[np.diag_indices_from(fisher)] *= 1 + 1e-9
+        pull = np.where(used, (amplitudes.conj() * slope).imag / level * (4 * np.pi * pulses), 0.0)
+        fisher = _fisher(np.where(used, amplitudes, 0.0) / np.sqrt(level), design, factor, first, second, pulses)
         step = np.linalg.solve(fisher, design.T @ pull)
         step = np.clip(step, -limit, limit)
         if np.all(step**2 * np.diag(fisher) < ENOUGH**2):
@@ -166,9 +184,11 @@ def fit_combs(
             level = data.level_of(rest)(frequency)
             relevelled = True
         values = values + step
-    covariance = np.linalg.inv(fisher)
-    std = np.sqrt(np.maximum(np.diag(covariance), 0))
     rest = remove_bands(data.samples - sum_of_lines(pulses, frequency, amplitudes), data.bands)
+    if not relevelled and count > 1:  # between several combs' lines the level was theirs: the noise is less
+        level = data.level_of(rest)(frequency)
+        fisher = _fisher(np.where(used, amplitudes, 0.0) / np.sqrt(level), design, factor, first, second, pulses)
+    std = np.sqrt(np.maximum(np.diag(np.linalg.inv(fisher)), 0))
     out = []
     for number in range(count):
         own = (comb == number) & used

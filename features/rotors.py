@@ -28,8 +28,8 @@ LEAST_SHARE = 0.03
 #: A comb weaker than this share of the strongest is what a rate that changed within the dwell leaves behind.
 LEAST_POWER_SHARE = 0.12
 
-#: Steps of the joint fit each time a rotor is added.
-JOINT_STEPS = 3
+#: Steps of the joint fit each time a rotor is added, and once all are found: only then their deviations matter.
+JOINT_STEPS, LAST_STEPS = 2, 4
 
 #: A rotor flashes once a period on each side of the body. A second flash of this share of the first one's power is
 #: another rotor's, of a rate that the dwell does not tell apart; so far from the first it is no part of it [1 / lines].
@@ -203,6 +203,11 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
         fits, rest, reaches = together, data.left(samples), [*reaches, far]
     if not fits:
         return alone
+    if len(fits) > 1:
+        polished = fit_combs(data, fits[0].centre, [fit.spacing for fit in fits], [(-r, r) for r in reaches], LAST_STEPS)
+        if polished is not None:
+            fits, samples = polished
+            rest = data.left(samples)
     fits.sort(key=lambda fit: fit.spacing)
     found = np.array([fit.spacing for fit in fits])
     if len(found) > 1 and np.diff(found).min() < resolution:
