@@ -204,7 +204,9 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
     if not fits:
         return alone
     if len(fits) > 1:
-        polished = fit_combs(data, fits[0].centre, [fit.spacing for fit in fits], [(-r, r) for r in reaches], LAST_STEPS)
+        polished = fit_combs(
+            data, fits[0].centre, [fit.spacing for fit in fits], [(-r, r) for r in reaches], LAST_STEPS
+        )
         if polished is not None:
             fits, samples = polished
             rest = data.left(samples)
