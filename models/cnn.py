@@ -235,7 +235,8 @@ class EvidenceNet(nn.Module):
 class SpectrumNet(EvidenceNet):
     """1-D network over the velocity spectrum, alone or beside other evidence.
 
-    XXX parameters.
+    About 59 000 parameters and 0.9 million multiplications a record of 3 x 256 beside rates of 2 x 96 and measurements;
+    twice as wide, 154 000 and 3.1 million.
 
     Parameters
     ----------
