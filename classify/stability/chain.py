@@ -14,6 +14,7 @@ from .cell import Cell, Outcome, sweep
 from .spectra import ODD
 
 _GAINS = (1e-30, 1e-20, 1e-10, 1e10, 1e20, 1e30)
+_NEAR_M = 300.0
 _RANGES_M = (1e3, 1e4, 1e5, 1e6, 1e7)
 _SCENES = ("quadcopter", "hexacopter", "helicopter", "fixed_wing", "type1", "gulls_and_drone")
 _POINTS = "change of accuracy [points]"
@@ -36,10 +37,10 @@ def cells(quick: bool) -> Iterator[Cell]:
         "{:g}".format,
     )
     seeds = range(2 if quick else 20)
-    near = _scene_answers(classifier, 300.0, seeds)
+    near = _scene_answers(classifier, _NEAR_M, seeds)
     yield from sweep(
         "whole chain",
-        f"range, {len(near)} dwells of UAV scenes against 300 m",
+        f"range, {len(near)} dwells of UAV scenes against {_NEAR_M:g} m",
         _RANGES_M,
         _POINTS,
         0.2,
@@ -88,12 +89,18 @@ def _accuracy(classifier: Classifier, gain: float, count: int) -> float:
 
 
 def _scene_answers(classifier: Classifier, range_m: float, seeds: range) -> NDArray[np.bool_]:
-    """Whether each rendering's most probable class is "uav", the scenes put at this range."""
+    """Whether each rendering's most probable class is "uav", the scenes put at about this range.
+
+    Whole half wavelengths away from the nearest one: the phases between target and surroundings are the same there, so
+    that an answer changes by what the numbers lose alone.
+    """
     answers = []
     for name in _SCENES:
         scene = Scene.load(name)
         plain = scene.model_dump(mode="python", exclude_unset=True)
-        moved = Scene.build({**plain, **{kind: [{**p, "range_m": range_m} for p in plain[kind]] for kind in ("uav",)}})
+        half_m = scene.sight.wavelength_m / 2
+        away_m = _NEAR_M + round((range_m - _NEAR_M) / half_m) * half_m
+        moved = Scene.build({**plain, "uav": [{**one, "range_m": away_m} for one in plain["uav"]]})
         for seed in seeds:
             radar = moved.sight
             answer = classifier.predict(moved.render(seed).iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
