@@ -49,8 +49,10 @@ def test_rates_levels_and_lengths_of_records_follow_their_laws(seed):
     mass = np.sort(bird["mass_kg"])
     assert distance(mass, distribution(LAWS["bird_mass_kg"], mass)) < 3
     expected_hz = wingbeat_hz(bird["mass_kg"], *wing_size(bird["mass_kg"]))
-    ratio = np.sort(bird["wingbeat_hz"] / expected_hz)
-    assert distance(ratio, distribution(LAWS["wingbeat_scatter"], ratio)) < 3 or bird["wingbeat_hz"].max() == 18.0
+    slow = expected_hz * LAWS["wingbeat_scatter"].high < 18  # no bird's mean rate is higher
+    ratio = np.sort((bird["wingbeat_hz"] / expected_hz)[slow])
+    # the rate that is rendered is up to a twentieth off the mean that the law draws
+    assert distance(ratio, distribution(LAWS["wingbeat_scatter"], ratio)) < 4
 
 
 def test_box_and_muller_give_normal_numbers():
