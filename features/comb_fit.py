@@ -75,6 +75,13 @@ def _smoother(comb: NDArray[np.intp], order: NDArray[np.intp]) -> Callable[[NDAr
     return smooth
 
 
+def _weighed(
+    amplitudes: NDArray[np.complex128], used: NDArray[np.bool_], level: NDArray[np.float64]
+) -> NDArray[np.complex128]:
+    """Amplitudes over the rms of the noise about them, 0 where a line does not count."""
+    return np.asarray(amplitudes * used / np.sqrt(level), np.complex128)
+
+
 def _fisher(
     weighed: NDArray[np.complex128],
     design: NDArray[np.float64],
@@ -173,7 +180,7 @@ def fit_combs(
         slope = moment - 1j * times(first.T, amplitudes)
         # the score of each line's frequency, and the Fisher matrix of centre and spacings
         pull = np.where(used, (amplitudes.conj() * slope).imag / level * (4 * np.pi * pulses), 0.0)
-        fisher = _fisher(np.where(used, amplitudes, 0.0) / np.sqrt(level), design, factor, first, second, pulses)
+        fisher = _fisher(_weighed(amplitudes, used, level), design, factor, first, second, pulses)
         step = np.linalg.solve(fisher, design.T @ pull)
         step = np.clip(step, -limit, limit)
         if np.all(step**2 * np.diag(fisher) < ENOUGH**2):
@@ -187,7 +194,7 @@ def fit_combs(
     rest = remove_bands(data.samples - sum_of_lines(pulses, frequency, amplitudes), data.bands)
     if not relevelled and count > 1:  # between several combs' lines the level was theirs: the noise is less
         level = data.level_of(rest)(frequency)
-        fisher = _fisher(np.where(used, amplitudes, 0.0) / np.sqrt(level), design, factor, first, second, pulses)
+        fisher = _fisher(_weighed(amplitudes, used, level), design, factor, first, second, pulses)
     std = np.sqrt(np.maximum(np.diag(np.linalg.inv(fisher)), 0))
     out = []
     for number in range(count):
