@@ -298,8 +298,10 @@ def _network(
     shapes = {key: INPUT_SHAPES[key] for key in LADDER[name].inputs}
     signal = LADDER[name].inputs[0]
     image = len(shapes[signal]) == 3
-    net: EvidenceNet = (ImageNet if image else partial(SpectrumNet, widen=LADDER[name].widen))(
-        shapes, seed=settings.seed
+    net: EvidenceNet = (
+        ImageNet(shapes, seed=settings.seed)
+        if image
+        else SpectrumNet(shapes, seed=settings.seed, widen=LADDER[name].widen)
     )
 
     def inputs(part: Gathered) -> dict[str, NDArray]:

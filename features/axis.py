@@ -41,6 +41,12 @@ def axis_velocities_mps(bins: int) -> NDArray[np.float64]:
     return (edges[1:] + edges[:-1]) / 2
 
 
+def expected_peak(counts: NDArray[np.intp], bandwidth: float) -> NDArray[np.float32]:
+    """Mean of the largest of so many bins of noise of unit power, of which `bandwidth` neighbours are alike."""
+    independent = np.maximum(counts / bandwidth, 1)
+    return np.maximum(np.log(independent) + np.euler_gamma, 1).astype(np.float32)
+
+
 @dataclass(frozen=True)
 class Pooling:
     """How one radar's bins fall onto the shared axis: on both sides alike, so a mirrored spectrum is mirrored there.
@@ -178,8 +184,7 @@ class Pooling:
     @cached_property
     def expected_peak(self) -> NDArray[np.float32]:
         """Mean of the largest of so many exponentials, in rising velocity."""
-        independent = np.maximum(self.spans[1] / NOISE_BANDWIDTH_BINS, 1)
-        return np.maximum(np.log(independent) + np.euler_gamma, 1).astype(np.float32)
+        return expected_peak(self.spans[1], NOISE_BANDWIDTH_BINS)
 
     @cached_property
     def _per_expected_peak(self) -> NDArray[np.float32]:

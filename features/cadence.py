@@ -5,16 +5,16 @@ on the mean, so the power over time shows rotors that the levels of the spectrum
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .axis import UNSEEN_DB
+from .axis import UNSEEN_DB, expected_peak
 from .notch import Mask, weights
 from .schema import CADENCE_BINS
-from .spectrum import Spectrum, per_floor, squared, sums, taper, to_db
+from .spectrum import Spectrum, means, per_floor, power_of, taper, to_db
 
 #: Range of the shared axis of rates [Hz]: from slow wings to the tenth flash of the fastest propeller.
 CADENCE_RANGE_HZ = (1.5, 6000.0)
@@ -60,11 +60,10 @@ class CadencePlan:
     seen: slice
     bins: int
 
-    @property
+    @cached_property
     def expected_peak(self) -> NDArray[np.float32]:
         """Mean of the largest of so many exponentials, a bin."""
-        independent = np.maximum(self.spans[1] / _HANN_LINES, 1)
-        return np.maximum(np.log(independent) + np.euler_gamma, 1).astype(np.float32)
+        return expected_peak(self.spans[1], _HANN_LINES)
 
 
 def cadence_edges_hz(bins: int = CADENCE_BINS) -> NDArray[np.float64]:
@@ -129,9 +128,9 @@ def power_over_time(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     plan = cadence_plan(spectrum.pulses, spectrum.prf_hz)
     # a centred spectrum gives samples of alternating sign: their power is the same
     samples = fft.ifft(spectrum.transform * weights(mask), overwrite_x=True)[..., plan.span]
-    power = squared(samples)
+    power = power_of(samples)
     power *= plan.per_taper
-    mean = sums(power) * np.float32(1 / power.shape[-1])
+    mean = means(power)
     power *= per_floor(np.maximum(mean, spectrum.transform_floor * np.float32(LEAST_MEAN)))[..., None]
     return power
 
@@ -155,9 +154,9 @@ def cadence_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     plan = cadence_plan(spectrum.pulses, spectrum.prf_hz)
     power = power_over_time(spectrum, mask)
     np.minimum(power, np.float32(CLIP), out=power)
-    power -= (sums(power) * np.float32(1 / power.shape[-1]))[..., None]
+    power -= means(power)[..., None]
     power *= plan.hann
-    lines = squared(fft.rfft(power, overwrite_x=True))
+    lines = power_of(fft.rfft(power, overwrite_x=True))
     out = np.full((*lines.shape[:-1], 2, plan.bins), UNSEEN_DB, np.float32)
     starts, counts = plan.spans
     if len(starts):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axis import pooling
-from .spectrum import Spectrum, at_least, centred_power, per_floor, scaled, sums, windows
+from .spectrum import Spectrum, at_least, centred_power, means, per_floor, scaled, sums, windows
 
 #: Parts of a dwell, half overlapping, each a quarter of it long.
 PARTS = 7
@@ -101,7 +101,7 @@ def centroid_mps(parts: NDArray[np.float32], axis_mps: NDArray[np.float32]) -> N
 
 def busy_db(parts: NDArray[np.float32]) -> NDArray[np.float32]:
     """Mean level over the axis in each part [dB], shape (..., PARTS): flashes and wing strokes lift single parts."""
-    return sums(parts) * np.float32(1 / parts.shape[-1])
+    return means(parts)
 
 
 def swing(values: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -1,6 +1,6 @@
 """Measurements of a dwell with their standard deviations: body, chopping, single rotors, band, blade."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -199,14 +199,12 @@ def measure(
 
 
 def _record(spectrum: Spectrum, index: tuple[int, ...]) -> Spectrum:
-    return Spectrum(
-        spectrum.relative_power[index],
-        spectrum.floor[index],
-        spectrum.carrier_hz,
-        spectrum.prf_hz,
-        spectrum.pulses,
-        spectrum.scale[index],
-        spectrum.transform[index],
+    return replace(
+        spectrum,
+        relative_power=spectrum.relative_power[index],
+        floor=spectrum.floor[index],
+        scale=spectrum.scale[index],
+        transform=spectrum.transform[index],
     )
 
 
@@ -362,7 +360,7 @@ def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | No
     half = int(half_bins * size / pulses)
     # what lies between the lines lifts the local level: the noise is that of most of the span, and the floor at most
     bins = np.arange(size) / size
-    floor = min(float(np.median(data.level_of(rotors.rest)(bins)[data.usable(bins)])), 1.0)
+    floor = min(float(np.median(data.level_of(rotors.rest)(bins)[data.seen])), 1.0)
     total, number = np.zeros(len(order)), np.zeros(len(order))
     for sign in (-1, 1):
         middle = np.rint((centre + sign * order * nominal) * size).astype(np.intp)

@@ -107,12 +107,12 @@ class Periodogram:
     @cached_property
     def evidence(self) -> NDArray[np.float32]:
         """Evidence of a line in every bin [nats], 0 where it cannot be seen, shape (line SNRs, bins)."""
-        return self._evidence * self._seen
+        return self._evidence * self.seen
 
     @cached_property
     def contrast(self) -> NDArray[np.float32]:
         """The same over what any place near by has, where lines fill that: see `octaves.over_neighbours`."""
-        return over_neighbours(self._evidence, self._block) * self._seen
+        return over_neighbours(self._evidence, self._block) * self.seen
 
     @cached_property
     def _evidence(self) -> NDArray[np.float32]:
@@ -123,9 +123,9 @@ class Periodogram:
         """Bins of a neighbourhood."""
         return int(BLOCK_BINS * len(self.power) / self.pulses)
 
-    @property
-    def _seen(self) -> NDArray[np.bool_]:
-        """Where a line can be seen."""
+    @cached_property
+    def seen(self) -> NDArray[np.bool_]:
+        """True in the bins of `power` where a line can be seen."""
         size = len(self.power)
         return self.usable(np.arange(size) / size)
 

@@ -127,6 +127,11 @@ def sums(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.vecdot(values, ones(values.shape[-1]))
 
 
+def means(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Means along the last axis, in the same way."""
+    return sums(values) * np.float32(1 / values.shape[-1])
+
+
 def windows(values: NDArray, shape: tuple[int, ...], steps: tuple[int, ...], first: int = 0) -> NDArray:
     """The last axis from an element on seen as axes of so many elements and steps, shape (..., *shape), to be read."""
     values = np.ascontiguousarray(values)
@@ -198,7 +203,7 @@ def centred_power(iq: NDArray[np.complex64], bins: int | None = None) -> NDArray
     -------
     ndarray of float32, shape (..., bins)
     """
-    return squared(centred_transform(iq, bins))
+    return power_of(centred_transform(iq, bins))
 
 
 def centred_transform(iq: NDArray[np.complex64], bins: int | None = None) -> NDArray[np.complex64]:
@@ -212,7 +217,7 @@ def centred_transform(iq: NDArray[np.complex64], bins: int | None = None) -> NDA
     return transform if even else fft.fftshift(transform, axes=-1)
 
 
-def squared(transform: NDArray[np.complex64]) -> NDArray[np.float32]:
+def power_of(transform: NDArray[np.complex64]) -> NDArray[np.float32]:
     """Power of complex values."""
     power = np.abs(transform)
     return np.multiply(power, power, out=power)
@@ -325,7 +330,7 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spec
             raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
     scale = safe_scale(samples)
     transform = centred_transform(scaled(samples, scale))
-    power = squared(transform)
+    power = power_of(transform)
     floor = noise_floor(power)
     floor = np.maximum(floor, sums(power) * (LEAST_FLOOR / np.float32(power.shape[-1])))
     natural = floor / np.square(scale[..., 0], dtype=np.float64)

@@ -104,9 +104,7 @@ def _branch(shape: tuple[int, ...]) -> nn.Sequential:
         _Convolution(inputs, outputs, (1, kernel), (1, 2))
         for inputs, outputs, kernel in zip((shape[0], *_RATES[:-1]), _RATES, (7, 5, 5), strict=True)
     ]
-    left = shape[1]
-    for _ in convolutions:
-        left = (left + 1) // 2
+    left = -(-shape[1] // 2 ** len(convolutions))  # each stride halves, rounding up
     dense = nn.Linear(_RATES[-1] * left, _BRANCH)
     return nn.Sequential(nn.Unflatten(1, (shape[0], 1)), *convolutions, nn.Flatten(), dense, nn.ReLU())
 

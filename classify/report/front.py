@@ -296,8 +296,8 @@ def _row(
         words, model, size = "measurements", "boosted trees", INPUT_SHAPES[FEATURES][0]
     else:
         assert given is not None
-        *first, last = (one.replace("_", " ") for one in given.inputs)
-        words, model = " and ".join([*([", ".join(first)] if first else []), last]), name
+        words = " and ".join(", ".join(given.inputs).replace("_", " ").rsplit(", ", 1))
+        model = name
         size = sum(int(np.prod(INPUT_SHAPES[one])) for one in given.inputs)
     dwells = [
         {"dwell_s": dwell_s, **gives, **takes, "operations": takes["input_operations"] + cost["model_operations"]}

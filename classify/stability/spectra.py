@@ -1,6 +1,7 @@
 """Stages of the features against the same arithmetic in long double, exact invariances and known truth."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from bladewing.features import measure
@@ -127,15 +128,7 @@ def _scaled(iq: NDArray[np.complex64], gain: float) -> NDArray[np.complex64]:
 
 def _long(spectrum: Spectrum) -> Spectrum:
     """The same spectrum in long double, for stages that keep the type they are given."""
-    return Spectrum(
-        spectrum.relative_power.astype(np.longdouble),
-        spectrum.floor,
-        spectrum.carrier_hz,
-        spectrum.prf_hz,
-        spectrum.pulses,
-        spectrum.scale,
-        spectrum.transform,
-    )
+    return replace(spectrum, relative_power=spectrum.relative_power.astype(np.longdouble))
 
 
 def _exact_cepstrum(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.longdouble]:

@@ -6,7 +6,7 @@ from .. import cadence as definition
 from ..axis import UNSEEN_DB
 from ..spectrum import Spectrum
 from .operators import Value
-from .spectrum import dft, pooled, squared
+from .spectrum import dft, pooled, power_of
 
 
 def cadence_db(radar: Spectrum, transform: tuple[Value, Value], floor: Value, kept: Value) -> Value:
@@ -15,12 +15,12 @@ def cadence_db(radar: Spectrum, transform: tuple[Value, Value], floor: Value, ke
     re, im = (part * kept for part in transform)
     # back in time by the conjugate: the power is the same
     packed = graph.concat(re.reshape(-1, 1, radar.bins), -im.reshape(-1, 1, radar.bins), axis=1)
-    samples = squared(dft(packed, radar.bins, plan.span.stop))
+    samples = power_of(dft(packed, radar.bins, plan.span.stop))
     power = samples.slice(plan.span.start, plan.span.stop) * (plan.per_taper / np.float32(radar.bins**2))
     mean = power.mean().at_least(floor * definition.LEAST_MEAN)
     power = (power / mean).at_most(definition.CLIP)
     count = plan.span.stop - plan.span.start
-    lines = squared(dft((power - power.mean()) * plan.hann, count, count // 2 + 1, real=True))
+    lines = power_of(dft((power - power.mean()) * plan.hann, count, count // 2 + 1, real=True))
     if not len(plan.spans[0]):  # the dwell tells no rate of the axis
         nothing = np.full((1, 2, plan.bins), UNSEEN_DB, np.float32)
         return lines.slice(0, 1).reshape(-1, 1, 1) * 0.0 + nothing

@@ -28,7 +28,7 @@ from .measurements import (
     threshold_width_hz,
 )
 from .operators import Graph, Value
-from .spectrum import centred_power, centred_transform, noise_floor, pooled, pooled_mean, squared, to_db, unit_scale
+from .spectrum import centred_power, centred_transform, noise_floor, pooled, pooled_mean, power_of, to_db, unit_scale
 
 #: The model inputs that are made in a graph.
 IN_GRAPH = ("features", "levels", "spectrum", "cadence")
@@ -78,7 +78,7 @@ def input_graph(
     packed = graph.where(live.reshape(-1, 1, 1), packed, 0.0) * unit_scale(largest).reshape(-1, 1, 1)
 
     transform = centred_transform(packed, pulses, radar.bins)
-    power = squared(transform)
+    power = power_of(transform)
     floor = noise_floor(power, radar.bins).at_least(power.mean() * float(LEAST_FLOOR))
     safe = graph.where(floor > 0.0, floor, 1.0)
     relative_power = power / safe

@@ -68,15 +68,15 @@ def centred_transform(packed: Value, pulses: int, bins: int) -> tuple[Value, Val
     return re, im
 
 
-def squared(parts: tuple[Value, Value]) -> Value:
-    """As `spectrum.squared`."""
+def power_of(parts: tuple[Value, Value]) -> Value:
+    """As `spectrum.power_of`."""
     re, im = parts
     return re * re + im * im
 
 
 def centred_power(packed: Value, pulses: int, bins: int) -> Value:
     """As `spectrum.centred_power`: from samples (n, 2, pulses) to power (n, bins)."""
-    return squared(centred_transform(packed, pulses, bins))
+    return power_of(centred_transform(packed, pulses, bins))
 
 
 def unit_scale(largest: Value) -> Value:
