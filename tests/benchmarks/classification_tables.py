@@ -14,6 +14,7 @@ import numpy as np
 from bladewing.classify import Classifier
 from bladewing.classify.inference import COVERAGES
 from bladewing.classify.labels import CLASSES, decide, decide_by_sets
+from bladewing.classify.ladder import COST_KEY, by_place, shipped_account
 from bladewing.classify.predict import answer
 from bladewing.classify.recording import Recording, load_recording
 from bladewing.classify.track import CORRELATION, LONGER, fuse
@@ -21,6 +22,9 @@ from bladewing.features.wingbeat import wingbeat
 from bladewing.models.calibration import conformal_thresholds, expected_calibration_error, negative_log_likelihood
 from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.dataset import KINDS, draw_radar
+
+SHARED_FFTS = 6.0
+"""What the networks' inputs have in common, over the bare FFT: the spectrum, the levels, the cadence."""
 
 PAPER_RADAR = Radar(9.85e9, 25e3, 2048)
 SNR_EDGES_DB = np.arange(-20, 33, 2)
@@ -228,6 +232,26 @@ def fusion(classifier: Classifier, count: int) -> None:
             print(f"{correlation:11.2f} | " + " | ".join(cells) + ("" if longer else "   without longer looks"))
 
 
+def cascade(classifier: Classifier, count: int) -> None:
+    """Whether to ask the fastest model first and this one only where that is unsure: accuracy against cost."""
+    account = shipped_account()
+    names = (by_place("fast", account), classifier.metadata["name"])
+    radars = [draw_radar(7, "bench", group) for group in range(count // 24)]
+    first, second = (scored(Classifier.load(name), radars, count) for name in names)
+    cheap, dear = (float(account[name][COST_KEY]) for name in names)
+    truth = np.array([CLASSES.index(name) for name in first["label"]])
+    print(f"\n{names[0]} first, {names[1]} where its best probability is below a limit; {len(truth)} records")
+    print("     limit   asked | accuracy   UAVs found at 1 % false alarms | x FFT: inputs shared    made anew")
+    for limit in (0.0, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 1.01):
+        asked = first["p"].max(axis=1) < limit
+        p = np.where(asked[:, None], second["p"], first["p"])
+        accuracy = np.mean([np.mean(p[truth == index].argmax(axis=1) == index) for index in range(len(CLASSES))])
+        found = np.mean(p[truth == 0, 0] > np.quantile(p[truth != 0, 0], 0.99))
+        # at best the second pays nothing for what the first has made, and neither pays to part the records
+        shared, anew = (cheap + asked.mean() * cost for cost in (dear - SHARED_FFTS, dear))
+        print(f"{limit:10.2f} {asked.mean():7.2f} | {accuracy:8.4f} {found:32.3f} | {shared:20.1f} {anew:12.1f}")
+
+
 def _cut(iq: np.ndarray, pulses: int) -> np.ndarray:
     count = iq.shape[-1] // pulses
     return iq[:, : count * pulses].reshape(len(iq), count, pulses)
@@ -239,6 +263,7 @@ TABLES: dict[str, Callable[[Classifier, int], None]] = {
     "tracks": tracks,
     "fusion": fusion,
     "coverage": coverage,
+    "cascade": cascade,
     "recordings": recordings,
 }
 

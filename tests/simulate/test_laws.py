@@ -51,8 +51,10 @@ def test_rates_levels_and_lengths_of_records_follow_their_laws(seed):
     expected_hz = wingbeat_hz(bird["mass_kg"], *wing_size(bird["mass_kg"]))
     slow = expected_hz * LAWS["wingbeat_scatter"].high < 18  # no bird's mean rate is higher
     ratio = np.sort((bird["wingbeat_hz"] / expected_hz)[slow])
-    # the rate that is rendered is up to a twentieth off the mean that the law draws
-    assert distance(ratio, distribution(LAWS["wingbeat_scatter"], ratio)) < 4
+    # the rate that is rendered is off the mean that the law draws, by as much as a twentieth, evenly
+    off = 1 + 0.1 * ((np.arange(200) + 0.5) / 200 - 0.5)
+    of_each = distribution(LAWS["wingbeat_scatter"], ratio[:, None] / off).clip(0, 1)
+    assert distance(ratio, of_each.mean(axis=1)) < 3
 
 
 def test_box_and_muller_give_normal_numbers():
