@@ -14,19 +14,8 @@ KNEE_MPS = 4.0
 #: Outer edge of the axis [m/s], beyond the fastest tips (below Mach 0.6).
 LIMIT_MPS = 200.0
 
-#: Spectra of up to so many bins to one of the axis are averaged by matrices; longer sums are faster one by one.
-COARSE = 4
-
-#: Most axis bins and spectrum bins of a matrix. Larger products are cut into parts by how many spectra there are, and a
-#: record would then be summed in another order among others than alone.
-_RUN, _LONGEST_SUM = 16, 256
-
 #: Level of a bin outside the radar's unambiguous span [dB]: lower than any noise, so "not seen" differs from "empty".
 UNSEEN_DB = LOWEST_DB / 2
-
-# The spectrum bins that it takes, the seen axis bins that it gives, and the shares of the former in the latter.
-_Copy = tuple[NDArray[np.intp], slice]
-_Matrix = tuple[slice, slice, NDArray[np.float32]]
 
 
 def axis_edges_mps(bins: int) -> NDArray[np.float64]:
@@ -116,21 +105,10 @@ class Pooling:
 
     def _mean(self, power: NDArray[np.float32], out: NDArray[np.float32]) -> None:
         """Write the mean power of each seen axis bin, in rising velocity; a row a spectrum."""
-        if self.spectrum_bins > COARSE * self.bins:
-            self._pooled(np.add, power, out)
-            out *= self._shares
-        elif len(power) == 1:
-            # a product of a single row would be summed in another order than the row is among others
-            twice = np.empty((2, out.shape[1]), np.float32)
-            self._mean(np.repeat(power, 2, axis=0), twice)
-            out[:] = twice[:1]
-        else:
-            # all spectra under one another: one product of matrices instead of one for each record
-            copies, matrices = self._products
-            for bins, axis_bins in copies:
-                out[:, axis_bins] = power.take(bins, axis=1)
-            for span, axis_bins, shares in matrices:
-                np.matmul(power[:, span], shares, out=out[:, axis_bins])
+        # one by one: products of matrices take a third of the time for many spectra, but libraries sum in another order
+        # by how many there are, and a record would have other last digits among others than alone
+        self._pooled(np.add, power, out)
+        out *= self._shares
 
     def _levels(self, out: NDArray[np.float32], lowest_db: float) -> NDArray[np.float32]:
         """Power to level in place: of the whole axis, which lies in one piece and so takes half the time."""
@@ -150,36 +128,6 @@ class Pooling:
     def _shares(self) -> NDArray[np.float32]:
         """One over the number of spectrum bins in each."""
         return (1 / self.spans[1]).astype(np.float32)
-
-    @cached_property
-    def _products(self) -> tuple[list[_Copy], list[_Matrix]]:
-        """The pooling as copies, where the axis is so fine that there is nothing to add up, and as matrices.
-
-        A run of axis bins needs few spectrum bins, so the zeros that are multiplied too do not matter.
-        """
-        starts, counts = self.spans
-        stops = starts + counts
-        copies: list[_Copy] = []
-        matrices: list[_Matrix] = []
-        stop = 0
-        while stop < len(starts):
-            first, stop = stop, min(stop + _RUN, len(starts))
-            while stop > first + 2 and stops[first:stop].max() - starts[first:stop].min() > _LONGEST_SUM:
-                stop -= 1
-            if len(starts) - stop == 1:  # a single column would be summed in another order
-                stop -= 1
-            axis_bins = slice(first, stop)
-            if (counts[axis_bins] == 1).all():
-                if copies and copies[-1][1].stop == first:
-                    axis_bins = slice(copies.pop()[1].start, stop)
-                copies.append((starts[axis_bins], axis_bins))
-                continue
-            low, high = int(starts[axis_bins].min()), int(stops[axis_bins].max())
-            position = np.arange(low, high)[:, None]
-            inside = (position >= starts[axis_bins]) & (position < stops[axis_bins])
-            shares = np.ascontiguousarray(inside * self._shares[axis_bins], np.float32)
-            matrices.append((slice(low, high), axis_bins, shares))
-        return copies, matrices
 
     @cached_property
     def expected_peak(self) -> NDArray[np.float32]:

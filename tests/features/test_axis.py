@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from bladewing.features import axis as axis_module
 from bladewing.features import doppler_spectrum
 from bladewing.features.axis import LIMIT_MPS, UNSEEN_DB, axis_edges_mps, axis_velocities_mps, pooling
 from bladewing.features.spectrum import LOWEST_DB
@@ -74,17 +73,15 @@ def test_noise_lies_at_zero_db_in_mean_and_peak():
     assert abs(10 * np.log10(np.median(peak))) < 1.0
 
 
-@pytest.mark.parametrize("rows", [2, 30])
 @pytest.mark.parametrize(("bins", "prf_hz"), [(65, 2e3), (500, 25e3), (512, 25e3), (1024, 90e3), (5000, 25e3)])
-def test_matrices_and_plain_sums_pool_alike(monkeypatch, bins, prf_hz, rows):
-    power = np.random.default_rng(bins).exponential(size=(3, rows, bins)).astype(np.float32) * np.logspace(0, 8, bins)
+def test_the_mean_level_is_the_mean_of_the_bins(bins, prf_hz):
+    power = np.random.default_rng(bins).exponential(size=(3, 30, bins)).astype(np.float32) * np.logspace(0, 8, bins)
     pool = pooling(bins, 10e9, prf_hz, 256)
     unit = np.float32([[[2.0]], [[3.0]], [[1.0]]])
-    fast = pool.mean_db(power.astype(np.float32), 1 / unit, from_floor=True)
-    monkeypatch.setattr(axis_module, "COARSE", 0)
+    from_floor = pool.mean_db(power.astype(np.float32), 1 / unit, from_floor=True)
     plain = pool.mean_db((power / unit).astype(np.float32))
-    assert fast.shape == (3, rows, 256)
-    np.testing.assert_allclose(fast, np.maximum(plain, 0), atol=1e-4)
+    assert from_floor.shape == (3, 30, 256)
+    np.testing.assert_allclose(from_floor, np.maximum(plain, 0), atol=1e-4)
     rows = [np.mean((power / unit)[..., s : s + int(n)], axis=-1) for s, n in zip(*pool.spans, strict=True)]
     expected = np.maximum(10 * np.log10(np.stack(rows, axis=-1)), LOWEST_DB)
     np.testing.assert_allclose(plain[..., pool.seen], expected, atol=1e-4)
@@ -98,5 +95,4 @@ def test_a_mirrored_spectrum_is_mirrored_on_the_axis(bins, carrier_hz, prf_hz, r
     pool = pooling(bins, carrier_hz, prf_hz, 256)
     one, other = pool.mean_and_peak_db(mirrored), pool.mean_and_peak_db(power)[..., ::-1]
     np.testing.assert_array_equal(pool.mean_db(mirrored), one[:, 0])
-    np.testing.assert_allclose(one[:, 0], other[:, 0], atol=1e-4)
-    np.testing.assert_array_equal(one[:, 1], other[:, 1])
+    np.testing.assert_array_equal(one, other)
