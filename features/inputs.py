@@ -1,17 +1,18 @@
 """From slow-time samples to the named inputs that models take: only what is asked for is computed."""
 
 from collections.abc import Collection
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .axis import pooling
+from .axis import Pooling, pooling
 from .cadence import cadence_db
 from .change import change_db, parts_db
 from .joint import joint_vector, stft_image
-from .notch import body_line, notch_mask
+from .notch import Body, body_line, notch_mask
 from .schema import AXIS_BINS, INPUT_SHAPES
-from .spectrum import doppler_spectrum
+from .spectrum import Spectrum, doppler_spectrum
 from .vector import feature_vector
 
 #: Fewest pulses that leave anything to measure outside the notches.
@@ -56,47 +57,100 @@ def model_inputs(
     if samples.ndim < 1 or samples.shape[-1] < MIN_PULSES:
         raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least {MIN_PULSES} pulses")
     framed = "image" in wanted or "joint_features" in wanted
-    high = max(1, BLOCK_SAMPLES // (IMAGE_SHARE if framed else 1) // samples.shape[-1])
     flat = samples.reshape(-1, samples.shape[-1])
-    if len(flat) <= high:
-        made = _inputs(flat, carrier_hz, prf_hz, wanted)
-    else:
-        blocks = [_inputs(flat[i : i + high], carrier_hz, prf_hz, wanted) for i in range(0, len(flat), high)]
-        made = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+    blocks = [
+        Dwells(block, carrier_hz=carrier_hz, prf_hz=prf_hz).inputs(wanted) for block in in_blocks(flat, framed=framed)
+    ]
+    made = blocks[0] if len(blocks) == 1 else {name: np.concatenate([b[name] for b in blocks]) for name in blocks[0]}
     return {name: rows.reshape(samples.shape[:-1] + INPUT_SHAPES[name]) for name, rows in made.items()}
 
 
-def _inputs(
-    samples: NDArray[np.complex64], carrier_hz: float, prf_hz: float, names: frozenset[str]
-) -> dict[str, NDArray[np.float32]]:
-    """The inputs of a batch that is worked on as a whole."""
-    spectrum = doppler_spectrum(samples, carrier_hz=carrier_hz, prf_hz=prf_hz)
-    out: dict[str, NDArray[np.float32]] = {}
-    if names & {"features", "cadence"}:
-        body = body_line(spectrum)
-        mask = notch_mask(spectrum, body)
-        if "cadence" in names:
-            out["cadence"] = cadence_db(spectrum, mask)
-    if names & {"levels", "spectrum", "features"}:
-        pool = pooling(spectrum.bins, spectrum.carrier_hz, spectrum.prf_hz, AXIS_BINS)
-        if names & {"levels", "spectrum"}:
-            levels = pool.mean_and_peak_db(spectrum.relative_power)
-            mean = levels[..., 0, :]
-            if "levels" in names:
-                out["levels"] = levels
+def in_blocks(samples: NDArray[np.complex64], *, framed: bool = False) -> list[NDArray[np.complex64]]:
+    """Cut records (n, pulses) into as many as are worked on at a time, one block at least; `framed` for an STFT."""
+    high = max(1, BLOCK_SAMPLES // (IMAGE_SHARE if framed else 1) // samples.shape[-1])
+    return [samples[first : first + high] for first in range(0, max(1, len(samples)), high)]
+
+
+class Dwells:
+    """Records of one radar with what is computed of them: each piece once, when the first input asks for it.
+
+    Parameters
+    ----------
+    samples : ndarray of complex64, shape (records, pulses)
+        Slow-time samples, at least `MIN_PULSES` pulses.
+    carrier_hz, prf_hz : float
+        Carrier and pulse repetition frequency [Hz], > 0.
+    """
+
+    def __init__(self, samples: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float) -> None:
+        self._samples = samples
+        self._radar = {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
+
+    def rows(self, rows: NDArray[np.intp]) -> "Dwells":
+        """Some of the records, with what is computed of them so far."""
+        some = Dwells(self._samples[rows], **self._radar)
+        for name, piece in self.__dict__.items():
+            if name not in ("_samples", "_radar", "_pool"):
+                some.__dict__[name] = piece[rows] if isinstance(piece, np.ndarray) else piece.rows(rows)
+        return some
+
+    def inputs(self, names: Collection[str]) -> dict[str, NDArray[np.float32]]:
+        """The named inputs, each of shape (records, *INPUT_SHAPES[name]); see `model_inputs`."""
+        return {name: getattr(self, f"_{name}") for name in INPUT_SHAPES if name in names}
+
+    @cached_property
+    def _spectrum_of_dwell(self) -> Spectrum:
+        return doppler_spectrum(self._samples, **self._radar)
+
+    @cached_property
+    def _body(self) -> Body:
+        return body_line(self._spectrum_of_dwell)
+
+    @cached_property
+    def _mask(self) -> NDArray[np.bool_]:
+        return notch_mask(self._spectrum_of_dwell, self._body)
+
+    @cached_property
+    def _cadence(self) -> NDArray[np.float32]:
+        return cadence_db(self._spectrum_of_dwell, self._mask)
+
+    @cached_property
+    def _pool(self) -> Pooling:
+        spectrum = self._spectrum_of_dwell
+        return pooling(spectrum.bins, spectrum.carrier_hz, spectrum.prf_hz, AXIS_BINS)
+
+    @cached_property
+    def _levels(self) -> NDArray[np.float32]:
+        return self._pool.mean_and_peak_db(self._spectrum_of_dwell.relative_power)
+
+    @cached_property
+    def _parts(self) -> NDArray[np.float32]:
+        return parts_db(self._samples, self._spectrum_of_dwell, AXIS_BINS)
+
+    @cached_property
+    def _change(self) -> NDArray[np.float32]:
+        return change_db(self._parts)
+
+    @cached_property
+    def _spectrum(self) -> NDArray[np.float32]:
+        return np.concatenate([self._levels, self._change[..., None, :]], axis=-2)
+
+    @cached_property
+    def _features(self) -> NDArray[np.float32]:
+        if "_levels" in self.__dict__:
+            mean = np.ascontiguousarray(self._levels[..., 0, :])
         else:
-            mean = pool.mean_db(spectrum.relative_power)
-    if names & {"spectrum", "features"}:
-        parts = parts_db(samples, spectrum, AXIS_BINS)
-        change = change_db(parts)
-        if "spectrum" in names:
-            out["spectrum"] = np.concatenate([levels, change[..., None, :]], axis=-2)
-        if "features" in names:
-            out["features"] = feature_vector(spectrum, body, mask, np.ascontiguousarray(mean), parts, change)
-    if names & {"image", "joint_features"}:
-        image = stft_image(samples, spectrum)
-        if "image" in names:
-            out["image"] = image[..., None, :, :]
-        if "joint_features" in names:
-            out["joint_features"] = joint_vector(image, spectrum)
-    return out
+            mean = self._pool.mean_db(self._spectrum_of_dwell.relative_power)
+        return feature_vector(self._spectrum_of_dwell, self._body, self._mask, mean, self._parts, self._change)
+
+    @cached_property
+    def _frames(self) -> NDArray[np.float32]:
+        return stft_image(self._samples, self._spectrum_of_dwell)
+
+    @cached_property
+    def _image(self) -> NDArray[np.float32]:
+        return self._frames[..., None, :, :]
+
+    @cached_property
+    def _joint_features(self) -> NDArray[np.float32]:
+        return joint_vector(self._frames, self._spectrum_of_dwell)

@@ -46,6 +46,10 @@ class Body:
     velocity_mps: NDArray[np.float32]
     level_db: NDArray[np.float32]
 
+    def rows(self, rows: NDArray[np.intp]) -> "Body":
+        """The lines of some of the records."""
+        return Body(self.index[rows], self.velocity_mps[rows], self.level_db[rows])
+
 
 def body_line(spectrum: Spectrum) -> Body:
     """Find the strongest line of each spectrum, refined by a parabola through three levels in dB.

@@ -1,7 +1,7 @@
 """The Doppler spectrum of a dwell, scaled to its own noise floor."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -63,6 +63,11 @@ class Spectrum:
     pulses: int
     scale: NDArray[np.float32]
     transform: NDArray[np.complex64]
+
+    def rows(self, rows: NDArray[np.intp]) -> "Spectrum":
+        """The spectra of some of the records, of shape (records, bins)."""
+        arrays = ("relative_power", "floor", "scale", "transform")
+        return replace(self, **{name: getattr(self, name)[rows] for name in arrays})
 
     @property
     def bins(self) -> int:
