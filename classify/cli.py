@@ -45,7 +45,7 @@ ModelName = Annotated[
     str | None,
     typer.Option(
         metavar="NAME|FILE",
-        help="A shipped model, an .onnx file, or fast, balanced or best.",
+        help="A shipped model, an .onnx file, cascade, or fast, balanced or best.",
         show_default="spectrum-cnn",
     ),
 ]

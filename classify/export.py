@@ -20,8 +20,9 @@ from onnx import TensorProto, helper
 
 from .errors import BadInput
 from .files import write_whole
-from .inference import Classifier, read_model
+from .inference import Classifier, chosen_name, read_model
 from .labels import CLASSES, UNKNOWN
+from .ladder import CASCADE
 from .samples import positive
 
 PRODUCT = "bladewing raw-IQ graph"
@@ -68,7 +69,12 @@ def export_raw_iq(
         The radar or the dwell lies outside the model's envelope, the model reads an image, or the file cannot be
         written.
     """
-    content, source = read_model(model)
+    name = chosen_name(model, single=True)
+    if name == CASCADE:
+        raise BadInput(
+            f"{CASCADE}: two models, of which each is asked about other records: give one of them as --model"
+        )
+    content, source = read_model(name)
     classifier = Classifier(content, source=source)
     carrier_hz, prf_hz = positive(carrier_hz, "carrier_hz"), positive(prf_hz, "prf_hz")
     outside = classifier.envelope.reason(carrier_hz, prf_hz, pulses)

@@ -26,7 +26,7 @@ from .envelope import Envelope
 from .errors import BadInput
 from .files import read_bounded
 from .labels import CLASSES, UNKNOWN, decide, decide_by_sets
-from .ladder import PLACES, by_budget, by_place, measured_fft_us, shipped_account
+from .ladder import CASCADE, PLACES, by_budget, by_place, measured_fft_us, shipped_account
 from .samples import complex_samples, positive
 
 __all__ = ["Classifier", "Envelope", "Prediction", "model_names"]
@@ -76,21 +76,44 @@ def model_names() -> tuple[str, ...]:
     return tuple(sorted(names, key=lambda name: (name != DEFAULT_MODEL, name)))
 
 
-def read_model(name_or_path: str | os.PathLike[str] | None = None, budget_us: float | None = None) -> tuple[bytes, str]:
-    """Read a shipped model or a file, as `Classifier.load` takes them: the content, and what messages call it.
+def chosen_name(
+    name_or_path: str | os.PathLike[str] | None = None, budget_us: float | None = None, *, single: bool = False
+) -> str:
+    """Name or path of the model that is meant: the default's, or what a place on the ladder or a budget leads to.
+
+    Parameters
+    ----------
+    name_or_path, budget_us
+        As `Classifier.load` takes them.
+    single
+        Whether only models of one file are meant, not the cascade of two.
+
+    Raises
+    ------
+    BadInput
+        Both are given, or no model keeps to the budget.
+    """
+    given = DEFAULT_MODEL if name_or_path is None else os.fspath(name_or_path)
+    if budget_us is None and given not in PLACES:
+        return given
+    account = shipped_account()
+    if single:
+        account.pop(CASCADE, None)
+    if budget_us is None:
+        return by_place(given, account)
+    if name_or_path is not None:
+        raise BadInput(f"model {given!r} and a budget of {budget_us:g} us: give one of them")
+    return by_budget(positive(budget_us, "budget_us"), account, measured_fft_us())
+
+
+def read_model(given: str) -> tuple[bytes, str]:
+    """Read a shipped model by its name, or a file: the content, and what messages call it.
 
     Raises
     ------
     BadInput
         There is no such model, or it cannot be read.
     """
-    given = DEFAULT_MODEL if name_or_path is None else os.fspath(name_or_path)
-    if budget_us is not None:
-        if name_or_path is not None:
-            raise BadInput(f"model {given!r} and a budget of {budget_us:g} us: give one of them")
-        given = by_budget(positive(budget_us, "budget_us"), shipped_account(), measured_fft_us())
-    elif given in PLACES:
-        given = by_place(given, shipped_account())
     if given in model_names():
         return resources.files("bladewing.models.pretrained").joinpath(f"{given}.onnx").read_bytes(), given
     path = Path(given)
@@ -207,8 +230,8 @@ class Classifier:
         Parameters
         ----------
         name_or_path
-            One of `model_names()`; "fast", "balanced" or "best" (see `ladder`); or a file. By default the shipped
-            default model.
+            One of `model_names()`; "cascade" (see `cascade`); "fast", "balanced" or "best" (see `ladder`); or a
+            file. By default the shipped default model.
         threads
             CPU threads that one call may use.
         budget_us
@@ -222,7 +245,12 @@ class Classifier:
         BadInput
             There is no such model, or it is not one that can be used (see `Classifier`).
         """
-        content, source = read_model(name_or_path, budget_us)
+        name = chosen_name(name_or_path, budget_us)
+        if name == CASCADE:
+            from .cascade import Cascade
+
+            return Cascade.of_shipped(threads, max_false_alarm=max_false_alarm, coverage=coverage)
+        content, source = read_model(name)
         return cls(content, source=source, threads=threads, max_false_alarm=max_false_alarm, coverage=coverage)
 
     def decide(self, probabilities: NDArray[np.floating]) -> tuple[NDArray[np.str_], list[str]]:
@@ -311,9 +339,27 @@ class Classifier:
         for start in range(0, count, step):
             part = slice(start, start + step)
             chunk = records[part if rows is None else rows[part]]
-            feed = model_inputs(chunk, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs)
-            out += self._session.run(_OUTPUTS, feed)
+            out += self._judged(chunk, carrier_hz, prf_hz)
         return out[-1] if len(out) <= 2 else np.concatenate(out)
+
+    def _judged(self, records: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> list[NDArray[np.float32]]:
+        """Probabilities of a bounded number of records, in one or more pieces."""
+        return [self.from_inputs(model_inputs(records, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs))]
+
+    def from_inputs(self, inputs: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+        """Probabilities of records whose inputs are made; others than the model's are passed over.
+
+        Parameters
+        ----------
+        inputs
+            Name to array (records, *shape), as `bladewing.features.model_inputs` gives them.
+
+        Returns
+        -------
+        ndarray
+            Shape (records, 3), order `classes`.
+        """
+        return self._session.run(_OUTPUTS, {name: inputs[name] for name in self.inputs})[0]
 
 
 def _open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.InferenceSession:

@@ -1,7 +1,8 @@
 """The shipped models on one front of accuracy against cost, and the choice of one by name or by a budget of time.
 
 The figures come from `train.json` beside the models: balanced accuracy on the test records, and what a record costs as
-a multiple of its bare FFT, both measured by the run that made the models. A ratio within one run means the same on
+a multiple of its bare FFT, both measured by the run that made the models; of the cascade, whose records do not all cost
+the same, the mean over records as training draws them. A ratio within one run means the same on
 another machine; only the FFT is timed here.
 """
 
@@ -12,7 +13,6 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from .errors import BadInput
@@ -20,6 +20,12 @@ from .errors import BadInput
 #: Names for places on the front: the cheapest, the cheapest that gains at least half of the accuracy between the ends,
 #: the most accurate.
 PLACES = ("fast", "balanced", "best")
+
+#: Name of the two models that are asked one after the other (see `cascade`), in train.json and where one is loaded.
+CASCADE = "cascade"
+
+#: Key of the cascade's account in train.json: the names of its two models.
+STAGES_KEY = "stages"
 
 #: What the costs are measured on: so many records at a time, each of so many pulses.
 RECORDS, PULSES = 64, 2048
@@ -31,10 +37,15 @@ _ROUNDS = 40
 
 
 def shipped_account() -> dict[str, Any]:
-    """The shipped models, name to account in `train.json`, which also tells of those that are on no front."""
+    """The shipped models and their cascade, name to account in `train.json`, which also tells of others."""
     folder = resources.files("bladewing.models.pretrained")
-    models = json.loads(folder.joinpath("train.json").read_text(encoding="utf-8"))["models"]
-    return {name: account for name, account in models.items() if folder.joinpath(f"{name}.onnx").is_file()}
+    told = json.loads(folder.joinpath("train.json").read_text(encoding="utf-8"))
+    accounts = told["models"] | ({CASCADE: told[CASCADE]} if told.get(CASCADE) else {})
+    return {
+        name: account
+        for name, account in accounts.items()
+        if all(folder.joinpath(f"{part}.onnx").is_file() for part in account.get(STAGES_KEY, [name]))
+    }
 
 
 def non_dominated(costs: Sequence[float], values: Sequence[float]) -> list[bool]:
@@ -108,14 +119,9 @@ def by_budget(budget_us: float, account: Mapping[str, Mapping[str, Any]], fft_us
     return affordable[-1]
 
 
-def timed_records() -> NDArray[np.complex64]:
-    """What costs are measured on: noise, shape (RECORDS, PULSES)."""
-    return np.random.default_rng(0).standard_normal((RECORDS, 2 * PULSES), np.float32).view(np.complex64)
-
-
 def measured_fft_us() -> float:
     """Time of a record's bare FFT in a batch on this machine [us]: the shortest of some rounds."""
-    iq = timed_records()
+    iq = np.random.default_rng(0).standard_normal((RECORDS, 2 * PULSES), np.float32).view(np.complex64)
     taken = []
     for _ in range(_ROUNDS):
         start = time.perf_counter()

@@ -4,7 +4,7 @@ import json
 import os
 import platform
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -23,11 +23,12 @@ from .files import result_folder, write_together
 from .gather import Gathered, gather, gather_from
 from .inference import COVERAGES, CURVE_KEY, SETS_KEY
 from .labels import CLASSES
-from .ladder import COST_KEY, timed_records
+from .ladder import CASCADE
 from .parts import Parts
 from .progress import Progress
 from .training_account import ACCOUNT, alarm_threshold, covered, figures, print_table
 from .training_config import TrainingConfig, training_config
+from .training_costs import add_costs
 
 #: Folder of what is trained so far, beside the models while the run is not done.
 PARTS = "train-parts"
@@ -110,8 +111,7 @@ def run_training(
         for name in settings.models:
             with bars.phase(f"train {name}", 1) as on_fraction:
                 files[f"{name}.onnx"], models[name] = _take_or_train(name, settings, sets, on_fraction, parts)
-    for name, cost in costs_ffts(files).items():
-        models[name][COST_KEY] = round(cost, 1)
+    cascade = add_costs(files, models, sets.test, settings.false_alarm)
     account = {
         "format": 1,
         "settings": settings.model_dump(mode="json"),
@@ -120,6 +120,7 @@ def run_training(
         "seconds": {"gather": round(gathered_s, 1), "all": round(time.perf_counter() - started, 1)},
         "false_alarm": settings.false_alarm,
         "models": models,
+        CASCADE: cascade,
         "schema_sha256": schema_hash(),
         "versions": versions,
     }
@@ -129,30 +130,6 @@ def run_training(
     if progress:
         print_table(account, out)
     return account
-
-
-def costs_ffts(files: Mapping[str, bytes]) -> dict[str, float]:
-    """What a record costs each model from samples to answer, over its bare FFT [1]; one thread, all in turns.
-
-    Parameters
-    ----------
-    files
-        File name, `<name>.onnx`, to the sealed model.
-    """
-    from scipy import fft
-
-    from .inference import Classifier
-    from .report.timing import quote, time_in_turns
-
-    iq = timed_records()
-    works: dict[str, Callable[[], object]] = {"": lambda: fft.fft(iq)}
-    for file, content in files.items():
-        classifier = Classifier(content, source=file)
-        works[file.removesuffix(".onnx")] = partial(classifier.predict, iq, carrier_hz=10e9, prf_hz=25e3)
-    laps = time_in_turns(works, seconds=2.0, least_rounds=5, most_rounds=100)
-    medians = {name: quote(lap)["median_us"] for name, lap in laps.items()}
-    bare = medians.pop("")
-    return {name: median / bare for name, median in medians.items()}
 
 
 def _gather(settings: TrainingConfig, stored: DataSet | None, bars: Progress) -> Sets:

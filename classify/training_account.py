@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .labels import CLASSES
+from .ladder import CASCADE, COST_KEY, STAGES_KEY
 
 #: Name of the account beside the models.
 ACCOUNT = "train.json"
@@ -52,11 +53,12 @@ def print_table(account: dict[str, Any], out: Path) -> None:
     from rich.table import Table
 
     title = f"{account['records']['test']} test records, looked at once"
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("model", no_wrap=True)
-    for column in ("accuracy", "found", "false", "named", "right", "ECE", "kB", "s"):
+    for column in ("accuracy", "found", "false", "named", "right", "ECE", "kB", "s", "FFTs"):
         table.add_column(column, justify="right", no_wrap=True)
-    for name, model in account["models"].items():
+    cascade = account[CASCADE]
+    for name, model in [*account["models"].items(), *([(CASCADE, cascade)] if cascade else [])]:
         figures = model["test"]
         right = figures["named_accuracy"]
         table.add_row(
@@ -67,8 +69,9 @@ def print_table(account: dict[str, Any], out: Path) -> None:
             f"{figures['named_share']:.3f}",
             "-" if right is None else f"{right:.3f}",
             f"{figures['expected_calibration_error']:.3f}",
-            f"{model['bytes'] / 1000:.0f}",
-            f"{model['seconds']:.0f}",
+            f"{model['bytes'] / 1000:.0f}" if "bytes" in model else "",
+            f"{model['seconds']:.0f}" if "seconds" in model else "",
+            f"{model[COST_KEY]:.1f}",
         )
     console = Console(highlight=False)
     console.print(table)
@@ -78,8 +81,14 @@ def print_table(account: dict[str, Any], out: Path) -> None:
         f"found     UAVs found where {account['false_alarm']:.0%} of birds and clutter would be called UAV\n"
         "false     birds and clutter that are named UAV\n"
         "named     records not answered 'unknown'; right: how many of these are right\n"
-        "ECE       expected calibration error of the probabilities"
+        "ECE       expected calibration error of the probabilities\n"
+        "FFTs      time of a record, samples to answer, over that of its bare FFT"
     )
+    if cascade:
+        first, second = cascade[STAGES_KEY]
+        console.print(
+            f"cascade   {first} first, then {second}\n          about the {cascade['asked']:.0%} that it is not sure of"
+        )
     since = " since the interruption" if account["resumed"] else ""
     took = f"trained in {account['seconds']['all']:.0f} s{since}"
     console.print(f"Models and {ACCOUNT} are in {out}; {took}.", soft_wrap=True)

@@ -6,15 +6,17 @@
 import json
 from pathlib import Path
 
-from bladewing.classify.ladder import front
+from bladewing.classify.ladder import CASCADE, STAGES_KEY, front
 
 PRETRAINED = Path(__file__).parents[1] / "models" / "pretrained"
 
 
 def main() -> None:
     """Remove the files."""
-    account = json.loads((PRETRAINED / "train.json").read_text(encoding="utf-8"))["models"]
-    kept = {name for name, _ in front(account)}
+    told = json.loads((PRETRAINED / "train.json").read_text(encoding="utf-8"))
+    kept = {name for name, _ in front(told["models"])}
+    if told[CASCADE]:
+        kept |= set(told[CASCADE][STAGES_KEY])
     for file in PRETRAINED.glob("*.onnx"):
         if file.stem not in kept:
             file.unlink()

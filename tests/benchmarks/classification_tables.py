@@ -18,10 +18,14 @@ from bladewing.classify.ladder import COST_KEY, by_place, shipped_account
 from bladewing.classify.predict import answer
 from bladewing.classify.recording import Recording, load_recording
 from bladewing.classify.track import CORRELATION, LONGER, fuse
+from bladewing.classify.training_account import figures
 from bladewing.features.wingbeat import wingbeat
 from bladewing.models.calibration import conformal_thresholds, expected_calibration_error, negative_log_likelihood
 from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.dataset import KINDS, draw_radar
+
+SURE_LIMITS = [(one, one) for one in (0.0, 0.6, 0.7, 0.8, 0.9, 0.95, 1.01)] + [(0.95, 0.85), (0.97, 0.85), (0.99, 0.9)]
+"""Probabilities of "uav" and of the others from which on the first model of a cascade is sure."""
 
 SHARED_FFTS = 6.0
 """What the networks' inputs have in common, over the bare FFT: the spectrum, the levels, the cadence."""
@@ -240,16 +244,19 @@ def cascade(classifier: Classifier, count: int) -> None:
     first, second = (scored(Classifier.load(name), radars, count) for name in names)
     cheap, dear = (float(account[name][COST_KEY]) for name in names)
     truth = np.array([CLASSES.index(name) for name in first["label"]])
-    print(f"\n{names[0]} first, {names[1]} where its best probability is below a limit; {len(truth)} records")
-    print("     limit   asked | accuracy   UAVs found at 1 % false alarms | x FFT: inputs shared    made anew")
-    for limit in (0.0, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 1.01):
-        asked = first["p"].max(axis=1) < limit
+    print(f"\n{names[0]} first, {names[1]} where it is not sure; {len(truth)} records")
+    print(" uav others  asked | accuracy  found at 1 % | false  named  right | x FFT: inputs shared    made anew")
+    for uav, others in SURE_LIMITS:
+        asked = first["p"].max(axis=1) < np.array([uav, others, others])[first["p"].argmax(axis=1)]
         p = np.where(asked[:, None], second["p"], first["p"])
-        accuracy = np.mean([np.mean(p[truth == index].argmax(axis=1) == index) for index in range(len(CLASSES))])
-        found = np.mean(p[truth == 0, 0] > np.quantile(p[truth != 0, 0], 0.99))
+        given = figures(p, truth, np.asarray(classifier.accept), 0.01)
         # at best the second pays nothing for what the first has made, and neither pays to part the records
         shared, anew = (cheap + asked.mean() * cost for cost in (dear - SHARED_FFTS, dear))
-        print(f"{limit:10.2f} {asked.mean():7.2f} | {accuracy:8.4f} {found:32.3f} | {shared:20.1f} {anew:12.1f}")
+        print(
+            f"{uav:4.2f} {others:6.2f} {asked.mean():6.2f} | {given['balanced_accuracy']:8.4f} "
+            f"{given['uav_detection']:13.3f} | {given['false_uav']:.4f} {given['named_share']:6.3f} "
+            f"{given['named_accuracy']:6.3f} | {shared:20.1f} {anew:12.1f}"
+        )
 
 
 def _cut(iq: np.ndarray, pulses: int) -> np.ndarray:

@@ -38,6 +38,17 @@ def test_training_writes_every_model_and_its_account(trained):
     assert not list(out.glob(".bladewing*"))
 
 
+def test_the_cascade_goes_from_the_cheapest_model_to_the_best(trained):
+    models, cascade = trained[1]["models"], trained[1]["cascade"]
+    first, second = (models[name] for name in cascade["stages"])
+    assert first["cost_ffts"] == min(model["cost_ffts"] for model in models.values())
+    assert second["test"]["balanced_accuracy"] == max(model["test"]["balanced_accuracy"] for model in models.values())
+    assert 0 < cascade["asked"] <= 1
+    assert first["cost_ffts"] * 0.8 < cascade["cost_ffts"]
+    # it is never far behind the second, as what the first is sure of is mostly right
+    assert cascade["test"]["balanced_accuracy"] > second["test"]["balanced_accuracy"] - 0.05
+
+
 @pytest.mark.parametrize("name", TrainingConfig().models)
 def test_trained_models_answer_through_the_classifier(trained, name):
     out, account = trained
@@ -114,7 +125,7 @@ def _run(out, *, after=None, then=None, **changed):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(train, "_gather", _few_sets)
-        patch.setattr(train, "costs_ffts", lambda files: {})
+        patch.setattr(train, "add_costs", lambda *_: None)
         patch.setattr(train, "training_config", lambda *_, **__: SETTINGS.model_copy(update=changed))
         patch.setattr(training, "train_network", train_network)
         return run_training(out, progress=False)

@@ -1,0 +1,91 @@
+"""Two models on one front: the fast one is asked about every record, the better one only where the fast is not sure.
+
+What both read is computed once. A record that the fast model is sure of costs what the fast model costs, so clear
+returns, most of what a radar near its targets sees, are answered at a third of the better model's price.
+"""
+
+import numpy as np
+from bladewing.features.inputs import Dwells, in_blocks
+from numpy.typing import NDArray
+
+from .errors import BadInput
+from .inference import Classifier, read_model
+from .ladder import CASCADE, STAGES_KEY, shipped_account
+
+SURE = (0.95, 0.85, 0.85)
+"""Probability of each class (uav, bird, clutter) from which on the fast model's answer stands. On records of the whole
+envelope the cascade is then as accurate as the better model, finds as many UAVs and names as few others so, and asks it
+about 70 % of them; with 0.9 for all it names a tenth more birds and clutter UAV, since a false drone of either counts
+(the table "cascade" of tests/benchmarks/classification_tables.py)."""
+
+
+class Cascade(Classifier):
+    """A fast model and a better one behind it; it answers like any classifier.
+
+    Where the first gives a class a probability of `SURE` or more, its probabilities are the answer's; elsewhere
+    those of the second, by whose thresholds labels are given. `inputs`, `metadata` and `accept` are the second's.
+
+    Parameters
+    ----------
+    first, second
+        Sealed bladewing models and what messages call them: the fast one and the better one.
+    threads
+        CPU threads that one call may use.
+    max_false_alarm
+        Largest share of birds and clutter that may be named UAV. Each model gets half of it, so that both together keep
+        to it whatever they have in common.
+
+    Raises
+    ------
+    BadInput
+        As for `Classifier`.
+    """
+
+    def __init__(
+        self,
+        first: tuple[bytes, str],
+        second: tuple[bytes, str],
+        *,
+        threads: int = 1,
+        max_false_alarm: float | None = None,
+    ) -> None:
+        half = None if max_false_alarm is None else max_false_alarm / 2
+        super().__init__(second[0], source=second[1], threads=threads, max_false_alarm=half)
+        self.first = Classifier(first[0], source=first[1], threads=threads, max_false_alarm=half)
+
+    @classmethod
+    def of_shipped(
+        cls, threads: int = 1, *, max_false_alarm: float | None = None, coverage: float | None = None
+    ) -> "Cascade":
+        """Load the two shipped models that `train.json` names.
+
+        Raises
+        ------
+        BadInput
+            They are not shipped, or a coverage is asked for: prediction sets are those of one model.
+        """
+        if coverage is not None:
+            raise BadInput(f"a coverage of {coverage:g} and the model {CASCADE!r}: prediction sets are of one model")
+        account = shipped_account()
+        if CASCADE not in account:
+            raise BadInput(f"the shipped train.json tells of no {CASCADE!r}: name a model, or train the models again")
+        first, second = account[CASCADE][STAGES_KEY]
+        return cls(read_model(first), read_model(second), threads=threads, max_false_alarm=max_false_alarm)
+
+    def sure(self, probabilities: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Where the first model's answer stands: from `SURE` on, and where either would name it; shape (records,)."""
+        limits = np.maximum(SURE, np.maximum(self.first.accept, self.accept))
+        return probabilities.max(axis=1) >= limits[probabilities.argmax(axis=1)]
+
+    def _judged(self, records: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> list[NDArray[np.float32]]:
+        """Probabilities of a bounded number of records, in one or more pieces."""
+        out = []
+        for block in in_blocks(records):
+            dwells = Dwells(block, carrier_hz=carrier_hz, prf_hz=prf_hz)
+            probabilities = self.first.from_inputs(dwells.inputs(self.first.inputs))
+            rows = np.flatnonzero(~self.sure(probabilities))
+            if len(rows):
+                asked = dwells if len(rows) == len(block) else dwells.rows(rows)
+                probabilities[rows] = self.from_inputs(asked.inputs(self.inputs))
+            out.append(probabilities)
+        return out

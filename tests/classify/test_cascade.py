@@ -1,0 +1,108 @@
+"""A cascade answers as its models do: the first where it is sure, the second elsewhere."""
+
+import json
+
+import numpy as np
+import pytest
+from bladewing.classify import BadInput, Classifier, inference
+from bladewing.classify.cascade import SURE, Cascade
+from bladewing.classify.inference import model_names
+from bladewing.classify.ladder import CASCADE, STAGES_KEY, shipped_account
+from bladewing.simulate import Radar, draw_records
+
+RADAR = {"carrier_hz": 10e9, "prf_hz": 20e3}
+
+
+@pytest.fixture(scope="module")
+def records():
+    """Records of every class of which some are clear and some are not."""
+    return draw_records(Radar(10e9, 20e3, 700), 240, 5, purpose="bench").iq
+
+
+@pytest.fixture(scope="module")
+def cascade():
+    return Classifier.load(CASCADE)
+
+
+def test_the_first_answers_where_it_is_sure_and_the_second_elsewhere(cascade, records):
+    first, second = (Classifier.load(name) for name in shipped_account()[CASCADE][STAGES_KEY])
+    one, other, both = (model.predict(records, **RADAR) for model in (first, second, cascade))
+    sure = (one.probabilities >= SURE).any(axis=1)
+    assert 0.1 < sure.mean() < 0.9  # else nothing is tested
+    np.testing.assert_array_equal(both.probabilities, np.where(sure[:, None], one.probabilities, other.probabilities))
+    np.testing.assert_array_equal(both.labels[sure], one.labels[sure])
+    np.testing.assert_array_equal(both.labels[~sure], other.labels[~sure])
+    assert "unknown" not in both.labels[sure]
+
+
+def test_the_second_is_asked_about_no_record_that_the_first_is_sure_of(cascade, records, monkeypatch):
+    asked = []
+    answered = Classifier.from_inputs
+
+    def from_inputs(self, inputs):
+        given = answered(self, inputs)
+        asked.append((self is cascade, len(given), int(cascade.sure(given).sum())))
+        return given
+
+    monkeypatch.setattr(Classifier, "from_inputs", from_inputs)
+    cascade.predict(records, **RADAR)
+    by_first = [row for row in asked if not row[0]]
+    assert sum(count for _, count, _ in by_first) == len(records)
+    assert sum(count for second, count, _ in asked if second) == len(records) - sum(sure for *_, sure in by_first)
+
+
+def test_batch_equals_loop_bit_for_bit(cascade, records):
+    batch = cascade.predict(records, **RADAR)
+    for row in range(0, len(records), 7):
+        np.testing.assert_array_equal(cascade.predict(records[row], **RADAR).probabilities, batch.probabilities[row])
+
+
+def test_each_model_gets_half_of_the_false_alarms(records):
+    given = Classifier.load(CASCADE, max_false_alarm=0.02)
+    first, second = (Classifier.load(name, max_false_alarm=0.01) for name in shipped_account()[CASCADE][STAGES_KEY])
+    assert given.accept == second.accept
+    assert given.first.accept == first.accept
+    said = given.predict(records, **RADAR)
+    uav = said.labels == "uav"
+    allowed = (first.predict(records, **RADAR).labels == "uav") | (second.predict(records, **RADAR).labels == "uav")
+    assert uav.any()
+    assert allowed[uav].all()
+
+
+def test_a_record_without_signal_and_one_outside_the_envelope_get_their_reasons(cascade):
+    assert cascade.predict(np.zeros(300, complex), **RADAR).reasons.item().startswith("no signal")
+    assert "PRF" in cascade.predict(np.ones(300, complex), carrier_hz=10e9, prf_hz=500.0).reasons.item()
+
+
+def test_what_a_cascade_cannot_do_is_told_in_one_line(tmp_path, monkeypatch):
+    from bladewing.classify.export import export_raw_iq
+
+    with pytest.raises(BadInput, match=r"coverage of 0\.9.*prediction sets are of one model"):
+        Classifier.load(CASCADE, coverage=0.9)
+    with pytest.raises(BadInput, match=r"cascade: two models.*give one of them as --model"):
+        export_raw_iq(tmp_path / "x.onnx", **RADAR, pulses=500, model=CASCADE)
+    monkeypatch.setattr("bladewing.classify.cascade.shipped_account", dict)
+    with pytest.raises(BadInput, match="tells of no 'cascade'"):
+        Classifier.load(CASCADE)
+
+
+def test_places_lead_to_the_cascade_but_not_to_export_it(monkeypatch):
+    test = {"cheap": (5, 0.5), "dear": (9, 0.6), CASCADE: (7, 0.7)}
+    accounts = {name: {"cost_ffts": cost, "test": {"balanced_accuracy": value}} for name, (cost, value) in test.items()}
+    monkeypatch.setattr(inference, "shipped_account", lambda: dict(accounts))
+    assert inference.chosen_name("best") == CASCADE
+    assert inference.chosen_name("best", single=True) == "dear"
+
+
+def test_the_shipped_account_tells_of_the_cascade_what_holds():
+    account = shipped_account()[CASCADE]
+    assert set(account[STAGES_KEY]) <= set(model_names())
+    cascade = Classifier.load(CASCADE)
+    assert isinstance(cascade, Cascade)
+    assert list(cascade.accept) == account["accept"]
+    assert json.loads(cascade.metadata["classes"]) == ["uav", "bird", "clutter"]
+    single = {name: one for name, one in shipped_account().items() if name != CASCADE}
+    assert (
+        account["test"]["balanced_accuracy"] >= max(one["test"]["balanced_accuracy"] for one in single.values()) - 0.002
+    )
+    assert account["cost_ffts"] < single[account[STAGES_KEY][1]]["cost_ffts"]
