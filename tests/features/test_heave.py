@@ -37,7 +37,14 @@ def test_rate_amplitude_and_whether_it_walks(velocity_mps, rate_hz, amplitude_m,
 def test_what_does_not_go_to_and_fro_has_no_heave():
     rng = np.random.default_rng(5)
     fading = np.exp(0.8 * np.sin(2 * np.pi * 5.3 * TIME_S))  # of the level, not of the path
+    rates = np.fft.rfftfreq(PULSES, 1 / RADAR["prf_hz"])
+    wander = np.where((rates > 1.6) & (rates < 18), rng.normal(size=rates.shape) + 1j * rng.normal(size=rates.shape), 0)
+    path = np.fft.irfft(wander, PULSES)
+    wanders = np.exp(-4j * np.pi / WAVELENGTH_M * path * 3e-3 / path.std())
+    several = sum(3e-2 / rate * np.sin(2 * np.pi * rate * TIME_S) for rate in (5.3, 7.7, 11.9, 13.3))
     records = {
+        "wanders": body(8.0) * wanders,
+        "several rates at once": body(8.0, snr_db=30.0) * np.exp(-4j * np.pi / WAVELENGTH_M * several / 2),
         "steady": body(8.0),
         "fading": body(8.0) * fading,
         "shaken": body(8.0, 12.0, LEAST_M / 3, snr_db=30.0),
