@@ -40,10 +40,11 @@ def test_what_does_not_go_to_and_fro_has_no_heave():
     rates = np.fft.rfftfreq(PULSES, 1 / RADAR["prf_hz"])
     wander = np.where((rates > 1.6) & (rates < 18), rng.normal(size=rates.shape) + 1j * rng.normal(size=rates.shape), 0)
     path = np.fft.irfft(wander, PULSES)
-    wanders = np.exp(-4j * np.pi / WAVELENGTH_M * path * 3e-3 / path.std())
+    wanders, little = (np.exp(-4j * np.pi / WAVELENGTH_M * path * rms_m / path.std()) for rms_m in (3e-3, 1e-3))
     several = sum(3e-2 / rate * np.sin(2 * np.pi * rate * TIME_S) for rate in (5.3, 7.7, 11.9, 13.3))
     records = {
         "wanders": body(8.0) * wanders,
+        "not sure of the rate": body(8.0, 5.3, 3e-3) * little,
         "several rates at once": body(8.0, snr_db=30.0) * np.exp(-4j * np.pi / WAVELENGTH_M * several / 2),
         "steady": body(8.0),
         "fading": body(8.0) * fading,
