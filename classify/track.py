@@ -125,7 +125,7 @@ def fuse(
     evidence = worth[:, None] * mean
     weights = np.exp(evidence - evidence.max(axis=1, keepdims=True))
     fused = weights / weights.sum(axis=1, keepdims=True)
-    fused[(used == 1) & (weight == LOOKS[1])] = p[np.argmax(heard)]  # to the last digit
+    fused[used == 1] = p[np.argmax(heard)]  # to the last digit
     if wings or heaves or steps:
         fused[-1, CLASSES.index("bird")] *= (WING_ODDS if wings else 1) * (HEAVE_ODDS if heaves else 1)
         fused[-1, CLASSES.index("clutter")] *= STEP_ODDS if steps else 1

@@ -110,8 +110,9 @@ def test_declared_at_the_first_dwell_that_names_a_class_at_half_the_odds(p, corr
         so_far = fuse(p[:n], labelled(p)[:n], accept=ACCEPT, correlation=correlation)
         best = float(so_far.probabilities.max())
         needed = 0.6 / 0.4 * 2  # odds
-        assume(abs(best / (1 - best) / needed - 1) > 1e-4)  # float32 cannot tell
-        if best / (1 - best) > needed:
+        odds = best / max(1 - best, 1e-9)
+        assume(abs(odds / needed - 1) > 1e-4)  # float32 cannot tell
+        if odds > needed:
             safe.append((CLASSES[int(so_far.probabilities.argmax())], n))
     assert (track.declared, track.declared_after) == (safe[0] if safe else ("", 0))
 
