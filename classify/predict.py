@@ -7,13 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from bladewing.features.heave import heave
 from bladewing.features.wingbeat import wingbeat
 
 from .errors import BadInput, one_line
+from .fusion import HEAVE_ODDS, LOOKS, STEP_ODDS, WING_ODDS
 from .labels import CLASSES, UNKNOWN
 from .recording import Recording, find_recording, load_recording
 from .samples import positive
-from .track import LONGER, WING_ODDS, Track, fuse
+from .track import Track, fuse
 
 if TYPE_CHECKING:
     from bladewing.models.operating import OperatingPoint
@@ -25,7 +27,7 @@ DWELL_S = 0.08
 """Default length of a dwell [s]."""
 
 WINGS_S = 5.0
-"""How much of a recording, from its start, a wingbeat is sought in [s]."""
+"""How much of a recording, from its start, a wingbeat and a heave are sought in [s]."""
 
 _COLOURS = {"uav": "bold red", "bird": "green", "clutter": "cyan", UNKNOWN: "yellow"}
 
@@ -51,9 +53,13 @@ class Answer:
     dwells
         The answers, shape (dwells,).
     track
-        The dwells together, and the wingbeat.
+        The dwells together, the wingbeat and the heave.
     wingbeat_hz
         Wingbeat rate of the recording [Hz]; None where none is found, or it is shorter than 1.5 s.
+    heave_hz
+        Rate at which the body itself goes to and fro [Hz], or None likewise.
+    steps
+        Whether that is a walker's step, and not a beat of wings.
     """
 
     name: str
@@ -62,6 +68,8 @@ class Answer:
     dwells: "Prediction"
     track: Track
     wingbeat_hz: float | None = None
+    heave_hz: float | None = None
+    steps: bool = False
 
     @property
     def declared_s(self) -> float | None:
@@ -91,6 +99,8 @@ class Answer:
             "declared": self.track.declared or None,
             "declared_s": self.declared_s,
             "wingbeat_hz": None if self.wingbeat_hz is None else round(self.wingbeat_hz, 3),
+            "heave_hz": None if self.heave_hz is None else round(self.heave_hz, 3),
+            "steps": self.steps,
         }
         yield {"file": self.name, "track": track}
 
@@ -125,6 +135,10 @@ class Answer:
         console.print(line)
         if self.wingbeat_hz is not None:
             console.print(Text(f"wingbeat {self.wingbeat_hz:.1f} Hz: the odds of a bird count {WING_ODDS:g} times"))
+        if self.heave_hz is not None:
+            what, odds = ("sways as a walker's", STEP_ODDS) if self.steps else ("heaves as a bird's", HEAVE_ODDS)
+            whose = "clutter" if self.steps else "a bird"
+            console.print(Text(f"body {what} at {self.heave_hz:.1f} Hz: the odds of {whose} count {odds:g} times"))
         if self.declared_s is not None:
             later = "" if self.track.declared == self.track.label else ", which later dwells do not bear out"
             console.print(Text(f"declared {self.track.declared} after {self.declared_s:.3g} s{later}"))
@@ -173,19 +187,34 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
     count, wanted = iq.shape
     dwells = classifier.predict(iq, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
     start_s = recording.start_s + np.arange(count) * wanted / recording.prf_hz
-    longer = None
-    if count >= LONGER:
-        joined = iq[: count // LONGER * LONGER].reshape(count // LONGER, LONGER * wanted)
+    longer = {}
+    for length in [length for length in LOOKS if 1 < length <= count]:
+        joined = iq[: count // length * length].reshape(count // length, length * wanted)
         looks = classifier.predict(joined, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
-        longer = looks.probabilities, looks.labels
-    beat_hz = None
+        longer[length] = looks.probabilities, looks.labels
+    beat_hz = heave_hz = None
+    steps = False
     if any(dwells.labels != UNKNOWN) or np.ptp(dwells.probabilities) > 0:  # else nothing could be judged
         start = recording.iq[: round(WINGS_S * recording.prf_hz)]
-        found = float(wingbeat(start, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz).wingbeat_hz)
-        beat_hz = found if np.isfinite(found) else None
-    wings = beat_hz is not None
-    track = fuse(dwells.probabilities, dwells.labels, longer=longer, wings=wings, rule=classifier.decide)
-    return Answer(recording.name, start_s, start_s + wanted / recording.prf_hz, dwells, track, beat_hz)
+        wings = wingbeat(start, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
+        body = heave(start, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
+        beat_hz, heave_hz = _finite(wings.wingbeat_hz), _finite(body.heave_hz)
+        steps = bool(body.walks)
+    track = fuse(
+        dwells.probabilities,
+        dwells.labels,
+        longer=longer,
+        wings=beat_hz is not None,
+        heaves=heave_hz is not None and not steps,
+        steps=steps,
+        rule=classifier.decide,
+    )
+    stop_s = start_s + wanted / recording.prf_hz
+    return Answer(recording.name, start_s, stop_s, dwells, track, beat_hz, heave_hz, steps)
+
+
+def _finite(value: np.ndarray) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def answers(

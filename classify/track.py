@@ -1,31 +1,22 @@
 """One answer for a track: the dwells of one target put together, and when it was safe to say."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .fusion import CORRELATION, HEAVE_ODDS, LOOKS, STEP_ODDS, WING_ODDS
 from .labels import CLASSES, UNKNOWN, decide
 
-# Dwells of one target share its aspect, its background and the model's own error, so their evidence is correlated:
-# with this coefficient n dwells count as n / (1 + (n - 1) c), at most 1 / c. Measured on 1200 simulated tracks:
-# the calibration error of 31 dwells is 0.026 here, 0.117 at 0.25, 0.064 at 0.5, 0.029 at 0.9 (the table "fusion" of
-# tests/benchmarks/classification_tables.py; 0.65 to 0.8 are as good as one another).
-CORRELATION = 0.72
-
 LONGER = 5
-"""Dwells in a row that are looked at once more as one: a slow target shows its motion only to a long look."""
+"""Dwells of each look that comes without its length."""
 
-# Who may speak after every dwell errs more often than who speaks once: on tracks of 2.5 s, 1.9 % of birds and clutter
-# were declared UAV at limits that 0.8 % of single dwells exceed. Odds halved before they are judged bring 0.9 % back.
+# Who may speak after every dwell errs more often than who speaks once: of the birds and clutter of 1913 tracks of 2.5 s
+# at 0 dB and above 1.6 % were declared UAV, where 0.5 % were named so at the end. Odds halved before they are judged
+# leave 0.7 %, and the median UAV is still declared after its first dwell.
 DOUBT = 2.0
-
-WING_ODDS = 10.0
-"""What a wingbeat, found in the whole track, multiplies the odds of a bird by. On simulated tracks at 0 dB and above
-one is found in 62 % of flapping birds and in 0 to 3 % of any other kind; far less is counted, because the dwells have
-seen the same wings. That none is found says nothing: most gliding and weak birds show none."""
 
 _FLOOR = 1e-6  # no single dwell rules a class out for ever
 
@@ -66,19 +57,23 @@ def fuse(
     probabilities: ArrayLike,
     labels: Sequence[str] | NDArray[np.str_],
     *,
-    longer: Looks | None = None,
+    longer: Looks | Mapping[int, Looks] | None = None,
     wings: bool = False,
+    heaves: bool = False,
+    steps: bool = False,
     accept: Sequence[float] = (0.5, 0.5, 0.5),
     rule: Decide | None = None,
     correlation: float = CORRELATION,
 ) -> Track:
     """Fuse the answers of consecutive dwells of one target.
 
-    The log-probabilities are averaged and weighted by the number of dwells that the correlated ones are worth,
+    Dwells of one target share its aspect, its background and the model's own error, so their evidence is correlated:
+    the log-probabilities are averaged and weighted by the number of dwells that the correlated ones are worth,
     n / (1 + (n - 1) `correlation`). One dwell is left as it is, dwells that agree sharpen each other, and the order
-    does not matter to the label. Longer looks at the same dwells are averaged among themselves, and the mean of the
-    two averages counts. A look without evidence ("unknown" with 1/3 each: outside the envelope, or without signal) is
-    left out; one that was merely not sure counts with what it said.
+    does not matter to the label. A slow target shows its motion only to a long look: looks at several dwells in a row
+    as one are averaged among those of their length, and the mean of all averages counts, weighted by `LOOKS`. A look
+    without evidence ("unknown" with 1/3 each: outside the envelope, or without signal) is left out, and so is a longer
+    one at such a dwell; one that was merely not sure counts with what it said.
 
     A class is declared after the first dwell at which it would be named even with its odds divided by `DOUBT`: one who
     may speak after every dwell must be surer than one who speaks once. So a label may stand that never was declared.
@@ -90,10 +85,12 @@ def fuse(
     labels
         Shape (dwells,), as `Prediction.labels`.
     longer
-        Probabilities and labels of the looks at each `LONGER` dwells in a row; number k is known after dwell
-        k `LONGER`. None without them.
-    wings
-        Whether a wingbeat is found in the whole track; it speaks for a bird at the end, not while dwells come in.
+        By their lengths in dwells, keys of `LOOKS`: probabilities and labels of the looks at so many dwells in a row;
+        number k of length n is known after dwell k n. Looks without their length are of `LONGER` dwells.
+    wings, heaves, steps
+        Whether a wingbeat is found in the whole track; whether the body heaves as wings lift it; whether it sways as a
+        walker's does. They speak for a bird and for clutter at the end, not while dwells come in; that nothing is found
+        says nothing.
     accept
         Least probability at which each class is named, as `Classifier.accept`.
     rule
@@ -104,7 +101,7 @@ def fuse(
     Raises
     ------
     ValueError
-        The shapes do not match, or `correlation` is outside 0 to 1.
+        The shapes do not match, looks are of a length without a weight, or `correlation` is outside 0 to 1.
     """
     if not 0 <= correlation <= 1:
         raise ValueError(f"correlation is {correlation}: it must be in 0 to 1")
@@ -113,21 +110,26 @@ def fuse(
     if not heard.any():
         return Track(UNKNOWN, uniform, "no dwell could be judged", 0)
     # row k: what is known after dwell k + 1
-    mean, used = _running_mean(p, heard)
-    looks = np.zeros(len(p), dtype=np.intp)
-    if longer is not None:
-        long_mean, long_used = _running_mean(*_heard(*longer))
-        known = np.minimum(np.arange(1, len(p) + 1) // LONGER, len(long_used))
-        looks = np.concatenate([[0], long_used])[known]
-        both = looks > 0
-        mean[both] = (mean[both] + long_mean[known[both] - 1]) / 2
+    dwell_mean, used = _running_mean(p, heard)
+    total, weight = LOOKS[1] * dwell_mean, np.full(len(p), LOOKS[1])
+    for length, looks in _by_length(longer).items():
+        look_p, whole = _heard(*looks)
+        silent = np.flatnonzero(~heard) // length
+        whole[silent[silent < len(whole)]] = False
+        look_mean, looked = _running_mean(look_p, whole)
+        known = np.minimum(np.arange(1, len(p) + 1) // length, len(looked))
+        there = np.concatenate([[0], looked])[known] > 0
+        total[there] += LOOKS[length] * look_mean[known[there] - 1]
+        weight[there] += LOOKS[length]
+    mean = total / weight[:, None]
     worth = used / (1 + np.maximum(used - 1, 0) * correlation)
     evidence = worth[:, None] * mean
     weights = np.exp(evidence - evidence.max(axis=1, keepdims=True))
     fused = weights / weights.sum(axis=1, keepdims=True)
-    fused[(used == 1) & (looks == 0)] = p[np.argmax(heard)]  # to the last digit
-    if wings:
-        fused[-1, CLASSES.index("bird")] *= WING_ODDS
+    fused[used == 1] = p[np.argmax(heard)]  # to the last digit
+    if wings or heaves or steps:
+        fused[-1, CLASSES.index("bird")] *= (WING_ODDS if wings else 1) * (HEAVE_ODDS if heaves else 1)
+        fused[-1, CLASSES.index("clutter")] *= STEP_ODDS if steps else 1
         fused[-1] /= fused[-1].sum()
     rule = rule or partial(decide, accept=accept)
     (named, reasons), (doubted, _) = rule(fused), rule(_doubted(fused))
@@ -137,6 +139,16 @@ def fuse(
     declared = str(safe[first]) if safe[first] != UNKNOWN else ""
     after = first + 1 if declared else 0
     return Track(str(named[-1]), fused[-1].astype(np.float32), reasons[-1], int(used[-1]), declared, after)
+
+
+def _by_length(longer: Looks | Mapping[int, Looks] | None) -> Mapping[int, Looks]:
+    """Longer looks by their lengths in dwells, checked."""
+    looks = {} if longer is None else longer if isinstance(longer, Mapping) else {LONGER: longer}
+    for length in looks:
+        if length not in LOOKS or length == 1:
+            known = ", ".join(str(key) for key in LOOKS if key > 1)
+            raise ValueError(f"looks at {length} dwells have no weight: their length must be one of {known}")
+    return looks
 
 
 def _doubted(p: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -30,6 +30,9 @@ _PADDING = 8
 #: Span over which the continuum of fluctuations is followed [Hz], and where it begins.
 _CONTINUUM_HZ, _SLOWEST_HZ = 6.0, 2.0
 
+#: Fluctuation of a level that is rounding [natural logarithm of a float32 power].
+_ROUNDING = 1e-5
+
 #: Stated deviations count neighbouring cells and frames as so much less than independent [1 of the variance].
 _OVERLAP = 2.3
 
@@ -117,7 +120,7 @@ def level_spectrum(
     Returns
     -------
     LevelSpectrum or None
-        None where no cell is over the noise.
+        None where no cell is over the noise, or nothing fluctuates.
     """
     from scipy.ndimage import median_filter  # here, because predicting needs no such import
 
@@ -128,6 +131,8 @@ def level_spectrum(
         return None
     level = np.log1p(power / np.float32(floor)).astype(np.float64)
     level -= level.mean(axis=0)
+    if np.abs(level).max() < _ROUNDING:
+        return None
     size = fft.next_fast_len(_PADDING * len(level), real=True)
     step_hz = frame_rate_hz / size
     taper = np.hanning(len(level) + 2)[1:-1, None]

@@ -4,12 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
-from .notch import body_line
-from .periodogram import LINE_DB
+from .following import followed, standing
 from .repetition import HARMONICS, LevelSpectrum, Repetition, level_spectrum, repetition
-from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum
+from .spectrum import LEAST_FLOOR, SPEED_OF_LIGHT_MPS
 from .stft import stft
 
 #: Wingbeats that are sought [Hz]: the slowest is a swan's in a slow beat, the fastest a small songbird's.
@@ -24,9 +22,6 @@ LEAST_S = 1.5
 #: Frames of the sequence last so long [s], the longer the lower the carrier, for cells of this width [m/s]; and from
 #: frame to frame [s].
 FRAME_S, CELL_MPS, HOP_S = (0.012, 0.024), 1.0, 0.003
-
-#: Dwells by which the body is followed [s].
-BODY_DWELL_S = 0.1
 
 #: Wings move within this of the body [m/s], and birds fly no faster.
 WING_MPS = 25.0
@@ -55,9 +50,6 @@ GAIT_HZ, GAIT_MPS, LIMB_SPEEDS = 4.6, 3.0, 2.5
 #: A vehicle's wheels are this much weaker than its body [dB], roll so far a turn [m], and their rims move about the
 #: body so many times as fast as it moves itself: once, but for parts that show unlike speeds near the road.
 WHEEL_BODY_DB, WHEEL_TURN_M, RIM_SPEEDS = 6.0, (1.2, 4.5), (0.4, 1.3)
-
-#: What stands at rest in this sense is taken for the background [m/s, m/s^2], and taken out so far about velocity zero.
-REST_MPS, REST_MPS2, REST_NOTCH_MPS = 0.4, 0.15, 0.5
 
 
 @dataclass(frozen=True)
@@ -155,17 +147,16 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     if prf_hz * wavelength_m / 4 < 1.1 * WING_MPS:
         # a rotor folded into the wings' speeds cannot be told from them
         return (*nothing, f"no wingbeat: unambiguous only to {prf_hz * wavelength_m / 4:.1f} m/s")
-    shown, body = _followed(iq / scale, carrier_hz, prf_hz)
-    velocity, acceleration, _ = body
+    shown, body = followed(iq / scale, carrier_hz, prf_hz)
+    velocity = body[0]
     if np.isnan(velocity):
         return (*nothing, "no wingbeat: no body line")
-    time_s = (np.arange(len(iq)) - (len(iq) - 1) / 2) / prf_hz
-    turns = 2 / wavelength_m * (velocity * time_s + acceleration / 2 * time_s**2)
-    steady = shown * np.exp(2j * np.pi * (turns - np.rint(turns))).astype(np.complex64)
+    steady = standing(shown, body, carrier_hz, prf_hz)
     frame_s = float(np.clip(wavelength_m / 2 / CELL_MPS, *FRAME_S))
     frames = stft(steady, carrier_hz=carrier_hz, prf_hz=prf_hz, window_s=frame_s, overlap=1 - HOP_S / frame_s)
     # the floor from a low quantile of each bin's mean: wings fill the middle
-    floor = float(np.quantile(frames.power.mean(axis=0, dtype=np.float64), 0.2))
+    mean = frames.power.mean(axis=0, dtype=np.float64)
+    floor = max(float(np.quantile(mean, 0.2)), float(LEAST_FLOOR * mean.mean()))
     # closing on the radar is a positive Doppler shift, and a velocity below the body's
     velocities = velocity - frames.frequency_hz * wavelength_m / 2
     near = np.abs(velocities - velocity) <= WING_MPS
@@ -234,38 +225,3 @@ def _not_wings(found: Repetition, body_mps: float, motion: _Motion, far: LevelSp
     if rolls and motion.body_db > WHEEL_BODY_DB:
         return f"what repeats at {rate:.1f} Hz may be a wheel's turn"
     return ""
-
-
-def _followed(
-    iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float
-) -> tuple[NDArray[np.complex64], tuple[float, float, float]]:
-    """The samples without a background at rest, and the track of the body in them."""
-    body = _track(iq, carrier_hz, prf_hz)
-    if not (abs(body[0]) < REST_MPS and abs(body[1]) < REST_MPS2):
-        return iq, body
-    away = np.abs(fft.fftfreq(len(iq), 1 / prf_hz)) * SPEED_OF_LIGHT_MPS / carrier_hz / 2
-    kept = np.clip((away / REST_NOTCH_MPS - 1) / 0.3, 0, 1).astype(np.float32)
-    moving = fft.ifft(fft.fft(iq) * kept)
-    other = _track(moving, carrier_hz, prf_hz)
-    return (iq, body) if np.isnan(other[0]) else (moving, other)
-
-
-def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[float, float, float]:
-    """Velocity in the middle, acceleration and its deviation, from a line through the velocities of the dwells."""
-    length = round(BODY_DWELL_S * prf_hz)
-    count = len(iq) // length
-    spectrum = doppler_spectrum(iq[: count * length].reshape(count, length), carrier_hz=carrier_hz, prf_hz=prf_hz)
-    body = body_line(spectrum)
-    if np.median(body.level_db) < LINE_DB:
-        return np.nan, np.nan, np.nan
-    velocity = body.velocity_mps.astype(np.float64)
-    ambiguous = prf_hz * spectrum.wavelength_m / 2
-    velocity = np.unwrap(velocity, period=ambiguous)
-    when = ((np.arange(count) + 0.5) * length - (len(iq) - 1) / 2) / prf_hz
-    # a dwell whose strongest line is a wing's must not turn the line: medians of slopes (Theil and Sen)
-    first, second = np.triu_indices(count, 1)
-    slope = float(np.median((velocity[second] - velocity[first]) / (when[second] - when[first])))
-    rest = velocity - slope * when
-    middle = float(np.median(rest))
-    spread = 1.4826 * float(np.median(np.abs(rest - middle)))
-    return middle, slope, spread / float(np.sqrt(((when - when.mean()) ** 2).sum()))

@@ -17,10 +17,9 @@ from bladewing.classify.labels import CLASSES, decide, decide_by_sets
 from bladewing.classify.ladder import COST_KEY, by_place, shipped_account
 from bladewing.classify.predict import answer
 from bladewing.classify.recording import Recording, load_recording
-from bladewing.classify.track import CORRELATION, LONGER, fuse
 from bladewing.classify.training_account import figures
 from bladewing.features.wingbeat import wingbeat
-from bladewing.models.calibration import conformal_thresholds, expected_calibration_error, negative_log_likelihood
+from bladewing.models.calibration import conformal_thresholds
 from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.dataset import KINDS, draw_radar
 
@@ -112,22 +111,27 @@ def track_radars(count: int) -> Iterator[Radar]:
     """Radars that can hold a decision: to 40 m/s and more; PRFs to 25 kHz, so that a track fits a few MB."""
     rng = np.random.default_rng(7)
     for _ in range(count):
-        carrier_hz = 2e9 * (35 / 2) ** rng.random()
-        prf_hz = min(4 * carrier_hz / 299_792_458 * 40 * (200 / 40) ** rng.random(), 25e3)
-        yield Radar(carrier_hz, prf_hz, round(TRACK_S * prf_hz))
+        yield track_radar(rng)
 
 
-def drawn_tracks(count: int, purpose: str) -> Iterator[tuple[Radar, np.ndarray, dict]]:
-    """Samples and truth of each radar's tracks, balanced over the classes, long records cut by whoever looks."""
+def track_radar(rng: np.random.Generator) -> Radar:
+    """One of them, from the next two numbers."""
+    carrier_hz = 2e9 * (35 / 2) ** rng.random()
+    prf_hz = min(4 * carrier_hz / 299_792_458 * 40 * (200 / 40) ** rng.random(), 25e3)
+    return Radar(carrier_hz, prf_hz, round(TRACK_S * prf_hz))
+
+
+def drawn_tracks(count: int) -> Iterator[tuple[Radar, np.ndarray, dict]]:
+    """Samples and truth of each radar's tracks, balanced over the classes."""
     for number, radar in enumerate(track_radars(-(-count // OF_RADAR))):
-        records = draw_records(radar, OF_RADAR, 7, purpose=purpose, start=number * OF_RADAR)
+        records = draw_records(radar, OF_RADAR, 7, purpose="bench", start=number * OF_RADAR)
         yield radar, records.iq, {"label": records.labels, **records.truth}
 
 
 def tracks(classifier: Classifier, count: int) -> None:
     """Tracks of 2.5 s at 0 dB and above, noise among them: accuracy, what was declared and when, wingbeat."""
     parts = []
-    for radar, iq, truth in drawn_tracks(count // 6, "bench"):
+    for radar, iq, truth in drawn_tracks(count // 6):
         for row, samples in enumerate(iq):
             if not (truth["snr_db"][row] >= 0 or truth["kind"][row] == "noise"):
                 continue
@@ -140,6 +144,7 @@ def tracks(classifier: Classifier, count: int) -> None:
                 {name: values[row] for name, values in truth.items()}
                 | said
                 | {"beat": beat.wingbeat_hz, "beat_std": beat.wingbeat_hz_std}
+                | {"heave": np.nan if given.heave_hz is None else given.heave_hz, "steps": given.steps}
             )
     every = {name: np.array([part[name] for part in parts]) for name in parts[0]}
     truth = every["label"]
@@ -174,6 +179,13 @@ def tracks(classifier: Classifier, count: int) -> None:
     print(
         "wingbeats where there is none: " + ", ".join(f"{kind} {hit.sum()}/{len(hit)}" for kind, hit in false.items())
     )
+    heaves = {kind: np.isfinite(every["heave"][every["kind"] == kind]) for group in KINDS.values() for kind in group}
+    print("heaves, walkers' steps among them: " + ", ".join(f"{kind} {hit.mean():.2f}" for kind, hit in heaves.items()))
+    walkers, beats = every["kind"] == "person", np.abs(every["heave"] - every["wingbeat_hz"])[flapping]
+    print(
+        f"steps: walkers {every['steps'][walkers].mean():.2f}, others {every['steps'][~walkers].mean():.3f}; "
+        f"heaves of flapping birds within 0.3 Hz of the wingbeat {(beats <= 0.3).sum() / np.isfinite(beats).sum():.2f}"
+    )
     print(f"{'':16s} {'n':>6s} {'best':>8s} " + " ".join(f"{name:>8s}" for name in (*CLASSES, "unknown")))
     for kind in (kind for group in KINDS.values() for kind in group):
         rows = every["kind"] == kind
@@ -207,35 +219,6 @@ def coverage(classifier: Classifier, count: int) -> None:
         row(f"coverage {wanted:g}", decide_by_sets(p, limits, wanted)[0], held)
 
 
-def fusion(classifier: Classifier, count: int) -> None:
-    """What the correlation of dwells should be: calibration of fused probabilities, tracks of every SNR."""
-    seen = []
-    for radar, iq, truth in drawn_tracks(count // 6, "calibrate"):
-        shown = {"carrier_hz": radar.carrier_hz, "prf_hz": radar.prf_hz}
-        pulses = round(DWELL_S * radar.prf_hz)
-        dwells = classifier.predict(_cut(iq, pulses), **shown)
-        looks = classifier.predict(_cut(iq, LONGER * pulses), **shown)
-        seen += [
-            (dwells.probabilities[row], dwells.labels[row], (looks.probabilities[row], looks.labels[row]), label)
-            for row, label in enumerate(truth["label"])
-        ]
-    truth = np.array([CLASSES.index(label) for *_, label in seen])
-    print(f"\nfused probabilities of {len(seen)} tracks of every SNR: calibration error, nats a track")
-    lengths = (1, 2, 4, 5, 10, 20, 31)
-    print("correlation | " + " | ".join(f"{length:4d} dwells" for length in lengths))
-    for longer in (False, True):
-        for correlation in (0.25, 0.5, 0.6, 0.65, 0.7, CORRELATION, 0.75, 0.8, 0.9):
-            cells = []
-            for length in lengths:
-                p = np.array([
-                    fuse(p[:length], labels[:length], longer=looks if longer else None, correlation=correlation)
-                    .probabilities for p, labels, looks, _ in seen
-                ])  # fmt: skip
-                error = expected_calibration_error(p, truth)
-                cells.append(f"{error:.3f} {negative_log_likelihood(p, truth):.3f}")
-            print(f"{correlation:11.2f} | " + " | ".join(cells) + ("" if longer else "   without longer looks"))
-
-
 def cascade(classifier: Classifier, count: int) -> None:
     """Whether to ask the fastest model first and this one only where that is unsure: accuracy against cost."""
     account = shipped_account()
@@ -259,16 +242,10 @@ def cascade(classifier: Classifier, count: int) -> None:
         )
 
 
-def _cut(iq: np.ndarray, pulses: int) -> np.ndarray:
-    count = iq.shape[-1] // pulses
-    return iq[:, : count * pulses].reshape(len(iq), count, pulses)
-
-
 TABLES: dict[str, Callable[[Classifier, int], None]] = {
     "detection": detection,
     "kinds": kinds,
     "tracks": tracks,
-    "fusion": fusion,
     "coverage": coverage,
     "cascade": cascade,
     "recordings": recordings,

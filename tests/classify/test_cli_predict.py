@@ -14,6 +14,8 @@ from bladewing.classify.cli import main
 PRF_HZ = 20e3
 NAMES = ["uav", "bird", "clutter"]
 
+STILL = {"wingbeat_hz": None, "heave_hz": None, "steps": False}  # of a recording without wings and limbs
+
 
 def noise(pulses: int) -> np.ndarray:
     return np.random.default_rng(0).normal(size=2 * pulses).astype(np.float32).view(np.complex64)
@@ -63,7 +65,8 @@ def test_one_line_a_dwell_and_a_closing_line(run_json, sigmf_pair):
     assert second == said | {"start_s": 0.08, "stop_s": 0.16, "reason": None}
     assert list(first) == ["file", "start_s", "stop_s", "label", "probabilities", "reason"]
     assert list(closing) == ["file", "track"]
-    assert list(closing["track"]) == ["label", "probabilities", "dwells", "declared", "declared_s", "wingbeat_hz"]
+    fields = ["label", "probabilities", "dwells", "declared", "declared_s", "wingbeat_hz", "heave_hz", "steps"]
+    assert list(closing["track"]) == fields
     assert (closing["track"]["label"], closing["track"]["dwells"]) == ("uav", 2)
     assert (closing["track"]["declared"], closing["track"]["declared_s"]) == ("uav", 0.08)
     assert list(closing["track"]["probabilities"]) == NAMES
@@ -102,7 +105,7 @@ def test_outside_the_envelope_is_answered_unknown_with_the_cure(run_json, sigmf_
     }
     assert dwells[0]["probabilities"] == dict.fromkeys(NAMES, 0.333333)
     nothing = {"label": "unknown", "probabilities": dict.fromkeys(NAMES, 0.333333), "declared": None}
-    assert closing["track"] == nothing | {"dwells": 4, "declared_s": None, "wingbeat_hz": None}
+    assert closing["track"] == nothing | {"dwells": 4, "declared_s": None} | STILL
 
 
 def test_a_dwell_too_short_is_unknown(run_json, sigmf_pair):
@@ -128,7 +131,7 @@ def test_a_silent_dwell_is_unknown_and_left_out_of_the_track(run_json, sigmf_pai
     assert closing["track"] == said | {
         "declared": "uav",
         "declared_s": 0.16,
-        "wingbeat_hz": None,
+        **STILL,
     }  # the silent dwell took its time
 
 

@@ -1,13 +1,15 @@
 import numpy as np
 import pytest
-from bladewing.classify import Classifier
+from bladewing.classify.fusion import CORRELATION, HEAVE_ODDS, LOOKS, STEP_ODDS, WING_ODDS
+from bladewing.classify.inference import Classifier, Envelope, Prediction
 from bladewing.classify.labels import CLASSES, UNKNOWN, decide
 from bladewing.classify.predict import answer
 from bladewing.classify.recording import Recording
-from bladewing.classify.track import CORRELATION, LONGER, WING_ODDS, fuse
+from bladewing.classify.track import LONGER, fuse
 from bladewing.simulate import Radar, draw_records
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from rich.console import Console
 
 ACCEPT = (0.6, 0.6, 0.6)
 
@@ -90,7 +92,7 @@ def test_correlated_dwells_are_never_worth_more_than_the_limit():
 def test_dwells_that_are_not_sure_add_up_to_an_answer():
     p = np.tile(np.float32([0.55, 0.25, 0.20]), (5, 1))
     assert set(labelled(p)) == {UNKNOWN}
-    assert fuse(p, labelled(p), accept=ACCEPT).label == "uav"
+    assert fuse(p, labelled(p), accept=ACCEPT, correlation=0.72).label == "uav"
 
 
 def test_contradiction_is_unknown():
@@ -108,8 +110,9 @@ def test_declared_at_the_first_dwell_that_names_a_class_at_half_the_odds(p, corr
         so_far = fuse(p[:n], labelled(p)[:n], accept=ACCEPT, correlation=correlation)
         best = float(so_far.probabilities.max())
         needed = 0.6 / 0.4 * 2  # odds
-        assume(abs(best / (1 - best) / needed - 1) > 1e-4)  # float32 cannot tell
-        if best / (1 - best) > needed:
+        odds = best / max(1 - best, 1e-9)
+        assume(abs(odds / needed - 1) > 1e-4)  # float32 cannot tell
+        if odds > needed:
             safe.append((CLASSES[int(so_far.probabilities.argmax())], n))
     assert (track.declared, track.declared_after) == (safe[0] if safe else ("", 0))
 
@@ -141,18 +144,37 @@ def test_stopping_early_keeps_what_calibrated_probabilities_promise():
     assert right.mean() < 0.95  # it declares as soon as it may, not later
 
 
-@given(dwells(least=2 * LONGER, most=3 * LONGER), dwells(least=1, most=3))
-def test_a_longer_look_counts_from_when_it_is_there(p, looks):
-    longer = looks, labelled(looks)
-    for n in (LONGER - 1, LONGER, 2 * LONGER):
-        given_looks = fuse(p[:n], labelled(p)[:n], longer=longer, accept=ACCEPT).probabilities
-        known = looks[: n // LONGER]
-        mean = np.log(p[:n].astype(float)).mean(axis=0)
-        if len(known):
-            mean = (mean + np.log(np.maximum(known, 1e-6).astype(float)).mean(axis=0)) / 2
+def mean_log(p):
+    return np.log(np.maximum(p, 1e-6).astype(float)).mean(axis=0)
+
+
+@given(dwells(least=30, most=30), dwells(least=15, most=15), dwells(least=6, most=6), dwells(least=2, most=2))
+def test_longer_looks_count_by_their_weight_from_when_they_are_there(p, two, five, twelve):
+    assume(min(np.ptp(x, axis=1).min() for x in (p, two, five, twelve)) > 1e-5)  # uniform ones say nothing
+    looks = {2: two, 5: five, 12: twelve}
+    longer = {length: (x, labelled(x)) for length, x in looks.items()}
+    for n in (1, 2, 4, 5, 11, 12, 30):
+        found = fuse(p[:n], labelled(p)[:n], longer=longer, accept=ACCEPT).probabilities
+        means = {1: mean_log(p[:n])} | {k: mean_log(x[: n // k]) for k, x in looks.items() if n >= k}
+        mean = sum(LOOKS[k] * x for k, x in means.items()) / sum(LOOKS[k] for k in means)
         odds = np.exp(n / (1 + (n - 1) * CORRELATION) * (mean - mean.max()))
-        silent = np.ptp(np.concatenate([p[:n], known]), axis=1).min() < 1e-5
-        assert silent or given_looks == pytest.approx(odds / odds.sum(), abs=1e-5)
+        assert found == pytest.approx(odds / odds.sum(), abs=1e-5)
+
+
+def test_looks_without_their_length_are_of_five_dwells():
+    p, looks = np.tile(np.float32([0.5, 0.3, 0.2]), (10, 1)), np.float32([[0.2, 0.7, 0.1], [0.1, 0.6, 0.3]])
+    plain = fuse(p, labelled(p), longer=(looks, labelled(looks)))
+    by_length = fuse(p, labelled(p), longer={LONGER: (looks, labelled(looks))})
+    assert LONGER == 5
+    np.testing.assert_array_equal(plain.probabilities, by_length.probabilities)
+    assert plain.probabilities[1] > fuse(p, labelled(p)).probabilities[1]
+
+
+@pytest.mark.parametrize("length", [1, 7])
+def test_a_length_without_a_weight_is_refused(length):
+    p = np.tile(np.float32([0.5, 0.3, 0.2]), (10, 1))
+    with pytest.raises(ValueError, match=f"looks at {length} dwells have no weight: their length must be one of 2, 5"):
+        fuse(p, labelled(p), longer={length: (p, labelled(p))})
 
 
 def test_a_silent_longer_look_changes_nothing():
@@ -160,6 +182,18 @@ def test_a_silent_longer_look_changes_nothing():
     alone = fuse(p, labelled(p), accept=ACCEPT)
     silent = fuse(p, labelled(p), longer=(np.full((1, 3), 1 / 3), [UNKNOWN]), accept=ACCEPT)
     np.testing.assert_array_equal(alone.probabilities, silent.probabilities)
+
+
+def test_a_longer_look_at_a_silent_dwell_is_left_out():
+    # what is cut into silence shows edges that no target has
+    p = np.tile(np.float32([0.55, 0.25, 0.2]), (10, 1))
+    p[7] = 1 / 3
+    said = np.where(np.arange(10) == 7, UNKNOWN, "uav")
+    looks = np.float32([[0.1, 0.8, 0.1], [0.8, 0.1, 0.1]])
+    both = fuse(p, said, longer={5: (looks, ["bird", "uav"])})
+    first = fuse(p, said, longer={5: (looks[:1], ["bird"])})
+    np.testing.assert_array_equal(both.probabilities, first.probabilities)
+    assert first.probabilities[1] > fuse(p, said).probabilities[1]
 
 
 @pytest.mark.parametrize("count", [0, 1, 7])
@@ -194,15 +228,70 @@ def test_reason_shows_that_the_probability_is_below_the_limit():
     assert reasons == ["not sure: best uav 0.48 < 0.62", "not sure: best uav 0.6199 < 0.6200", ""]
 
 
-def test_a_wingbeat_multiplies_the_odds_of_a_bird_at_the_end_alone():
-    p = [[0.5, 0.3, 0.2]] * 4
-    plain, winged = fuse(p, ["unknown"] * 4), fuse(p, ["unknown"] * 4, wings=True)
-    odds = [track.probabilities / (1 - track.probabilities) for track in (plain, winged)]
-    assert odds[1][1] == pytest.approx(WING_ODDS * odds[0][1], rel=1e-5)
-    assert winged.probabilities[0] / winged.probabilities[2] == pytest.approx(
-        plain.probabilities[0] / plain.probabilities[2], rel=1e-5
-    )
-    assert winged.label == "bird"
+@pytest.mark.parametrize(
+    ("found", "name", "factor"),
+    [
+        ({"wings": True}, "bird", WING_ODDS),
+        ({"heaves": True}, "bird", HEAVE_ODDS),
+        ({"wings": True, "heaves": True}, "bird", WING_ODDS * HEAVE_ODDS),
+        ({"steps": True}, "clutter", STEP_ODDS),
+    ],
+)
+def test_what_the_whole_track_shows_multiplies_odds_at_the_end_alone(found, name, factor):
+    p = [[0.4, 0.3, 0.3]] * 4
+    # so low that what is found lets the class be declared
+    plain, shown = (fuse(p, ["unknown"] * 4, accept=(0.3,) * 3, **known) for known in ({}, found))
+    best = CLASSES.index(name)
+    odds = [track.probabilities / (1 - track.probabilities) for track in (plain, shown)]
+    assert odds[1][best] == pytest.approx(factor * odds[0][best], rel=1e-5)
+    others = [k for k in range(3) if k != best]
+    ratios = [track.probabilities[others[0]] / track.probabilities[others[1]] for track in (plain, shown)]
+    assert ratios[1] == pytest.approx(ratios[0], rel=1e-5)
+    assert (plain.declared, shown.declared, shown.declared_after) == ("", name, 4)
+
+
+class Asked:
+    """A classifier that is never sure, and what it was asked."""
+
+    decide = staticmethod(lambda p: decide(p, ACCEPT))
+
+    def __init__(self, envelope):
+        self.envelope, self.shapes = envelope, []
+
+    def predict(self, iq, *, carrier_hz, prf_hz):
+        self.shapes.append(iq.shape)
+        p = np.tile(np.float32([0.4, 0.3, 0.3]), (len(iq), 1))
+        return Prediction(decide(p, ACCEPT)[0], p, np.full(len(iq), ""))
+
+
+@pytest.mark.parametrize(("count", "lengths"), [(1, [1]), (2, [1, 2]), (13, [1, 2, 5, 12]), (31, [1, 2, 5, 12, 31])])
+def test_as_many_looks_of_each_length_as_the_recording_holds(count, lengths):
+    asked = Asked(Envelope())
+    noise = np.random.default_rng(3).normal(size=(count * 80 + 30, 2)).view(complex)[:, 0]
+    given = answer(Recording("x", noise, 10e9, 4e3), asked, dwell_s=0.02)
+    assert asked.shapes == [(count // length, length * 80) for length in lengths]
+    assert given.track.used == count
+
+
+@pytest.mark.parametrize(("velocity_mps", "rate_hz", "steps"), [(-1.6, 3.2, True), (7.0, 5.0, False)])
+def test_a_body_that_goes_to_and_fro_is_reported_and_counts(velocity_mps, rate_hz, steps, capsys):
+    time_s = np.arange(10_000) / 4e3
+    path = velocity_mps * time_s + 6e-3 * np.sin(2 * np.pi * rate_hz * time_s)
+    noise = np.random.default_rng(4).normal(scale=0.2, size=(10_000, 2)).view(complex)[:, 0]
+    recording = Recording("x", np.exp(-4j * np.pi * 10e9 / 299_792_458 * path) + noise, 10e9, 4e3)
+    given = answer(recording, Asked(Envelope()))
+    assert given.heave_hz == pytest.approx(rate_hz, abs=0.05)
+    closing = list(given.json_objects())[-1]["track"]
+    assert (closing["heave_hz"], closing["steps"]) == (round(given.heave_hz, 3), steps)
+    _, bird, clutter = given.track.probabilities  # alike in every look
+    given.print(Console())
+    said = capsys.readouterr().out
+    if steps:
+        assert f"body sways as a walker's at {rate_hz} Hz: the odds of clutter count {STEP_ODDS:g} times" in said
+        assert clutter / bird == pytest.approx(STEP_ODDS, rel=1e-5)
+    else:
+        assert f"body heaves as a bird's at {rate_hz} Hz: the odds of a bird count {HEAVE_ODDS:g} times" in said
+        assert bird / clutter == pytest.approx(HEAVE_ODDS, rel=1e-5)
 
 
 def test_a_flapping_bird_shows_its_wingbeat_in_the_track_and_a_short_one_none():

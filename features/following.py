@@ -1,0 +1,73 @@
+"""A body followed through a long recording: its steady course, and the samples as if it stood still."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from .notch import body_line
+from .periodogram import LINE_DB
+from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum
+
+#: Dwells by which the body is followed [s].
+BODY_DWELL_S = 0.1
+
+#: What stands at rest in this sense is taken for the background [m/s, m/s^2], and taken out so far about velocity zero.
+REST_MPS, REST_MPS2, REST_NOTCH_MPS = 0.4, 0.15, 0.5
+
+#: Velocity in the middle [m/s], acceleration and its deviation [m/s^2]; NaN where no line stands out.
+Course = tuple[float, float, float]
+
+
+def followed(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[NDArray[np.complex64], Course]:
+    """The samples without a background at rest, and the course of the body in them.
+
+    Parameters
+    ----------
+    iq : ndarray of complex64, shape (pulses,)
+        A recording of two `BODY_DWELL_S` and more, of a size whose square float32 holds.
+    carrier_hz, prf_hz : float
+        Carrier and pulse repetition frequency [Hz], > 0.
+
+    Returns
+    -------
+    samples : ndarray of complex64, shape (pulses,)
+        As given, or with what is slower than `REST_NOTCH_MPS` taken out, where that was the strongest line.
+    course : Course
+    """
+    body = _track(iq, carrier_hz, prf_hz)
+    if not (abs(body[0]) < REST_MPS and abs(body[1]) < REST_MPS2):
+        return iq, body
+    away = np.abs(fft.fftfreq(len(iq), 1 / prf_hz)) * SPEED_OF_LIGHT_MPS / carrier_hz / 2
+    kept = np.clip((away / REST_NOTCH_MPS - 1) / 0.3, 0, 1).astype(np.float32)
+    moving = fft.ifft(fft.fft(iq) * kept)
+    other = _track(moving, carrier_hz, prf_hz)
+    return (iq, body) if np.isnan(other[0]) else (moving, other)
+
+
+def standing(iq: NDArray[np.complex64], course: Course, carrier_hz: float, prf_hz: float) -> NDArray[np.complex64]:
+    """The samples as if the body stood still, shape (pulses,)."""
+    velocity, acceleration, _ = course
+    time_s = (np.arange(len(iq)) - (len(iq) - 1) / 2) / prf_hz
+    turns = 2 * carrier_hz / SPEED_OF_LIGHT_MPS * (velocity * time_s + acceleration / 2 * time_s**2)
+    return iq * np.exp(2j * np.pi * (turns - np.rint(turns))).astype(np.complex64)
+
+
+def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> Course:
+    """Velocity in the middle, acceleration and its deviation, from a line through the velocities of the dwells."""
+    length = round(BODY_DWELL_S * prf_hz)
+    count = len(iq) // length
+    spectrum = doppler_spectrum(iq[: count * length].reshape(count, length), carrier_hz=carrier_hz, prf_hz=prf_hz)
+    body = body_line(spectrum)
+    if np.median(body.level_db) < LINE_DB:
+        return np.nan, np.nan, np.nan
+    velocity = body.velocity_mps.astype(np.float64)
+    ambiguous = prf_hz * spectrum.wavelength_m / 2
+    velocity = np.unwrap(velocity, period=ambiguous)
+    when = ((np.arange(count) + 0.5) * length - (len(iq) - 1) / 2) / prf_hz
+    # a dwell whose strongest line is a wing's must not turn the line: medians of slopes (Theil and Sen)
+    first, second = np.triu_indices(count, 1)
+    slope = float(np.median((velocity[second] - velocity[first]) / (when[second] - when[first])))
+    rest = velocity - slope * when
+    middle = float(np.median(rest))
+    spread = 1.4826 * float(np.median(np.abs(rest - middle)))
+    return middle, slope, spread / float(np.sqrt(((when - when.mean()) ** 2).sum()))

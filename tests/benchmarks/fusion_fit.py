@@ -1,0 +1,211 @@
+"""Fit what each piece of a track counts and write classify/fusion.py. Run: python -m tests.benchmarks.fusion_fit.
+
+Tracks of 2.5 s and every SNR, of radars and a seed of their own: record i comes from (SEED, i) alone. The table tells
+what each piece brings on the carriers that it was not fitted on: below the middle of the band from those above it, and
+the other way round. Eight minutes on two cores.
+"""
+
+import argparse
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import lru_cache, partial
+from pathlib import Path
+
+import numpy as np
+from bladewing.classify import Classifier
+from bladewing.classify.fusion import CORRELATION, HEAVE_ODDS, LOOKS, STEP_ODDS, WING_ODDS
+from bladewing.classify.labels import CLASSES
+from bladewing.classify.track import fuse
+from bladewing.features.heave import heave
+from bladewing.features.wingbeat import wingbeat
+from bladewing.models.calibration import expected_calibration_error, negative_log_likelihood
+from bladewing.simulate import draw_records
+from scipy import optimize
+
+from .classification_tables import DWELL_S, OF_RADAR, track_radar
+
+TABLE = Path(__file__).parents[2] / "classify" / "fusion.py"
+SEED, RADARS = 2024, 160
+LENGTHS = (1, 2, 5, 12, 31)
+WHOLE = 31  # dwells of a track
+AFTER = (2, 5, 10, 12, 20, WHOLE)  # dwells after which the probabilities are to be right
+RIDGE = 1e-4  # keeps a weight that nothing depends on where it began
+MIDDLE_HZ = 2e9 * (35 / 2) ** 0.5  # of the carriers drawn, on their logarithm
+
+Arrays = dict[str, np.ndarray]
+
+
+@lru_cache(maxsize=1)
+def _classifier(model: str | None) -> Classifier:
+    return Classifier.load(model)
+
+
+def seen(model: str | None, group: int) -> Arrays:
+    """The tracks of one radar as the decision sees them: rows are tracks."""
+    radar = track_radar(np.random.default_rng((SEED, group)))
+    shown = {"carrier_hz": radar.carrier_hz, "prf_hz": radar.prf_hz}
+    records = draw_records(radar, OF_RADAR, SEED, purpose="calibrate", start=group * OF_RADAR)
+    out = {"label": records.label_indices, "carrier_hz": np.full(OF_RADAR, radar.carrier_hz)}
+    out |= {"kind": records.truth["kind"], "snr_db": records.truth["snr_db"]}
+    for length in LENGTHS:
+        pulses = length * round(DWELL_S * radar.prf_hz)
+        count = WHOLE // length
+        looks = _classifier(model).predict(records.iq[:, : count * pulses].reshape(-1, count, pulses), **shown)
+        out |= {f"p{length}": looks.probabilities, f"label{length}": looks.labels}
+    body = heave(records.iq, **shown)
+    out["wings"] = np.isfinite(wingbeat(records.iq, **shown).wingbeat_hz)
+    out["steps"], out["heaves"] = body.walks, np.isfinite(body.heave_hz) & ~body.walks
+    return out
+
+
+def means(tracks: Arrays, after: int, length: int) -> np.ndarray:
+    """Mean log-probability of the looks of a length after so many dwells, shape (tracks, 3)."""
+    return np.log(np.maximum(tracks[f"p{length}"][:, : after // length].astype(np.float64), 1e-6)).mean(axis=1)
+
+
+class Model:
+    """The pieces that are fitted, in one vector: logarithms of weights and odds, and the correlation's logit.
+
+    Parameters
+    ----------
+    lengths
+        Looks that count; the weight of the first is 1.
+    numbers
+        Names of what the whole track shows, among "wings", "heaves" and "steps".
+    """
+
+    def __init__(self, lengths: Sequence[int] = LENGTHS, numbers: Sequence[str] = ("wings", "heaves", "steps")) -> None:
+        self.lengths, self.numbers = tuple(lengths), tuple(numbers)
+        self.values = np.array([1.0, *[1.0] * (len(lengths) - 1), *[1.0] * len(numbers)])
+
+    def read(self, values: np.ndarray) -> tuple[float, dict[int, float], dict[str, float]]:
+        """Correlation, weights and odds."""
+        cut = len(self.lengths)
+        weights = dict(zip(self.lengths, [1.0, *np.exp(values[1:cut])], strict=True))
+        return float(1 / (1 + np.exp(-values[0]))), weights, dict(zip(self.numbers, np.exp(values[cut:]), strict=True))
+
+    def fit(self, tracks: Arrays) -> "Model":
+        """Choose the values of least nats a track, mean over the times in `AFTER`."""
+        held = {after: {n: means(tracks, after, n) for n in self.lengths if n <= after} for after in AFTER}
+        shown = {name: tracks[name] for name in self.numbers}
+
+        def loss(values: np.ndarray) -> float:
+            read = self.read(values)
+            nats = [negative_log_likelihood(fused(held[k], k, shown, *read), tracks["label"]) for k in AFTER]
+            return float(np.mean(nats)) + RIDGE * float(values @ values)
+
+        self.values = optimize.minimize(loss, self.values, method="L-BFGS-B").x
+        return self
+
+    def probabilities(self, tracks: Arrays) -> np.ndarray:
+        """Of whole tracks, shape (tracks, 3)."""
+        held = {length: means(tracks, WHOLE, length) for length in self.lengths}
+        return fused(held, WHOLE, {name: tracks[name] for name in self.numbers}, *self.read(self.values))
+
+
+def fused(
+    held: dict[int, np.ndarray],
+    after: int,
+    shown: Arrays,
+    correlation: float,
+    weights: dict[int, float],
+    odds: dict[str, float],
+) -> np.ndarray:
+    """What `fuse` gives for tracks without silent dwells, all at once, shape (tracks, 3)."""
+    total = sum(weights[length] * mean for length, mean in held.items())
+    evidence = total / sum(weights[length] for length in held) * (after / (1 + (after - 1) * correlation))
+    if after == WHOLE:
+        for name, factor in odds.items():
+            evidence[:, CLASSES.index("clutter" if name == "steps" else "bird")] += np.log(factor) * shown[name]
+    p = np.exp(evidence - evidence.max(axis=1, keepdims=True))
+    return p / p.sum(axis=1, keepdims=True)
+
+
+def checked(tracks: Arrays) -> None:
+    """Compare `fused` with the product's own `fuse`, at the constants as they are."""
+    held = {length: means(tracks, WHOLE, length) for length in LOOKS}
+    odds = {"wings": WING_ODDS, "heaves": HEAVE_ODDS, "steps": STEP_ODDS}
+    here = fused(held, WHOLE, tracks, CORRELATION, LOOKS, odds)
+    for row in range(50):
+        longer = {length: (tracks[f"p{length}"][row], tracks[f"label{length}"][row]) for length in LOOKS if length > 1}
+        found = {name: bool(tracks[name][row]) for name in odds}
+        there = fuse(tracks["p1"][row], tracks["label1"][row], longer=longer, **found).probabilities
+        np.testing.assert_allclose(there, here[row], atol=1e-5)
+
+
+def cut(tracks: Arrays, rows: np.ndarray) -> Arrays:
+    """Some of the tracks."""
+    return {name: values[rows] for name, values in tracks.items()}
+
+
+def gains(tracks: Arrays) -> None:
+    """Print what each piece brings, fitted on one half of the band and tested on the other."""
+    pieces = {
+        "dwells of 80 ms": Model((1,), ()),
+        "and of 5 dwells": Model((1, 5), ()),
+        "and of 2, 12, 31": Model(LENGTHS, ()),
+        "and wingbeat": Model(LENGTHS, ("wings",)),
+        "and heave": Model(LENGTHS, ("wings", "heaves")),
+        "and step": Model(),
+    }
+    low = tracks["carrier_hz"] < MIDDLE_HZ
+    bands = {"below": low, f"above {MIDDLE_HZ / 1e9:.1f} GHz": ~low}
+    print(f"tested          {'':5s}" + "   ".join(f"{name:>29s}" for name in bands))
+    print(f"{'':20s}" + "   ".join(f"{'accuracy':>10s} {'nats':>8s} {'ECE':>9s}" for _ in bands))
+    for name, piece in pieces.items():
+        cells = []
+        for band in bands.values():
+            p, test = piece.fit(cut(tracks, ~band)).probabilities(cut(tracks, band)), cut(tracks, band)
+            clear = (test["snr_db"] >= 0) | (test["kind"] == "noise")
+            right = p.argmax(axis=1) == test["label"]
+            accuracy = np.mean([np.mean(right[clear & (test["label"] == k)]) for k in range(len(CLASSES))])
+            nats = negative_log_likelihood(p, test["label"])
+            cells.append(f"{accuracy:10.3f} {nats:8.4f} {expected_calibration_error(p, test['label']):9.3f}")
+        print(f"{name:20s}" + "   ".join(cells))
+    print("accuracy at 0 dB and above, balanced; nats a track and calibration error at every SNR")
+
+
+def written(model: Model, source: str, tracks: Arrays) -> str:
+    """The file `TABLE`."""
+    correlation, weights, odds = model.read(model.values)
+    looks = ", ".join(f"{length}: {weight:.2f}" for length, weight in weights.items())
+    wings, heaves, steps = (f"{odds[name]:.1f}" for name in ("wings", "heaves", "steps"))
+    error = expected_calibration_error(model.probabilities(tracks), tracks["label"])
+    return f'''"""How much each piece of a track counts: fitted, and written by `python -m tests.benchmarks.fusion_fit`.
+
+To {source}, on {len(tracks["label"])} simulated tracks of 2.5 s and every SNR: calibration error {error:.3f}.
+"""
+
+CORRELATION = {correlation:.2f}
+"""Between the evidence of two dwells of one target: n of them count as n / (1 + (n - 1) CORRELATION)."""
+
+LOOKS = {{{looks}}}
+"""Weight of the mean of the looks at so many dwells in a row, as one; of dwells of 80 ms."""
+
+WING_ODDS, HEAVE_ODDS, STEP_ODDS = {wings}, {heaves}, {steps}
+"""What is multiplied in the whole track: the odds of a bird by a wingbeat, and by a body that heaves as wings lift it;
+the odds of clutter by one that sways as a walker's does."""
+'''
+
+
+def main() -> None:
+    """Draw, fit, print what each piece brings, and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--model", help="a shipped model's name or a file")
+    parser.add_argument("--radars", type=int, default=RADARS, help=f"radars of {OF_RADAR} tracks each")
+    parser.add_argument("--dry", action="store_true", help="write nothing")
+    options = parser.parse_args()
+    metadata = Classifier.load(options.model).metadata
+    with ProcessPoolExecutor(2) as pool:
+        parts = list(pool.map(partial(seen, options.model), range(options.radars)))
+    tracks = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    checked(tracks)
+    gains(tracks)
+    text = written(Model().fit(tracks), f"{metadata['name']} {metadata['bladewing_sha256'][:12]}", tracks)
+    print("\n" + text)
+    if not options.dry:
+        TABLE.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
