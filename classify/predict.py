@@ -208,6 +208,7 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
         heaves=heave_hz is not None and not steps,
         steps=steps,
         rule=classifier.decide,
+        dwell_s=wanted / recording.prf_hz,
     )
     stop_s = start_s + wanted / recording.prf_hz
     return Answer(recording.name, start_s, stop_s, dwells, track, beat_hz, heave_hz, steps)

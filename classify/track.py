@@ -13,6 +13,9 @@ from .labels import CLASSES, UNKNOWN, decide
 LONGER = 5
 """Dwells of each look that comes without its length."""
 
+FITTED_DWELL_S = 0.08
+"""Dwell that `LOOKS` was fitted to [s]."""
+
 # Who may speak after every dwell errs more often than who speaks once: of the birds and clutter of 1913 tracks of 2.5 s
 # at 0 dB and above 1.6 % were declared UAV, where 0.5 % were named so at the end. Odds halved before they are judged
 # leave 0.7 %, and the median UAV is still declared after its first dwell.
@@ -64,6 +67,7 @@ def fuse(
     accept: Sequence[float] = (0.5, 0.5, 0.5),
     rule: Decide | None = None,
     correlation: float = CORRELATION,
+    dwell_s: float = FITTED_DWELL_S,
 ) -> Track:
     """Fuse the answers of consecutive dwells of one target.
 
@@ -71,7 +75,7 @@ def fuse(
     the log-probabilities are averaged and weighted by the number of dwells that the correlated ones are worth,
     n / (1 + (n - 1) `correlation`). One dwell is left as it is, dwells that agree sharpen each other, and the order
     does not matter to the label. A slow target shows its motion only to a long look: looks at several dwells in a row
-    as one are averaged among those of their length, and the mean of all averages counts, weighted by `LOOKS`. A look
+    as one are averaged among those of their length, and the mean of all averages counts, weighted by `weights`. A look
     without evidence ("unknown" with 1/3 each: outside the envelope, or without signal) is left out, and so is a longer
     one at such a dwell; one that was merely not sure counts with what it said.
 
@@ -97,6 +101,8 @@ def fuse(
         Instead of `accept`: labels and reasons of probabilities (n, 3), as `Classifier.decide`.
     correlation
         Between the evidence of two dwells, 0 (independent) to 1 (many are worth one).
+    dwell_s
+        Length of a dwell [s], above 0: what a look counts depends on how long it is.
 
     Raises
     ------
@@ -111,7 +117,8 @@ def fuse(
         return Track(UNKNOWN, uniform, "no dwell could be judged", 0)
     # row k: what is known after dwell k + 1
     dwell_mean, used = _running_mean(p, heard)
-    total, weight = LOOKS[1] * dwell_mean, np.full(len(p), LOOKS[1])
+    counts = weights(dwell_s)
+    total, weight = counts[1] * dwell_mean, np.full(len(p), counts[1])
     for length, looks in _by_length(longer).items():
         look_p, whole = _heard(*looks)
         silent = np.flatnonzero(~heard) // length
@@ -119,13 +126,13 @@ def fuse(
         look_mean, looked = _running_mean(look_p, whole)
         known = np.minimum(np.arange(1, len(p) + 1) // length, len(looked))
         there = np.concatenate([[0], looked])[known] > 0
-        total[there] += LOOKS[length] * look_mean[known[there] - 1]
-        weight[there] += LOOKS[length]
+        total[there] += counts[length] * look_mean[known[there] - 1]
+        weight[there] += counts[length]
     mean = total / weight[:, None]
     worth = used / (1 + np.maximum(used - 1, 0) * correlation)
     evidence = worth[:, None] * mean
-    weights = np.exp(evidence - evidence.max(axis=1, keepdims=True))
-    fused = weights / weights.sum(axis=1, keepdims=True)
+    shares = np.exp(evidence - evidence.max(axis=1, keepdims=True))
+    fused = shares / shares.sum(axis=1, keepdims=True)
     fused[used == 1] = p[np.argmax(heard)]  # to the last digit
     if wings or heaves or steps:
         fused[-1, CLASSES.index("bird")] *= (WING_ODDS if wings else 1) * (HEAVE_ODDS if heaves else 1)
@@ -139,6 +146,17 @@ def fuse(
     declared = str(safe[first]) if safe[first] != UNKNOWN else ""
     after = first + 1 if declared else 0
     return Track(str(named[-1]), fused[-1].astype(np.float32), reasons[-1], int(used[-1]), declared, after)
+
+
+def weights(dwell_s: float) -> dict[int, float]:
+    """What the mean of the looks of each length counts, by their length in dwells of so many seconds.
+
+    `LOOKS` was fitted to dwells of `FITTED_DWELL_S`. Looks of other dwells count as those of the same duration, between
+    two of them by the logarithm, and beyond the ends as the last.
+    """
+    known_s = FITTED_DWELL_S * np.array(list(LOOKS))
+    counts = np.interp(np.log(dwell_s * np.array(list(LOOKS))), np.log(known_s), list(LOOKS.values()))
+    return dict(zip(LOOKS, counts.tolist(), strict=True))
 
 
 def _by_length(longer: Looks | Mapping[int, Looks] | None) -> Mapping[int, Looks]:

@@ -5,7 +5,7 @@ from bladewing.classify.inference import Classifier, Envelope, Prediction
 from bladewing.classify.labels import CLASSES, UNKNOWN, decide
 from bladewing.classify.predict import answer
 from bladewing.classify.recording import Recording
-from bladewing.classify.track import LONGER, fuse
+from bladewing.classify.track import FITTED_DWELL_S, LONGER, fuse, weights
 from bladewing.simulate import Radar, draw_records
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -175,6 +175,27 @@ def test_a_length_without_a_weight_is_refused(length):
     p = np.tile(np.float32([0.5, 0.3, 0.2]), (10, 1))
     with pytest.raises(ValueError, match=f"looks at {length} dwells have no weight: their length must be one of 2, 5"):
         fuse(p, labelled(p), longer={length: (p, labelled(p))})
+
+
+def test_looks_count_by_their_duration():
+    fitted = weights(FITTED_DWELL_S)
+    assert fitted == pytest.approx(LOOKS)
+    # five dwells of a fifth of the length are one dwell, and one of five times the length is five
+    assert weights(FITTED_DWELL_S / 5)[5] == pytest.approx(LOOKS[1])
+    assert weights(5 * FITTED_DWELL_S)[1] == pytest.approx(LOOKS[5])
+    between = weights(FITTED_DWELL_S * 2**0.5)
+    assert between[1] == pytest.approx((LOOKS[1] + LOOKS[2]) / 2)
+    assert between[31] == LOOKS[31]
+    p = np.array([[0.7, 0.2, 0.1], [0.6, 0.3, 0.1]])
+    looks = np.array([[0.1, 0.8, 0.1]])
+    short, long_ = (fuse(p, labelled(p), longer={2: (looks, labelled(looks))}, dwell_s=s) for s in (0.04, 0.5))
+    mean = (
+        np.log(p).mean(axis=0) + np.log(looks[0])
+    ) / 2  # dwells and looks of no more than the fitted dwell count alike
+    worth = 2 / (1 + CORRELATION)
+    expected = np.exp(worth * mean)
+    assert short.probabilities == pytest.approx(expected / expected.sum(), rel=1e-5)
+    assert long_.probabilities[1] > short.probabilities[1]
 
 
 def test_a_silent_longer_look_changes_nothing():
