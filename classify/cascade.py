@@ -4,6 +4,8 @@ What both read is computed once. A record that the fast model is sure of costs w
 returns, most of what a radar near its targets sees, are answered at a third of the better model's price.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from bladewing.features.inputs import Dwells, in_blocks
 from numpy.typing import NDArray
@@ -23,7 +25,8 @@ class Cascade(Classifier):
     """A fast model and a better one behind it; it answers like any classifier.
 
     Where the first gives a class a probability of `SURE` or more, its probabilities are the answer's; elsewhere
-    those of the second, by whose thresholds labels are given. `inputs`, `metadata` and `accept` are the second's.
+    those of the second, by whose thresholds labels are given. `inputs`, `metadata`, `accept` and the detection of the
+    operating point are the second's.
 
     Parameters
     ----------
@@ -52,6 +55,9 @@ class Cascade(Classifier):
         half = None if max_false_alarm is None else max_false_alarm / 2
         super().__init__(second[0], source=second[1], threads=threads, max_false_alarm=half)
         self.first = Classifier(first[0], source=first[1], threads=threads, max_false_alarm=half)
+        if self.operating_point is not None and self.first.operating_point is not None:
+            both = self.operating_point.false_alarm + self.first.operating_point.false_alarm
+            self.operating_point = replace(self.operating_point, false_alarm=both)
 
     @classmethod
     def of_shipped(
@@ -65,7 +71,8 @@ class Cascade(Classifier):
             They are not shipped, or a coverage is asked for: prediction sets are those of one model.
         """
         if coverage is not None:
-            raise BadInput(f"a coverage of {coverage:g} and the model {CASCADE!r}: prediction sets are of one model")
+            asked = f"a coverage of {coverage:g} and the model {CASCADE!r}"
+            raise BadInput(f"{asked}: prediction sets are those of one model: name one")
         account = shipped_account()
         if CASCADE not in account:
             raise BadInput(f"the shipped train.json tells of no {CASCADE!r}: name a model, or train the models again")

@@ -62,6 +62,7 @@ def test_each_model_gets_half_of_the_false_alarms(records):
     first, second = (Classifier.load(name, max_false_alarm=0.01) for name in shipped_account()[CASCADE][STAGES_KEY])
     assert given.accept == second.accept
     assert given.first.accept == first.accept
+    assert given.operating_point.false_alarm == pytest.approx(0.02)
     said = given.predict(records, **RADAR)
     uav = said.labels == "uav"
     allowed = (first.predict(records, **RADAR).labels == "uav") | (second.predict(records, **RADAR).labels == "uav")
@@ -77,7 +78,7 @@ def test_a_record_without_signal_and_one_outside_the_envelope_get_their_reasons(
 def test_what_a_cascade_cannot_do_is_told_in_one_line(tmp_path, monkeypatch):
     from bladewing.classify.export import export_raw_iq
 
-    with pytest.raises(BadInput, match=r"coverage of 0\.9.*prediction sets are of one model"):
+    with pytest.raises(BadInput, match=r"coverage of 0\.9.*prediction sets are those of one model: name one"):
         Classifier.load(CASCADE, coverage=0.9)
     with pytest.raises(BadInput, match=r"cascade: two models.*give one of them as --model"):
         export_raw_iq(tmp_path / "x.onnx", **RADAR, pulses=500, model=CASCADE)
