@@ -17,6 +17,7 @@ from bladewing.features import model_inputs
 from bladewing.simulate import Radar, draw_records
 from numpy.typing import NDArray
 
+from ..cascade import Cascade
 from ..inference import Classifier
 from .pictures import PICTURES, Picture, in_blocks, quantised, radar_numbers, spectrum_picture
 from .settings import ReportConfig
@@ -226,15 +227,15 @@ def train_features(sets: Mapping[str, Sets], config: ReportConfig) -> tuple[NDAr
     return Calibration().probabilities(tabular_scores(model, sets["test"].inputs[FEATURES])), content, seconds
 
 
-def open_choice(kind: str, name: str, content: bytes) -> Answer:
+def open_choice(kind: str, name: str, files: Sequence[bytes]) -> Answer:
     """Open a choice: what then answers goes all the way from samples to probabilities.
 
     Parameters
     ----------
     kind : {"picture", "features", "model"}
     name : str
-    content : bytes
-        The ONNX file.
+    files : sequence of bytes
+        The ONNX file, or the two of a cascade.
 
     Returns
     -------
@@ -242,13 +243,14 @@ def open_choice(kind: str, name: str, content: bytes) -> Answer:
         From samples (n, pulses) and their radar to probabilities (n, 3).
     """
     if kind == "model":
-        classifier = Classifier(content, source=name)
+        stages = [(content, name) for content in files]
+        classifier = Classifier(*files, source=name) if len(files) == 1 else Cascade(*stages)
         return lambda iq, radar: classifier.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz).probabilities
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
-    session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    session = onnxruntime.InferenceSession(files[0], options, providers=["CPUExecutionProvider"])
     names = [node.name for node in session.get_inputs()]
 
     def answer(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
@@ -263,7 +265,9 @@ def open_choice(kind: str, name: str, content: bytes) -> Answer:
     return answer
 
 
-def prepared(kind: str, name: str, content: bytes, iq: NDArray[np.complex64], radar: Radar) -> Callable[[], object]:
+def prepared(
+    kind: str, name: str, files: Sequence[bytes], iq: NDArray[np.complex64], radar: Radar
+) -> Callable[[], object]:
     """Open a choice and give what answers these samples; for `memory.peak_bytes`."""
-    answer = open_choice(kind, name, content)
+    answer = open_choice(kind, name, files)
     return lambda: answer(iq, radar)

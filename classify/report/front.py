@@ -46,15 +46,15 @@ class Given:
 
     Attributes
     ----------
-    content : bytes
-        Sealed ONNX model.
+    files : tuple of bytes
+        Sealed ONNX model, or the two of a cascade.
     inputs : tuple of str
         Names of what it reads.
     train_s : float or None
         How long it took to train [s], where that is known.
     """
 
-    content: bytes
+    files: tuple[bytes, ...]
     inputs: tuple[str, ...]
     train_s: float | None
 
@@ -91,7 +91,7 @@ def measure_front(
 
     def costs() -> dict[str, Any]:
         trees = base64.b64decode(scored[FEATURES]["onnx"])
-        files = {name: given.content for name, given in models.items()} | {FEATURES: trees} | _networks(config)
+        files = {name: given.files for name, given in models.items()} | {FEATURES: (trees,)} | _networks(config)
         with phase("Timing the front", 1.0) as done:
             return _costs(entries, files, config, reference, done)
 
@@ -122,7 +122,7 @@ def _score(models: Mapping[str, Given], config: ReportConfig, reference: Radar, 
     unasked = {name: given for name, given in models.items() if not parts.have(f"front model {name}")}
     if not (missing or features or unasked):
         return
-    answers = {name: choices.open_choice("model", name, given.content) for name, given in unasked.items()}
+    answers = {name: choices.open_choice("model", name, given.files) for name, given in unasked.items()}
     said: dict[str, list[NDArray[np.floating]]] = {name: [] for name in unasked}
 
     def ask(purpose: str, iq: NDArray[np.complex64], radar: Radar) -> None:
@@ -214,10 +214,10 @@ def _found_by_snr(
     ]
 
 
-def _networks(config: ReportConfig) -> dict[str, bytes]:
+def _networks(config: ReportConfig) -> dict[str, tuple[bytes]]:
     """ONNX files of the pictures' networks; their time and size do not depend on what they learnt."""
     of_shape = {
-        picture.shape: choices.network_bytes(choices.network_for(picture, seed=config.seed))
+        picture.shape: (choices.network_bytes(choices.network_for(picture, seed=config.seed)),)
         for picture in PICTURES.values()
     }
     return {name: of_shape[picture.shape] for name, picture in PICTURES.items()}
@@ -225,7 +225,7 @@ def _networks(config: ReportConfig) -> dict[str, bytes]:
 
 def _costs(
     entries: Sequence[tuple[str, str]],
-    files: Mapping[str, bytes],
+    files: Mapping[str, tuple[bytes, ...]],
     config: ReportConfig,
     reference: Radar,
     done: OnDone,
@@ -236,9 +236,9 @@ def _costs(
     found: dict[str, Any] = {}
     for place, (kind, name) in enumerate(entries):
         found[name] = {
-            "model_bytes": len(files[name]),
-            "weights": _weights(files[name]),
-            "model_operations": network_operations(files[name]),
+            "model_bytes": sum(map(len, files[name])),
+            "weights": _weights(files[name][-1]),
+            "model_operations": sum(map(network_operations, files[name])),  # of a cascade at most
             "peak_bytes": peak_bytes(choices.prepared, kind, name, files[name], batch, quoted),
             "dwells": [],
         }

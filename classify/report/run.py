@@ -26,6 +26,7 @@ from ..errors import BadInput
 from ..files import read_bounded, result_folder, settle, write_together
 from ..inference import Classifier
 from ..labels import CLASSES
+from ..ladder import CASCADE, STAGES_KEY
 from ..parts import Parts
 from ..progress import Progress
 from ..stability.run import worst_of_each
@@ -125,10 +126,10 @@ def measure(
     chain = parts.take("cost", timed)
     against = parts.take("transforms", transforms)
     given = {
-        name: Given(content, classifiers[name].inputs, trained.get(name, {}).get("seconds"))
+        name: Given((content,), classifiers[name].inputs, trained.get(name, {}).get("seconds"))
         for name, content in models.items()
     }
-    given |= _in_eight_bits(given)
+    given |= _in_eight_bits(given) | _cascade(given, account)
     compared = measure_front(given, config, REFERENCE, parts=parts, phase=progress.phase)
     return {
         "config": config.model_dump(mode="json"),
@@ -159,7 +160,16 @@ def _in_eight_bits(given: Mapping[str, Given]) -> dict[str, Given]:
     if DEFAULT_MODEL not in given:
         return {}
     whole = given[DEFAULT_MODEL]
-    return {f"{DEFAULT_MODEL}-int8": replace(whole, content=seal(in_eight_bits(whole.content)))}
+    return {f"{DEFAULT_MODEL}-int8": replace(whole, files=(seal(in_eight_bits(*whole.files)),))}
+
+
+def _cascade(given: Mapping[str, Given], account: Mapping[str, Any] | None) -> dict[str, Given]:
+    """The cascade that the training tells of, where its two models are among those given: only for the front."""
+    stages = ((account or {}).get(CASCADE) or {}).get(STAGES_KEY, ())
+    if not stages or not given.keys() >= set(stages):
+        return {}
+    first, second = (given[name] for name in stages)
+    return {CASCADE: replace(second, files=(*first.files, *second.files), train_s=None)}
 
 
 def _forms(reference: Records) -> dict[str, NDArray[np.generic]]:

@@ -33,7 +33,8 @@ class Look:
 
 
 def looks(models: Sequence[str]) -> dict[str, Look]:
-    """Give each model its look; strangers share the last marker and take the colours after the known ones, in turn.
+    """Give each model its look; strangers take the colours after the known ones in turn, with the last marker, then the
+    one before it.
 
     Parameters
     ----------
@@ -48,7 +49,8 @@ def looks(models: Sequence[str]) -> dict[str, Look]:
     number = {
         name: LADDER.index(name) if name in LADDER else len(LADDER) + strangers.index(name) % spare for name in models
     }
-    return {name: Look(number[name], number[name] if name in LADDER else len(MARKERS) - 1) for name in models}
+    marker = {name: len(MARKERS) - 1 - place // spare for place, name in enumerate(strangers)}
+    return {name: Look(number[name], marker.get(name, number[name]) % len(MARKERS)) for name in models}
 
 
 def choice_looks(choices: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], Look]:

@@ -129,7 +129,7 @@ def linear_bytes(net: Any) -> bytes:
 
 def few_choices(patch: pytest.MonkeyPatch) -> None:
     """Let a report compare little: two pictures, dwells, numbers of bins and families; no process of its own."""
-    from bladewing.classify.report import choices, families, front, pictures
+    from bladewing.classify.report import choices, families, front, pictures, run
 
     few = {name: pictures.PICTURES[name] for name in ("spectrum", "stft-80-90")}
     dwells_s, bins = (0.005, 0.02, 0.08), (64, 1024)
@@ -140,6 +140,9 @@ def few_choices(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(families, "FAMILIES", {name: families.FAMILIES[name] for name in ("sea", "band 18-40 GHz")})
     patch.setattr(choices, "network_bytes", linear_bytes)
     patch.setattr(front, "peak_bytes", lambda *_: 1_000_000)
+    # there is no train.json that could tell of a cascade
+    of_account, told = run._cascade, {"cascade": {"stages": ["spectrum-cnn", "always-uav"]}}
+    patch.setattr(run, "_cascade", lambda given, _: of_account(given, told))
 
 
 @pytest.fixture(scope="session")

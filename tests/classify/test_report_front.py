@@ -195,7 +195,7 @@ def test_a_ratio_lies_within_its_spread() -> None:
 
 def test_the_front_holds_every_choice_at_every_dwell(report: dict[str, Any]) -> None:
     rows = report["front"]["choices"]
-    models = ["spectrum-cnn", "always-uav", "spectrum-cnn-int8"]
+    models = ["spectrum-cnn", "always-uav", "spectrum-cnn-int8", "cascade"]
     assert [row["name"] for row in rows] == ["spectrum", "stft-80-90", "features", *models]
     for row in rows:
         assert [point["dwell_s"] for point in row["dwells"]] == report["front"]["dwells_s"]
@@ -210,12 +210,30 @@ def test_the_front_holds_every_choice_at_every_dwell(report: dict[str, Any]) -> 
     assert len(weights) == 8
 
 
+def test_a_cascade_weighs_what_its_models_weigh(report: dict[str, Any]) -> None:
+    rows = {row["name"]: row for row in report["front"]["choices"]}
+    first, second, both = (rows[name] for name in ("spectrum-cnn", "always-uav", "cascade"))
+    assert both["model_bytes"] == first["model_bytes"] + second["model_bytes"]
+    assert both["model_operations"] == first["model_operations"] + second["model_operations"]
+
+
+def test_a_cascade_stands_on_the_front_only_where_both_its_models_are_given() -> None:
+    from bladewing.classify.report import run
+
+    of_account = run._cascade
+    models = {name: front.Given((name.encode(),), ("features",), 1.0) for name in ("a", "b")}
+    told = {"cascade": {"stages": ["a", "b"]}}
+    assert of_account(models, told)["cascade"].files == (b"a", b"b")
+    for account in (None, {}, {"cascade": None}, {"cascade": {"stages": ["a", "c"]}}):
+        assert of_account(models, account) == {}
+
+
 def test_no_two_choices_look_alike() -> None:
     from bladewing.classify.report.series import choice_looks
     from bladewing.models import LADDER
 
     rows = [{"name": name, "kind": "picture"} for name in pictures.PICTURES]
-    names = (*LADDER, "spectrum-cnn-int8")
+    names = (*LADDER, "spectrum-cnn-int8", "cascade")
     rows += [{"name": "features", "kind": "features"}, *({"name": name, "kind": "model"} for name in names)]
     assert len(set(choice_looks(rows).values())) == len(rows)
 
