@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .lines import line_products, sum_of_lines
-from .periodogram import Periodogram
-from .slow_lines import parts, remove_bands, times, whole, without_bands
+from .lines import sum_of_lines
+from .periodogram import LEAST_LEVEL, Periodogram
+from .slow_lines import LineProducts, notched_products, parts, remove_bands, times, whole
 
-#: Gauss-Newton steps at most, and the step below which they end, in standard deviations.
+#: Gauss-Newton steps at most. They end after one below so many standard deviations: the next would be a tenth of it.
 STEPS = 8
-ENOUGH = 0.02
+ENOUGH = 0.1
 
 #: Orders to each side over which line powers are averaged to weigh the lines.
 SMOOTHED_ORDERS = 2
@@ -82,27 +82,35 @@ def _weighed(
     return np.asarray(amplitudes * used / np.sqrt(level), np.complex128)
 
 
+def _factored(plain: NDArray[np.float64], ridge: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+    """Cholesky factor of symmetric products with a ridge, and whether that failed."""
+    from scipy.linalg import lapack  # here, because predicting needs no such import
+
+    ridged = plain.copy()
+    ridged.flat[:: len(ridged) + 1] += ridge
+    factor, failed = lapack.dpotrf(ridged.T, overwrite_a=True)
+    return np.asarray(factor, np.float64), int(failed)
+
+
 def _fisher(
     weighed: NDArray[np.complex128],
     design: NDArray[np.float64],
     factor: NDArray[np.float64],
-    first: NDArray[np.float64],
-    second: NDArray[np.float64],
+    products: LineProducts,
     pulses: int,
 ) -> NDArray[np.float64]:
     """Fisher matrix of centre and spacings with the amplitudes eliminated, these over the rms of the noise about them.
 
-    The other arguments are those of `fit_combs`: the factored products of the lines, and their first and second
-    moments.
+    The other arguments are those of `fit_combs`: the products of the lines, and the plain ones factored.
     """
     from scipy.linalg import lapack
 
     sway = np.asarray(weighed[:, None] * design, np.complex128)
-    leaked = times(first, sway)
+    leaked = products.with_time(sway)
     kept = whole(lapack.dpotrs(factor, parts(leaked))[0])
-    fisher = (sway.conj().T @ times(second, sway) - leaked.conj().T @ kept).real
+    fisher = (sway.conj().T @ products.with_time_squared(sway) - leaked.conj().T @ kept).real
     fisher *= 8 * np.pi**2 * pulses
-    fisher[np.diag_indices_from(fisher)] *= 1 + 1e-9
+    fisher.flat[:: len(fisher) + 1] *= 1 + 1e-9
     return np.asarray(fisher, np.float64)
 
 
@@ -161,40 +169,36 @@ def fit_combs(
     design[np.arange(len(order)), 1 + comb] = order
     smooth = _smoother(comb, order)
     limit = np.concatenate([[0.5], 0.5 / np.array([max(1, np.abs(own).max()) for own in orders])]) / pulses
-    level = data.level_at(centre + values[1 + comb] * order)
-    relevelled = False
+    frequency = values[0] + values[1 + comb] * order
+    level = data.level_at(frequency)
+    # several combs' lines take so much of the noise out with them that what they leave says little of it
+    least = LEAST_LEVEL if count == 1 else 1.0
     for number in range(steps):
-        frequency = values[0] + values[1 + comb] * order
         seen, moment = data.lines.at(frequency)
-        plain, first, second = products = line_products(frequency, pulses)
-        without_bands(products, frequency, pulses, data.bands)
+        products = notched_products(frequency, pulses, data.bands)
         if number == 0:
             snr = np.maximum(smooth(np.abs(seen) ** 2 * pulses / level) - 1, 1e-3)
         held_back = 1 / (snr * (1 + (snr / CLEAR_SNR) ** 2)) + LEAST_RIDGE
-        factor, failed = lapack.dpotrf((plain + np.diag(held_back)).T, overwrite_a=True)
+        factor, failed = _factored(products.plain, held_back)
         if failed:  # what is tabulated of the notch is a little off where nearly all was taken out
-            factor, _ = lapack.dpotrf((plain + np.diag(held_back + NOTCH_RIDGE)).T, overwrite_a=True)
+            factor, _ = _factored(products.plain, held_back + NOTCH_RIDGE)
         amplitudes: NDArray[np.complex128] = whole(lapack.dpotrs(factor, parts(seen))[0])[:, 0]
-        left = seen - times(plain, amplitudes)
+        left = seen - times(products.plain, amplitudes)
         snr = np.maximum(smooth(np.abs(amplitudes + left) ** 2 * pulses / level) - 1, 1e-3)
-        slope = moment - 1j * times(first.T, amplitudes)
+        slope = moment - 1j * products.time_with(amplitudes)[:, 0]
         # the score of each line's frequency, and the Fisher matrix of centre and spacings
         pull = np.where(used, (amplitudes.conj() * slope).imag / level * (4 * np.pi * pulses), 0.0)
-        fisher = _fisher(_weighed(amplitudes, used, level), design, factor, first, second, pulses)
+        fisher = _fisher(_weighed(amplitudes, used, level), design, factor, products, pulses)
         step = np.linalg.solve(fisher, design.T @ pull)
         step = np.clip(step, -limit, limit)
-        if np.all(step**2 * np.diag(fisher) < ENOUGH**2):
-            if relevelled or steps == 1:
-                break
-            # what the lines leak lifts the level between them: once they are fitted, it is taken from what they leave
-            rest = remove_bands(data.samples - sum_of_lines(pulses, frequency, amplitudes), data.bands)
-            level = data.level_of(rest)(frequency)
-            relevelled = True
         values = values + step
-    rest = remove_bands(data.samples - sum_of_lines(pulses, frequency, amplitudes), data.bands)
-    if not relevelled and count > 1:  # between several combs' lines the level was theirs: the noise is less
-        level = data.level_of(rest)(frequency)
-        fisher = _fisher(_weighed(amplitudes, used, level), design, factor, first, second, pulses)
+        # an amplitude changes little with so small a step
+        frequency = values[0] + values[1 + comb] * order
+        rest = remove_bands(data.samples - sum_of_lines(pulses, frequency, amplitudes), data.bands)
+        # what the lines leak lifts the level between them: as they are fitted, it is taken from what they leave
+        level = np.maximum(data.level_of(rest)(frequency), least)
+        if number and np.all(step**2 * np.diag(fisher) < ENOUGH**2):
+            break
     std = np.sqrt(np.maximum(np.diag(np.linalg.inv(fisher)), 0))
     out = []
     for number in range(count):

@@ -234,9 +234,8 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
                 None,
                 f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s",
             )
-    out |= _body(data, comb)
     if comb is None:
-        return out
+        return out | _body(data, None)
     out["chopping_hz"], out["chopping_hz_std"] = comb.chopping * prf_hz, comb.chopping_std * prf_hz
     out["comb_order"] = float(comb.last // comb.per_turn)
     out["comb_snr_db"] = float(10 * np.log10(max(comb.fit.snr.sum() / data.pulses, 1e-9)))
@@ -249,6 +248,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
             out[f"{name}_chopping_hz"], out[f"{name}_chopping_hz_std"] = rate * prf_hz, std * prf_hz
         out["gear_ratio"], out["gear_ratio_std"] = gear.ratio, gear.ratio_std
     count = len(rotors.rates)
+    out |= _body(data, rotors.fits[0] if count > 1 else comb.fit, steady=rotors.resolved)
     if count > 1:
         # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
         out["chopping_hz"] = float(rotors.rates.mean()) * prf_hz
@@ -292,17 +292,20 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     return out
 
 
-def _body(data: Periodogram, comb: Comb | None) -> dict[str, float]:
-    """The body's velocity: from its own line, or from the comb's centre where background may hide that line."""
+def _body(data: Periodogram, fit: CombFit | None, *, steady: bool = True) -> dict[str, float]:
+    """The body's velocity: from its own line, or from the comb's centre where background may hide that line.
+
+    Of unresolved rotors, or a rate that is not steady, the centre has no true deviation.
+    """
     own, level_db = data.centres[0], data.centres_db[0]
     # the bound of a single line's frequency, and what its interpolation between bins is off by
     snr = 10 ** (level_db / 10)
     own_std = float(np.hypot(np.sqrt(1.5 / snr) / np.pi, 0.01)) / data.pulses
     turns, std = own, own_std
-    if comb is not None:
-        offset = (own - comb.fit.centre) * data.pulses
-        if abs(offset) > 1.0 or comb.fit.centre_std < own_std:
-            turns, std = comb.fit.centre, comb.fit.centre_std
+    if fit is not None:
+        offset = (own - fit.centre) * data.pulses
+        if abs(offset) > 1.0 or (steady and fit.centre_std < own_std):
+            turns, std = fit.centre, fit.centre_std
     scale = data.prf_hz * data.wavelength_m / 2
     return {"body_velocity_mps": -turns * scale, "body_velocity_mps_std": std * scale}
 

@@ -6,11 +6,14 @@ signals of so narrow a band.
 """
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
+
+from .lines import line_products
 
 #: Sequences beyond the time-bandwidth product: what the band leaks past it falls under -100 dB.
 EXTRA_SEQUENCES = 11
@@ -126,21 +129,56 @@ def _held(pulses: int, half_bins: float) -> NDArray[np.float32]:
     return out
 
 
-def without_bands(
-    products: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    frequency: NDArray[np.floating],
-    pulses: int,
-    bands: tuple[tuple[float, float], ...],
-) -> None:
-    """Take from the products of unit lines, in place, what `remove_bands` takes from the lines.
+@dataclass(frozen=True)
+class LineProducts:
+    """Mean products of unit lines that narrow bands were taken from.
 
     A line some bins off a band loses a little of its middle. The fit of lines to what is left must know it, or it takes
     the loss for a change of frequency.
 
     Parameters
     ----------
-    products : tuple of ndarray, shape (lines, lines) each
-        From `lines.line_products`.
+    plain, first, second : ndarray, shape (lines, lines)
+        As from `lines.line_products`: `plain` of what is left, the other two of the whole lines.
+    held, held_timed : ndarray, shape (lines, sequences)
+        What the bands hold of each line, and of it times time.
+    joint, joint_timed : ndarray, same shape
+        The same of bands that lie in one another, each sequence's own share.
+    """
+
+    plain: NDArray[np.float64]
+    first: NDArray[np.float64]
+    second: NDArray[np.float64]
+    held: NDArray[np.float32]
+    held_timed: NDArray[np.float32]
+    joint: NDArray[np.floating]
+    joint_timed: NDArray[np.floating]
+
+    # what the bands take from the other two is of low rank: it is taken from a few columns rather than from all lines
+
+    def with_time(self, columns: NDArray[np.complexfloating]) -> NDArray[np.complex128]:
+        """Products with time of each line with sums of lines of these amplitudes, shape (lines, columns)."""
+        both = parts(columns)
+        return whole(self.first @ both - self.joint @ (self.held_timed.T @ both))
+
+    def time_with(self, columns: NDArray[np.complexfloating]) -> NDArray[np.complex128]:
+        """The same of each line times time with sums of the plain lines."""
+        both = parts(columns)
+        return whole(-(self.first @ both) - self.held_timed @ (self.joint.T @ both))
+
+    def with_time_squared(self, columns: NDArray[np.complexfloating]) -> NDArray[np.complex128]:
+        """Products of each line times time with sums of lines times time."""
+        both = parts(columns)
+        return whole(self.second @ both - self.joint_timed @ (self.held_timed.T @ both))
+
+
+def notched_products(
+    frequency: NDArray[np.floating], pulses: int, bands: tuple[tuple[float, float], ...]
+) -> LineProducts:
+    """Products of unit lines as `remove_bands` leaves them.
+
+    Parameters
+    ----------
     frequency : ndarray, shape (lines,)
         [cycles a sample].
     pulses : int
@@ -148,8 +186,8 @@ def without_bands(
     bands : tuple of (float, float)
         Centre [cycles a sample] and half width [bins] of each band.
     """
-    plains, timeds = [], []
-    nodes = _NODES
+    products = line_products(frequency, pulses)
+    plains, timeds = [np.zeros((len(frequency), 0), np.float32)], [np.zeros((len(frequency), 0), np.float32)]
     for centre, half in bands:
         table = _held(pulses, float(half))
         away = frequency - centre
@@ -158,21 +196,20 @@ def without_bands(
         first = np.floor(place).astype(np.intp)
         # the polynomial through six points; time counts from the middle, half a sample off where the pulses are even
         sign = 1 - 2 * (turns % 2) * (pulses % 2 == 0)
-        gaps = (place - first)[:, None] - nodes
+        gaps = (place - first)[:, None] - _NODES
         weights = gaps[:, _OTHER_NODES].prod(axis=-1) * _NODE_SCALES * sign[:, None]
-        about = table.take(first[:, None] + nodes, axis=0).reshape(*gaps.shape, -1)
+        about = table.take(first[:, None] + _NODES, axis=0).reshape(*gaps.shape, -1)
         held = (weights[:, None, :] @ about).reshape(-1, *table.shape[1:])
         plains.append(held[:, 0])
         timeds.append(held[:, 1])
-    if not plains:
-        return
     plain, timed = np.concatenate(plains, axis=1), np.concatenate(timeds, axis=1)
-    left, also = plain, timed
-    if len(plains) > 1:
+    joint, joint_timed = plain, timed
+    if len(bands) > 1:
         inverse = _gram_inverse(pulses, bands)
-        left, also = plain @ inverse, timed @ inverse
-    for product, part in zip(products, (left @ plain.T, left @ timed.T, also @ timed.T), strict=True):
-        product -= part
+        joint, joint_timed = plain @ inverse, timed @ inverse
+    left = products[0]
+    left -= joint @ plain.T
+    return LineProducts(*products, plain, timed, joint, joint_timed)
 
 
 @lru_cache(maxsize=4)

@@ -6,7 +6,7 @@ from bladewing.features.comb_fit import fit_combs
 from bladewing.features.flashes import flash_nats
 from bladewing.features.lines import LineSpace, line_products, sum_of_lines
 from bladewing.features.periodogram import prepare, without_clicks
-from bladewing.features.slow_lines import remove_bands, slepian, without_bands
+from bladewing.features.slow_lines import notched_products, remove_bands, slepian
 from bladewing.simulate import RotorMotion, rotor_echo
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
@@ -186,13 +186,15 @@ def test_the_products_of_lines_know_what_the_notch_takes(bands):
     time = np.arange(pulses) - (pulses - 1) / 2
     frequency = 0.1 + np.array([4.2, 7.7, -6.1, 12.3, 120.0, -180.0]) / pulses
     lines = np.exp(2j * np.pi * np.outer(frequency, time))
-    products = line_products(frequency, pulses)
-    without_bands(products, frequency, pulses, bands)
+    products = notched_products(frequency, pulses, bands)
     left = np.stack([remove_bands(line, bands) for line in lines])
     timed = np.stack([remove_bands(line * time, bands) for line in lines])
-    np.testing.assert_allclose(products[0], left.conj() @ left.T / pulses, atol=1e-4)
-    np.testing.assert_allclose(-1j * products[1], left.conj() @ timed.T / pulses, atol=1e-4 * pulses)
-    np.testing.assert_allclose(products[2], timed.conj() @ timed.T / pulses, atol=1e-4 * pulses**2)
+    each = np.eye(len(frequency), dtype=complex)
+    with_time, squared = left.conj() @ timed.T / pulses, timed.conj() @ timed.T / pulses
+    np.testing.assert_allclose(products.plain, left.conj() @ left.T / pulses, atol=1e-4)
+    np.testing.assert_allclose(-1j * products.with_time(each), with_time, atol=1e-4 * pulses)
+    np.testing.assert_allclose(1j * products.time_with(each), with_time.conj().T, atol=1e-4 * pulses)
+    np.testing.assert_allclose(products.with_time_squared(each), squared, atol=1e-4 * pulses**2)
 
 
 def test_clicks_are_taken_out_and_flashes_are_not():
