@@ -315,9 +315,11 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
         bands.append((0.0, rest_half))
         # what stands at rest may be the background; the body is then the strongest line that moves
         moving = offset > rest_half + 2 * NOISE_BANDWIDTH_BINS
-        line = body_line(replace(spectrum, relative_power=np.where(moving, spectrum.relative_power, np.float32(0))))
-        # the strongest line of all, if it is as slow as that, has its own level
+        # the strongest line of all, if it is as slow as that, has its own level; if not, it is the one that moves
         slow = abs(turns(body)) * pulses <= rest_half
+        line = body
+        if slow:
+            line = body_line(replace(spectrum, relative_power=np.where(moving, spectrum.relative_power, np.float32(0))))
         centres.append((turns(body), float(body.level_db)) if slow else (0.0, rest_db))
         if line.level_db > LINE_DB:
             centres.append((turns(line), float(line.level_db)))
