@@ -173,6 +173,10 @@ def fit_combs(
     level = data.level_at(frequency)
     # several combs' lines take so much of the noise out with them that what they leave says little of it
     least = LEAST_LEVEL if count == 1 else 1.0
+
+    def left_by(frequency: NDArray[np.float64], amplitudes: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        return remove_bands(data.samples - sum_of_lines(pulses, frequency, amplitudes), data.bands)
+
     for number in range(steps):
         seen, moment = data.lines.at(frequency)
         products = notched_products(frequency, pulses, data.bands)
@@ -192,13 +196,11 @@ def fit_combs(
         step = np.linalg.solve(fisher, design.T @ pull)
         step = np.clip(step, -limit, limit)
         values = values + step
-        # an amplitude changes little with so small a step
         frequency = values[0] + values[1 + comb] * order
-        rest = remove_bands(data.samples - sum_of_lines(pulses, frequency, amplitudes), data.bands)
-        # what the lines leak lifts the level between them: as they are fitted, it is taken from what they leave
-        level = np.maximum(data.level_of(rest)(frequency), least)
-        if number and np.all(step**2 * np.diag(fisher) < ENOUGH**2):
+        if number == steps - 1 or (number and np.all(step**2 * np.diag(fisher) < ENOUGH**2)):
             break
+        # what the lines leak lifts the level between them: as they are fitted, it is taken from what they leave
+        level = np.maximum(data.level_of(left_by(frequency, amplitudes))(frequency), least)
     std = np.sqrt(np.maximum(np.diag(np.linalg.inv(fisher)), 0))
     out = []
     for number in range(count):
@@ -214,4 +216,5 @@ def fit_combs(
                 snr[own],
             )
         )
-    return out, rest
+    # an amplitude changes little with the last step
+    return out, left_by(frequency, amplitudes)
