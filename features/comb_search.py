@@ -1,5 +1,6 @@
 """Where a comb may be: spacings from the autocorrelation of band-limited spectra, scored by the likelihood of lines."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -166,8 +167,6 @@ def score(
     evidence: NDArray[np.float32],
     spacings: NDArray[np.float64],
     centres: NDArray[np.float64],
-    *,
-    even: bool = False,
 ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
     """Score combs by their lines, each side of the centre out to where its lines stop.
 
@@ -177,8 +176,6 @@ def score(
         From `line_evidence`, 0 where a line cannot be seen.
     spacings, centres : ndarray, shape (candidates,)
         [cycles a sample].
-    even : bool
-        True where both sides must reach equally far.
 
     Returns
     -------
@@ -201,41 +198,79 @@ def score(
         sides = [row.take(place, mode="wrap") for place in places]
         for side in sides:
             side[beyond] = 0.0
-        if not even:
-            for side in sides:
-                side.cumsum(axis=1, out=side)
+        for side in sides:
+            side.cumsum(axis=1, out=side)
         # a rotor's lines reach equally far to both sides; other reaches cost as much as the choice of two ends gives
         both = sides[0] + sides[1]
-        if even:
-            both.cumsum(axis=1, out=both)
         last = both.argmax(axis=1)
         total = np.maximum(both[number, last], 0)
         ends = np.stack([last, last]) + 1
-        if not even:
-            apart = np.stack([side.argmax(axis=1) for side in sides])
-            peaks = np.stack([np.maximum(side[number, end], 0) for side, end in zip(sides, apart, strict=True)])
-            uneven = peaks.sum(axis=0) - np.float32(UNEVEN_COST)
-            ends = np.where(uneven > total, np.where(peaks > 0, apart + 1, 0), ends)
-            total = np.maximum(total, uneven)
+        apart = np.stack([side.argmax(axis=1) for side in sides])
+        peaks = np.stack([np.maximum(side[number, end], 0) for side, end in zip(sides, apart, strict=True)])
+        uneven = peaks.sum(axis=0) - np.float32(UNEVEN_COST)
+        ends = np.where(uneven > total, np.where(peaks > 0, apart + 1, 0), ends)
+        total = np.maximum(total, uneven)
         better = total > best
         best[better] = total[better]
         reach[:, better] = ends[:, better]
     return best.astype(np.float64), -reach[0], reach[1]
 
 
+def even_scores(
+    evidence: NDArray[np.float32], spacings: NDArray[np.float64], centres: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Score combs whose two sides reach equally far.
+
+    Parameters
+    ----------
+    evidence : ndarray of float32, shape (line SNRs, bins)
+        As for `score`.
+    spacings, centres : ndarray, shape (candidates,)
+        [cycles a sample]; the spacings rise.
+
+    Returns
+    -------
+    score : ndarray of float64, shape (candidates,)
+        [nats]
+    reach : ndarray of int, shape (candidates,)
+        Outermost order.
+    """
+    best = np.full((len(spacings), len(evidence)), -np.inf, np.float32)
+    reach = np.ones(best.shape, np.intp)
+    first = 1
+    for sums in _sums_of_sides(evidence, spacings, centres):
+        both = (sums[:, 0] + sums[:, 1])[..., : len(evidence)]
+        far = both.argmax(axis=0)
+        highest = np.take_along_axis(both, far[None], axis=0)[0]
+        held, ends = best[: len(highest)], reach[: len(highest)]
+        better = highest > held
+        held[better], ends[better] = highest[better], far[better] + first
+        first += len(both)
+    row = best.argmax(axis=1)[:, None]
+    scores, ends = (np.take_along_axis(values, row, axis=1)[:, 0] for values in (best, reach))
+    return np.maximum(scores, 0).astype(np.float64), ends
+
+
+def _sums_of_sides(
+    evidence: NDArray[np.float32], spacings: NDArray[np.float64], centres: NDArray[np.float64]
+) -> Iterator[NDArray[np.float32]]:
+    """Running sums to both sides of combs, the spacings rising: as `running_sums` gives them."""
+    size = evidence.shape[-1]
+    # half a turn more on each side: a line beyond half the PRF is the alias on the other
+    wide = np.concatenate([evidence[:, size // 2 :], evidence, evidence[:, : size // 2 + 1]], axis=1)
+    start = (centres % 1.0) * size + (size - size // 2)
+    step = spacings * size
+    return running_sums(wide, np.stack([start, start]), np.stack([-step, step]), size / 2)
+
+
 def heights(
     evidence: NDArray[np.float32], spacings: NDArray[np.float64], centres: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """The scores of many combs, as `score` gives them, without their reaches, shape (candidates,) [nats]."""
-    size = evidence.shape[-1]
     rising = np.argsort(spacings)
-    # half a turn more on each side: a line beyond half the PRF is the alias on the other
-    wide = np.concatenate([evidence[:, size // 2 :], evidence, evidence[:, : size // 2 + 1]], axis=1)
-    start = (centres[rising] % 1.0) * size + (size - size // 2)
-    step = spacings[rising] * size
-    sides = np.zeros((2, len(step), MOST_SNRS), np.float32)
-    both = np.zeros((len(step), MOST_SNRS), np.float32)
-    for sums in running_sums(wide, np.stack([start, start]), np.stack([-step, step]), size / 2):
+    sides = np.zeros((2, len(rising), MOST_SNRS), np.float32)
+    both = np.zeros((len(rising), MOST_SNRS), np.float32)
+    for sums in _sums_of_sides(evidence, spacings[rising], centres[rising]):
         some = sums.shape[2]
         np.maximum(sides[:, :some], sums.max(axis=0), out=sides[:, :some])
         np.maximum(both[:some], (sums[:, 0] + sums[:, 1]).max(axis=0), out=both[:some])
@@ -326,16 +361,16 @@ def _centred(data: Periodogram, evidence: NDArray[np.float32], found: Candidate)
     for centre, bonus in dict(options).items():
         # one comb for several rotors may pass a little beside the body's line: either place will do
         beside = found.centre + found.spacing * round((centre - found.centre) / found.spacing)
-        heights, _, _ = score(evidence, np.tile(steps, 2), np.repeat([centre, beside], len(steps)), even=True)
-        index = int(heights.argmax())
-        if heights[index] + bonus > most:
-            most = heights[index] + bonus
+        scores, _ = even_scores(evidence, np.repeat(steps, 2), np.tile([centre, beside], len(steps)))
+        index = int(scores.argmax())
+        if scores[index] + bonus > most:
+            most = scores[index] + bonus
             if centre == found.centre:
                 best = found
             else:
                 shift = round((centre - found.centre) / found.spacing)
                 best = Candidate(
-                    float(steps[index % len(steps)]),
+                    float(steps[index // 2]),
                     centre,
                     min(found.low - shift, 0),
                     max(found.high - shift, 0),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 #: Lines summed at once: they must stay in the cache. And orders at least and at most.
-LINES_AT_ONCE, ORDERS_AT_ONCE = 8000, (16, 64)
+LINES_AT_ONCE, ORDERS_AT_ONCE = 8000, (4, 64)
 
 #: Line SNRs whose evidence is summed side by side, at most: they are taken from the table as one complex number.
 MOST_SNRS = 4
@@ -40,13 +40,14 @@ def running_sums(
     nearest = starts + 0.5
     outermost = reach / np.abs(steps[0])
     before = np.zeros((*starts.shape, MOST_SNRS), np.float32)
+    falling = -outermost
     first, last = 1, int(outermost.max(initial=0))
     while first <= last:
-        some = int(np.searchsorted(-outermost, -first, side="right"))
-        count = int(np.clip(LINES_AT_ONCE // (len(starts) * some), *ORDERS_AT_ONCE))
+        some = int(falling.searchsorted(-first, side="right"))
+        count = min(max(LINES_AT_ONCE // (len(starts) * some), ORDERS_AT_ONCE[0]), ORDERS_AT_ONCE[1])
         order = np.arange(first, min(first + count, last + 1))[:, None, None]
         first += len(order)
-        every = int(np.searchsorted(-outermost, -order[-1, 0, 0], side="right"))
+        every = int(falling.searchsorted(-order[-1, 0, 0], side="right"))
         place = order * steps[:, :some]
         place += nearest[:, :some]
         seen = lines.take(place.astype(np.intp), mode="clip")

@@ -10,18 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .periodogram import Periodogram
+from .periodogram import Periodogram, squared
 
 #: A side with fewer lines than this says nothing by its phases.
 LEAST_LINES = 5
 
 #: Frequencies tried for each line that a side has.
 OVERSAMPLING = 4
-
-
-def _squared(amplitudes: NDArray[np.complexfloating]) -> NDArray[np.floating]:
-    """Power of amplitudes, in their own precision."""
-    return np.asarray(amplitudes.real**2 + amplitudes.imag**2)
 
 
 def flash_nats(amplitudes: NDArray[np.complexfloating]) -> NDArray[np.float64]:
@@ -42,9 +37,9 @@ def flash_nats(amplitudes: NDArray[np.complexfloating]) -> NDArray[np.float64]:
         At least 0.
     """
     lines = np.count_nonzero(amplitudes, axis=-1)
-    total = _squared(amplitudes).sum(axis=-1, dtype=np.float64)
+    total = squared(amplitudes).sum(axis=-1, dtype=np.float64)
     size = fft.next_fast_len(OVERSAMPLING * amplitudes.shape[-1])
-    peak = _squared(fft.fft(amplitudes, size, axis=-1)).max(axis=-1)
+    peak = squared(fft.fft(amplitudes, size, axis=-1)).max(axis=-1)
     share = np.minimum(peak / np.maximum(total * lines, 1e-30), 1 - 1e-9)
     nats = -(lines - 1) * np.log1p(-share) - np.log(2.0 * np.maximum(lines, 1))
     return np.where(lines >= LEAST_LINES, np.maximum(nats, 0.0), 0.0)

@@ -165,7 +165,7 @@ def _left_over(data: Periodogram, comb: Comb) -> tuple[Periodogram, NDArray[np.b
     power = rest.power * rest.level
     block = int(BLOCK_BINS * len(power) / rest.pulses)
     level = np.maximum(local_level(power, ~hidden, 1.0, block), LEAST_LEVEL)
-    return replace(rest, power=power / level, level=level), hidden
+    return replace(rest, power=(power / level).astype(np.float32), level=level), hidden
 
 
 def _hidden(rest: Periodogram, first: CombFit) -> NDArray[np.bool_]:

@@ -33,6 +33,9 @@ BODY_NOTCH_MPS = 0.5
 #: Transform length in units of the dwell: between two bins a line loses 0.2 dB.
 PADDING = 4
 
+#: The same where only the level is wanted: half of what lies between the bins tells nothing new.
+LEVEL_PADDING = 2
+
 #: The local level is followed in blocks of so many independent bins, by their lower quartile: lines
 #: may fill the rest. What that is of the mean of an exponential stands beside it.
 BLOCK_BINS = 24
@@ -60,7 +63,7 @@ class Periodogram:
         Samples of unit noise power, the strong slow lines taken out, whitening not applied.
     amplitude : ndarray of complex64, shape (PADDING * pulses, about)
         Amplitude over the root of the local level in FFT order, its phase that in the middle of the record.
-    power : ndarray of float64, same shape
+    power : ndarray of float32, same shape
         Its square: noise has mean 1.
     level : ndarray of float64, same shape
         The local level [noise power a sample].
@@ -76,7 +79,7 @@ class Periodogram:
 
     samples: NDArray[np.complex128]
     amplitude: NDArray[np.complex64]
-    power: NDArray[np.float64]
+    power: NDArray[np.float32]
     level: NDArray[np.float64]
     bands: tuple[tuple[float, float], ...]
     centres: tuple[float, ...]
@@ -157,8 +160,8 @@ class Periodogram:
 
     def level_of(self, rest: NDArray[np.complex128]) -> Callable[[NDArray[np.floating]], NDArray[np.float64]]:
         """Local level of samples that lines were taken from, as a function of the frequency [cycles a sample]."""
-        size = len(self.power)
-        power = squared(_spectrum(rest, size, tapered=False))
+        size = fft.next_fast_len(LEVEL_PADDING * self.pulses)
+        power = squared(fft.fft(rest.astype(np.complex64), size)) * np.float32(1 / self.pulses)
         keep = _kept(size, self.blocked, THINNED_BINS / self.pulses)
         level = _level_at_bins(power, keep, 1.0, int(BLOCK_BINS * size / self.pulses))
         return lambda frequency: np.maximum(level(np.rint(frequency * size) % size), LEAST_LEVEL)
@@ -190,9 +193,9 @@ def _spectrum(samples: NDArray[np.complex128], size: int, *, tapered: bool) -> N
     return np.asarray(fft.fft(shaped.astype(np.complex64), size) * _middle(len(samples), size), np.complex64)
 
 
-def squared(amplitude: NDArray[np.complexfloating]) -> NDArray[np.float64]:
-    """Power of amplitudes."""
-    return np.asarray(amplitude.real.astype(np.float64) ** 2 + amplitude.imag.astype(np.float64) ** 2, np.float64)
+def squared(amplitude: NDArray[np.complexfloating]) -> NDArray[np.floating]:
+    """Power of amplitudes, in their own precision."""
+    return np.asarray(amplitude.real**2 + amplitude.imag**2)
 
 
 def _within(size: int, centre: float, half: float) -> NDArray[np.bool_]:
@@ -200,11 +203,13 @@ def _within(size: int, centre: float, half: float) -> NDArray[np.bool_]:
     return np.abs(away - np.rint(away)) <= half
 
 
+@lru_cache(maxsize=8)
 def _kept(size: int, blocked: tuple[tuple[float, float], ...], margin: float = 0.0) -> NDArray[np.bool_]:
     """False in the bins of what was taken out, and so far beside [cycles a sample]."""
     keep = np.ones(size, bool)
     for centre, half in blocked:
         keep &= ~_within(size, centre, half + margin)
+    keep.setflags(write=False)
     return keep
 
 
@@ -342,7 +347,7 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
         amplitude = _spectrum(samples, size, tapered=tapered)
         power = squared(amplitude)
         level = local_level(power, full, 1.0, block)
-        whitened = power / level
+        whitened = (power / level).astype(np.float32)
         if whitened[keep].max(initial=0) <= 10 ** (TAPER_FROM_DB / 10):
             break
     whitened[~keep] = 1.0

@@ -11,7 +11,7 @@ from scipy import fft
 
 from .comb import Comb
 from .comb_fit import CombFit, fit_combs
-from .comb_search import score
+from .comb_search import even_scores
 from .flashes import flash_nats
 from .periodogram import LINE_DB, Periodogram, squared
 
@@ -82,7 +82,7 @@ class Rotors:
 def _strongest(data: Periodogram, centre: float, rates: NDArray[np.float64]) -> tuple[float, int, float]:
     """Rate whose lines speak loudest by their powers and their flashes, how far they reach, and their evidence."""
     size = len(data.power)
-    powers, _, reach = score(data.evidence, rates, np.full(len(rates), centre), even=True)
+    powers, reach = even_scores(data.evidence, rates, np.full(len(rates), centre))
     order = np.arange(1, reach.max() + 1)
     frequency = centre + np.array([-1, 1])[:, None, None] * rates[:, None] * order
     seen = data.usable(frequency) & (order <= reach[:, None])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bladewing.features.comb_search import heights, score
+from bladewing.features.comb_search import even_scores, heights, score
 from bladewing.features.comb_sums import MOST_SNRS, running_sums
 
 
@@ -34,3 +34,18 @@ def test_heights_are_the_scores():
     np.testing.assert_allclose(heights(evidence, spacings, centres), expected, atol=1e-3)
     assert np.any(-low != high)  # some of them reach unequally far
     assert len(heights(evidence, spacings[:0], centres[:0])) == 0
+
+
+def test_even_scores_are_those_of_a_loop():
+    rng = np.random.default_rng(6)
+    size = 4001
+    evidence = (rng.standard_normal((3, size)) - 0.2).astype(np.float32)
+    spacings, centres = np.sort(rng.uniform(0.004, 0.2, 200)), rng.uniform(-0.7, 0.7, 200)
+    scores, reach = even_scores(evidence, spacings, centres)
+    for number in range(0, 200, 7):
+        order = np.arange(1, int(0.5 / spacings[number]) + 1)
+        sides = [np.rint((centres[number] + sign * spacings[number] * order) * size) for sign in (-1, 1)]
+        sums = sum(evidence[:, side.astype(int) % size] for side in sides).cumsum(axis=1)
+        assert scores[number] == pytest.approx(max(sums.max(), 0), abs=1e-3)
+        if scores[number] > 1:
+            assert reach[number] == np.unravel_index(sums.argmax(), sums.shape)[1] + 1
