@@ -26,6 +26,9 @@ NOTCH_RIDGE = 1e-2
 #: Well above this snr a line's amplitude is not held back: what that leaves of it would pull at its neighbours.
 CLEAR_SNR = 30.0
 
+#: Lines of several combs nearer than this at an order share the power seen there [bins].
+ONE_BINS = 1.6
+
 #: Lines beyond the outermost that speak for the comb, fitted with it: what they hold must not leak into the others.
 MARGIN_ORDERS = 3
 
@@ -120,6 +123,8 @@ def fit_combs(
     spacings: Sequence[float],
     reaches: Sequence[tuple[int, int]],
     steps: int = STEPS,
+    *,
+    rest: NDArray[np.complex128] | None = None,
 ) -> tuple[list[CombFit], NDArray[np.complex128]] | None:
     """Refine combs about one centre, jointly, by Gauss-Newton steps on the frequencies of their lines.
 
@@ -140,6 +145,8 @@ def fit_combs(
         Outermost orders of each, low <= 0 <= high.
     steps : int
         Steps at most, >= 1.
+    rest : ndarray of complex128, shape (pulses,), optional
+        Samples without what is known of the combs already: the first step takes the level about the lines from these.
 
     Returns
     -------
@@ -170,9 +177,10 @@ def fit_combs(
     smooth = _smoother(comb, order)
     limit = np.concatenate([[0.5], 0.5 / np.array([max(1, np.abs(own).max()) for own in orders])]) / pulses
     frequency = values[0] + values[1 + comb] * order
-    level = data.level_at(frequency)
     # several combs' lines take so much of the noise out with them that what they leave says little of it
     least = LEAST_LEVEL if count == 1 else 1.0
+    snr = np.full(len(order), np.inf)
+    level = data.level_at(frequency) if rest is None else np.maximum(data.level_of(rest)(frequency), least)
 
     def left_by(frequency: NDArray[np.float64], amplitudes: NDArray[np.complex128]) -> NDArray[np.complex128]:
         return remove_bands(data.samples - sum_of_lines(pulses, frequency, amplitudes), data.bands)
@@ -180,8 +188,10 @@ def fit_combs(
     for number in range(steps):
         seen, moment = data.lines.at(frequency)
         products = notched_products(frequency, pulses, data.bands)
-        if number == 0:
-            snr = np.maximum(smooth(np.abs(seen) ** 2 * pulses / level) - 1, 1e-3)
+        # lines that lie in one another may come out as large ones that cancel: together they hold no more than is seen
+        apart = np.abs((values[1:] - values[1 + comb][:, None]) * order[:, None]) * pulses
+        most = smooth(np.abs(seen) ** 2 * pulses / level) - 1
+        snr = np.minimum(snr, np.maximum(most / (apart < ONE_BINS).sum(axis=1), 1e-3))
         held_back = 1 / (snr * (1 + (snr / CLEAR_SNR) ** 2)) + LEAST_RIDGE
         factor, failed = _factored(products.plain, held_back)
         if failed:  # what is tabulated of the notch is a little off where nearly all was taken out

@@ -29,7 +29,7 @@ LEAST_SHARE = 0.03
 LEAST_POWER_SHARE = 0.12
 
 #: Steps of the joint fit each time a rotor is added, and once all are found: only then their deviations matter.
-JOINT_STEPS, LAST_STEPS = 2, 4
+JOINT_STEPS, LAST_STEPS = 1, 3
 
 #: A rotor flashes once a period on each side of the body. A second flash of this share of the first one's power is
 #: another rotor's, of a rate that the dwell does not tell apart; so far from the first it is no part of it [1 / lines].
@@ -192,7 +192,8 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
             fits, rest, reaches = [comb.fit], data.left(comb.rest), [far]
             continue
         spacings = [*(fit.spacing for fit in fits), rate]
-        fitted = fit_combs(data, centre, spacings, [(-r, r) for r in (*reaches, far)], JOINT_STEPS)
+        outermost = [(-r, r) for r in (*reaches, far)]
+        fitted = fit_combs(data, centre, spacings, outermost, JOINT_STEPS, rest=rest.samples)
         if fitted is None:
             break
         together, samples = fitted
@@ -204,9 +205,8 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
     if not fits:
         return alone
     if len(fits) > 1:
-        polished = fit_combs(
-            data, fits[0].centre, [fit.spacing for fit in fits], [(-r, r) for r in reaches], LAST_STEPS
-        )
+        spacings, outermost = [fit.spacing for fit in fits], [(-r, r) for r in reaches]
+        polished = fit_combs(data, fits[0].centre, spacings, outermost, LAST_STEPS, rest=rest.samples)
         if polished is not None:
             fits, samples = polished
             rest = data.left(samples)
