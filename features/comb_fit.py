@@ -26,7 +26,7 @@ NOTCH_RIDGE = 1e-2
 #: Well above this snr a line's amplitude is not held back: what that leaves of it would pull at its neighbours.
 CLEAR_SNR = 30.0
 
-#: Lines of several combs nearer than this at an order share the power seen there [bins].
+#: Lines nearer than this share the power seen there [bins].
 ONE_BINS = 1.6
 
 #: Lines beyond the outermost that speak for the comb, fitted with it: what they hold must not leak into the others.
@@ -189,10 +189,11 @@ def fit_combs(
         seen, moment = data.lines.at(frequency)
         products = notched_products(frequency, pulses, data.bands)
         # lines that lie in one another may come out as large ones that cancel: together they hold no more than is seen
-        apart = np.abs((values[1:] - values[1 + comb][:, None]) * order[:, None]) * pulses
         most = smooth(np.abs(seen) ** 2 * pulses / level) - 1
-        snr = np.minimum(snr, np.maximum(most / (apart < ONE_BINS).sum(axis=1), 1e-3))
-        held_back = 1 / (snr * (1 + (snr / CLEAR_SNR) ** 2)) + LEAST_RIDGE
+        first, last = np.sort(frequency).searchsorted(frequency + np.array([[-ONE_BINS], [ONE_BINS]]) / pulses)
+        shared = last - first
+        snr = np.minimum(snr, np.maximum(most / shared, 1e-3))
+        held_back = 1 / (snr * (1 + (shared == 1) * (snr / CLEAR_SNR) ** 2)) + LEAST_RIDGE
         factor, failed = _factored(products.plain, held_back)
         if failed:  # what is tabulated of the notch is a little off where nearly all was taken out
             factor, _ = _factored(products.plain, held_back + NOTCH_RIDGE)

@@ -217,7 +217,7 @@ def score(
 
 
 def even_scores(
-    evidence: NDArray[np.float32], spacings: NDArray[np.float64], centres: NDArray[np.float64]
+    evidence: NDArray[np.float32], spacings: NDArray[np.float64], centres: NDArray[np.float64], furthest: float = 0.5
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Score combs whose two sides reach equally far.
 
@@ -227,6 +227,8 @@ def even_scores(
         As for `score`.
     spacings, centres : ndarray, shape (candidates,)
         [cycles a sample]; the spacings rise.
+    furthest : float
+        Lines up to so far from the centre count [cycles a sample].
 
     Returns
     -------
@@ -238,7 +240,7 @@ def even_scores(
     best = np.full((len(spacings), len(evidence)), -np.inf, np.float32)
     reach = np.ones(best.shape, np.intp)
     first = 1
-    for sums in _sums_of_sides(evidence, spacings, centres):
+    for sums in _sums_of_sides(evidence, spacings, centres, furthest):
         both = (sums[:, 0] + sums[:, 1])[..., : len(evidence)]
         far = both.argmax(axis=0)
         highest = np.take_along_axis(both, far[None], axis=0)[0]
@@ -252,7 +254,7 @@ def even_scores(
 
 
 def _sums_of_sides(
-    evidence: NDArray[np.float32], spacings: NDArray[np.float64], centres: NDArray[np.float64]
+    evidence: NDArray[np.float32], spacings: NDArray[np.float64], centres: NDArray[np.float64], furthest: float = 0.5
 ) -> Iterator[NDArray[np.float32]]:
     """Running sums to both sides of combs, the spacings rising: as `running_sums` gives them."""
     size = evidence.shape[-1]
@@ -260,7 +262,7 @@ def _sums_of_sides(
     wide = np.concatenate([evidence[:, size // 2 :], evidence, evidence[:, : size // 2 + 1]], axis=1)
     start = (centres % 1.0) * size + (size - size // 2)
     step = spacings * size
-    return running_sums(wide, np.stack([start, start]), np.stack([-step, step]), size / 2)
+    return running_sums(wide, np.stack([start, start]), np.stack([-step, step]), furthest * size)
 
 
 def heights(

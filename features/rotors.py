@@ -45,6 +45,9 @@ LEAST_BINS = 100
 #: not have been seen.
 HIDDEN_DEVIATIONS = 1.5
 
+#: Lines are looked for so far past the edge of the line family: what strong ones leave there may pass for more.
+FURTHEST = 1.5
+
 #: Rates nearer than this are one: so many bins apart at the outermost order.
 RESOLVED_BINS = 0.9
 
@@ -79,10 +82,12 @@ class Rotors:
     next_rate: float
 
 
-def _strongest(data: Periodogram, centre: float, rates: NDArray[np.float64]) -> tuple[float, int, float]:
+def _strongest(
+    data: Periodogram, centre: float, rates: NDArray[np.float64], furthest: float
+) -> tuple[float, int, float]:
     """Rate whose lines speak loudest by their powers and their flashes, how far they reach, and their evidence."""
     size = len(data.power)
-    powers, reach = even_scores(data.evidence, rates, np.full(len(rates), centre))
+    powers, reach = even_scores(data.evidence, rates, np.full(len(rates), centre), furthest)
     order = np.arange(1, reach.max() + 1)
     frequency = centre + np.array([-1, 1])[:, None, None] * rates[:, None] * order
     seen = data.usable(frequency) & (order <= reach[:, None])
@@ -174,13 +179,14 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
     if reach * RATE_SPREAD * nominal * data.pulses < 2:
         return alone
     rates = np.arange(nominal * (1 - RATE_SPREAD), nominal * (1 + RATE_SPREAD), resolution / 4)
+    furthest = min(FURTHEST * nominal * reach, 0.5)
     fits: list[CombFit] = []
     reaches: list[int] = []
     rest = data
     first, spread, rate = 0.0, 0.0, nominal
     resolved = True
     while len(fits) < MAX_ROTORS:
-        rate, far, evidence = _strongest(rest, centre, rates)
+        rate, far, evidence = _strongest(rest, centre, rates, furthest)
         first = first or evidence
         if evidence < max(LEAST_EVIDENCE, LEAST_SHARE * first):
             break
