@@ -264,6 +264,7 @@ def without_clicks(samples: NDArray[np.complex128]) -> NDArray[np.complex128]:
     power = squared(samples)
     noise = float(np.median(power)) / np.log(2)
     beside = np.maximum(np.roll(power, 1), np.roll(power, -1))
+    beside[[0, -1]] = np.inf  # the record may have cut a flash there
     clicks = (power > CLICK_POWER * noise) & (power > CLICK_OVER_BESIDE * beside)
     return np.where(clicks, 0.0, samples) if 0 < clicks.sum() <= MOST_CLICKS else samples
 

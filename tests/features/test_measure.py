@@ -209,6 +209,11 @@ def test_clicks_are_taken_out_and_flashes_are_not():
     # a click's samples beside are as weak as ever, those of a band-limited flash are not
     flash = noise + 20 * np.sinc((np.arange(PULSES) - 900.3) * 0.4)
     np.testing.assert_array_equal(without_clicks(flash), flash)
+    # nor is the first or the last sample of a record: it may be all that is left of one
+    for end in (0, -1):
+        cut = noise.copy()
+        cut[end] += 40
+        np.testing.assert_array_equal(without_clicks(cut), cut)
     # two clicks are as far apart as the flashes of a rotor, 400 samples are 87.5 Hz: each of these had a comb
     for seed in (4, 6, 11, 13):
         clicked = white(np.random.default_rng(seed), PULSES)
