@@ -321,18 +321,14 @@ def _edge(
     spacings = np.array([fit.spacing * per_turn for fit in fits])
     fastest = float(spacings.max())
     order = np.arange(1, int(0.49 / fastest) + 1)
-    total, noise, number = np.zeros(len(order)), np.zeros(len(order)), np.zeros(len(order))
-    left, level = LineSpace(rest), data.level_of(rest)
-    for fit, spacing in zip(fits, spacings, strict=True):
-        own = dict(zip(fit.orders.tolist(), fit.amplitudes, strict=True))
-        for sign in (-1, 1):
-            frequency = fit.centre + sign * order * spacing
-            fitted = np.array([own.get(int(sign * per_turn * o), 0.0) for o in order])
-            power = np.abs(left.at(frequency)[0] + fitted) ** 2 * data.pulses
-            usable = data.usable(frequency)
-            total += np.where(usable, power, 0.0)
-            noise += np.where(usable, level(frequency), 0.0)
-            number += usable
+    sides = np.array([[-1], [1]]) * order
+    frequency = np.array([fit.centre for fit in fits])[:, None, None] + spacings[:, None, None] * sides
+    fitted = np.stack([_amplitudes_at(fit, per_turn * sides) for fit in fits])
+    left = LineSpace(rest).at(frequency.ravel())[0].reshape(frequency.shape)
+    usable = data.usable(frequency)
+    total = np.where(usable, np.abs(left + fitted) ** 2 * data.pulses, 0.0).sum(axis=(0, 1))
+    noise = np.where(usable, data.level_of(rest)(frequency), 0.0).sum(axis=(0, 1))
+    number = usable.sum(axis=(0, 1)).astype(float)
     # where the single rotors' lines lie in one another they add up: those orders stand too high beside the outer ones
     nearest = float(np.diff(np.sort(spacings)).min()) if len(fits) > 1 else 1.0
     seen = (number > 0) & (order * nearest * data.pulses >= MERGED_BINS)
@@ -342,6 +338,14 @@ def _edge(
     leak = SEVERAL_LEAK if len(fits) > 1 else LEAK_SHARE
     edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades, leak=leak)
     return edge * fastest, std * fastest
+
+
+def _amplitudes_at(fit: CombFit, orders: NDArray[np.intp]) -> NDArray[np.complex128]:
+    """Amplitudes of a fit's lines of these orders, 0 where it has none, same shape."""
+    widest = int(max(np.abs(orders).max(), np.abs(fit.orders).max()))
+    table = np.zeros(2 * widest + 1, np.complex128)
+    table[widest + fit.orders] = fit.amplitudes
+    return table[widest + orders]
 
 
 def _surer(lines: tuple[float, float], around: tuple[float, float]) -> tuple[float, float]:
