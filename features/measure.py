@@ -32,7 +32,7 @@ AGREED_DEVIATIONS = 2.0
 
 #: Share of the power of several rotors' family that does not count past its edge: what their inner lines leave between
 #: them lifts the level that the outer ones are read against.
-SEVERAL_LEAK = 0.02
+SEVERAL_LEAK = 0.005
 
 #: Of the sums of all about an order: variance over the square where the rotors' lines lie in one another (four of equal
 #: power, both sides), and what an edge is off by at least [lines].
@@ -256,7 +256,6 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         edge, edge_std = _edge(data, rotors.fits, rotors.rest, 1, blades)
     if not rotors.resolved:  # the mean lies anywhere within what the unresolved rates span
         out["chopping_hz_std"] = float(np.hypot(out["chopping_hz_std"], rotors.spread * prf_hz / np.sqrt(12)))
-    if count > 1 or not rotors.resolved:
         edge, edge_std = _surer((edge, edge_std), _edge_around(data, comb, rotors, blades))
     for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):
         padded = np.full(MAX_ROTORS, np.nan)
@@ -349,7 +348,7 @@ def _amplitudes_at(fit: CombFit, orders: NDArray[np.intp]) -> NDArray[np.complex
 
 
 def _surer(lines: tuple[float, float], around: tuple[float, float]) -> tuple[float, float]:
-    """Of several rotors, the edge of the fitted lines with its deviation, if it is the surer one; or that about them.
+    """Of unresolved rotors, the edge of the fitted lines with its deviation, if it is the surer one; or that about them.
 
     Rotors that were not told apart show in the second alone. It is known to its own deviation, whatever the first says.
     """
