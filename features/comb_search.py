@@ -249,8 +249,8 @@ def even_scores(
         held[better], ends[better] = highest[better], far[better] + first
         first += len(both)
     row = best.argmax(axis=1)[:, None]
-    scores, ends = (np.take_along_axis(values, row, axis=1)[:, 0] for values in (best, reach))
-    return np.maximum(scores, 0).astype(np.float64), ends
+    scores = np.maximum(np.take_along_axis(best, row, axis=1)[:, 0], 0)
+    return scores.astype(np.float64), np.take_along_axis(reach, row, axis=1)[:, 0]
 
 
 def _sums_of_sides(

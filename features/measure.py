@@ -321,7 +321,8 @@ def _edge(
     fastest = float(spacings.max())
     order = np.arange(1, int(0.49 / fastest) + 1)
     sides = np.array([[-1], [1]]) * order
-    frequency = np.array([fit.centre for fit in fits])[:, None, None] + spacings[:, None, None] * sides
+    centres = np.array([fit.centre for fit in fits])
+    frequency = np.asarray(centres[:, None, None] + spacings[:, None, None] * sides, np.float64)
     fitted = np.stack([_amplitudes_at(fit, per_turn * sides) for fit in fits])
     left = LineSpace(rest).at(frequency.ravel())[0].reshape(frequency.shape)
     usable = data.usable(frequency)
@@ -348,7 +349,7 @@ def _amplitudes_at(fit: CombFit, orders: NDArray[np.intp]) -> NDArray[np.complex
 
 
 def _surer(lines: tuple[float, float], around: tuple[float, float]) -> tuple[float, float]:
-    """Of unresolved rotors, the edge of the fitted lines with its deviation, if it is the surer one; or that about them.
+    """Of unresolved rotors, the edge of the lines and its deviation, if it is the surer one; or that of all about them.
 
     Rotors that were not told apart show in the second alone. It is known to its own deviation, whatever the first says.
     """

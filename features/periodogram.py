@@ -213,7 +213,7 @@ def _kept(size: int, blocked: tuple[tuple[float, float], ...], margin: float = 0
     return keep
 
 
-def local_level(power: NDArray[np.float64], keep: NDArray[np.bool_], floor: float, block: int) -> NDArray[np.float64]:
+def local_level(power: NDArray[np.floating], keep: NDArray[np.bool_], floor: float, block: int) -> NDArray[np.float64]:
     """Smooth level of a spectrum in FFT order that lines do not lift: lower quartiles of blocks, joined by lines.
 
     Parameters
@@ -231,7 +231,7 @@ def local_level(power: NDArray[np.float64], keep: NDArray[np.bool_], floor: floa
 
 
 def _level_at_bins(
-    power: NDArray[np.float64], keep: NDArray[np.bool_], floor: float, block: int
+    power: NDArray[np.floating], keep: NDArray[np.bool_], floor: float, block: int
 ) -> Callable[[NDArray], NDArray[np.float64]]:
     """`local_level` as a function of the bin."""
     size = len(power)

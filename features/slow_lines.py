@@ -203,13 +203,13 @@ def notched_products(
         plains.append(held[:, 0])
         timeds.append(held[:, 1])
     plain, timed = np.concatenate(plains, axis=1), np.concatenate(timeds, axis=1)
-    joint, joint_timed = plain, timed
+    both: tuple[NDArray[np.floating], NDArray[np.floating]] = plain, timed
     if len(bands) > 1:
         inverse = _gram_inverse(pulses, bands)
-        joint, joint_timed = plain @ inverse, timed @ inverse
+        both = plain @ inverse, timed @ inverse
     left = products[0]
-    left -= joint @ plain.T
-    return LineProducts(*products, plain, timed, joint, joint_timed)
+    left -= both[0] @ plain.T
+    return LineProducts(*products, plain, timed, *both)
 
 
 @lru_cache(maxsize=4)
