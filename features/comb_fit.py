@@ -27,7 +27,7 @@ NOTCH_RIDGE = 1e-2
 CLEAR_SNR = 30.0
 
 #: Lines nearer than this share the power seen there [bins].
-ONE_BINS = 1.6
+ONE_BINS = 1.0
 
 #: Lines beyond the outermost that speak for the comb, fitted with it: what they hold must not leak into the others.
 MARGIN_ORDERS = 3
@@ -193,7 +193,7 @@ def fit_combs(
         first, last = np.sort(frequency).searchsorted(frequency + np.array([[-ONE_BINS], [ONE_BINS]]) / pulses)
         shared = last - first
         snr = np.minimum(snr, np.maximum(most / shared, 1e-3))
-        held_back = 1 / (snr * (1 + (shared == 1) * (snr / CLEAR_SNR) ** 2)) + LEAST_RIDGE
+        held_back = 1 / (snr * (1 + (snr / CLEAR_SNR) ** 2)) + LEAST_RIDGE
         factor, failed = _factored(products.plain, held_back)
         if failed:  # what is tabulated of the notch is a little off where nearly all was taken out
             factor, _ = _factored(products.plain, held_back + NOTCH_RIDGE)

@@ -29,7 +29,7 @@ LEAST_SHARE = 0.03
 LEAST_POWER_SHARE = 0.12
 
 #: Steps of the joint fit each time a rotor is added, and once all are found: only then their deviations matter.
-JOINT_STEPS, LAST_STEPS = 1, 3
+JOINT_STEPS, LAST_STEPS = 2, 3
 
 #: A rotor flashes once a period on each side of the body. A second flash of this share of the first one's power is
 #: another rotor's, of a rate that the dwell does not tell apart; so far from the first it is no part of it [1 / lines].
