@@ -323,6 +323,22 @@ def test_the_rates_of_four_rotors_and_their_body_are_true_to_their_deviations():
     assert np.mean(np.square(speeds)) < 3
 
 
+def test_rotors_just_further_apart_than_the_dwell_tells_are_told_apart():
+    resolved, spreads_rpm = [], []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        rpm = rng.uniform(3395, 3480) + np.array([0.0, 13.0])
+        first, second = (shifted(value / 60, angle) for value, angle in zip(rpm, rng.uniform(0, 6, 2), strict=True))
+        moving = tone(-2 * rng.uniform(5, 30) / WAVELENGTH_M)
+        echo = (first + second) / np.sqrt(np.mean(np.abs(first + second) ** 2)) + 10
+        found = measure(10**0.5 * echo * moving + white(rng, PULSES), **RADAR)
+        resolved.append(bool(found.rotors_resolved))
+        spreads_rpm.append(30 * found.rotor_spread_hz)
+    # found by one step each they leave what passes for further rotors: none was resolved
+    assert sum(resolved) >= 3
+    assert np.abs(np.median(spreads_rpm) - 13) < 1
+
+
 def test_the_band_of_four_rotors_30_db_up_is_sure():
     errors, stds = [], []
     for seed in range(8):
