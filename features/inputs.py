@@ -96,7 +96,8 @@ class Dwells:
 
     def inputs(self, names: Collection[str]) -> dict[str, NDArray[np.float32]]:
         """The named inputs, each of shape (records, *INPUT_SHAPES[name]); see `model_inputs`."""
-        return {name: getattr(self, f"_{name}") for name in INPUT_SHAPES if name in names}
+        # the measurements last: they take the mean level from the levels where these are made
+        return {name: getattr(self, f"_{name}") for name in sorted(names, key=lambda name: (name == "features", name))}
 
     @cached_property
     def _spectrum_of_dwell(self) -> Spectrum:
