@@ -2,8 +2,8 @@
 
 The figures come from `train.json` beside the models: balanced accuracy on the test records, and what a record costs as
 a multiple of its bare FFT, both measured by the run that made the models; of the cascade, whose records do not all cost
-the same, the mean over records as training draws them. A ratio within one run means the same on
-another machine; only the FFT is timed here.
+the same, the mean over records as training draws them. Only the FFT is timed here: a ratio to it carries over to
+another machine within a factor of two, as processors differ in how fast their FFT is beside the rest.
 """
 
 import json

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .cascade import Cascade
 from .gather import Gathered
 from .inference import Classifier
-from .ladder import COST_KEY, PULSES, RECORDS, STAGES_KEY, by_place
+from .ladder import CASCADE, COST_KEY, PULSES, RECORDS, STAGES_KEY, by_place
 from .training_account import figures
 
 _RADAR = Radar(10e9, 25e3, PULSES)
@@ -57,7 +57,7 @@ def add_costs(
         "asked": round(float(np.mean(~sure)), 4),
         "test": figures(probabilities, test.labels, np.asarray(cascade.accept), false_alarm)
         | {"expected_calibration_error": round(expected_calibration_error(probabilities, test.labels), 4)},
-        COST_KEY: round(costs_ffts({"": cascade})[""], 1),
+        COST_KEY: round(costs_ffts({CASCADE: cascade})[CASCADE], 1),
         "accept": [float(limit) for limit in cascade.accept],
     }
 

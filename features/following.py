@@ -1,5 +1,8 @@
 """A body followed through a long recording: its steady course, and the samples as if it stood still."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
@@ -16,6 +19,16 @@ REST_MPS, REST_MPS2, REST_NOTCH_MPS = 0.4, 0.15, 0.5
 
 #: Velocity in the middle [m/s], acceleration and its deviation [m/s^2]; NaN where no line stands out.
 Course = tuple[float, float, float]
+
+
+def by_recording(
+    iq: NDArray[np.complexfloating], one: Callable[[NDArray[np.complex64]], tuple[Any, ...]]
+) -> list[NDArray]:
+    """What is found in each recording of a batch (..., pulses), one after the other: an array (...) a field."""
+    samples = np.asarray(iq, np.complex64)
+    lead = samples.shape[:-1]
+    rows = [one(samples[index]) for index in np.ndindex(lead)]
+    return [np.array(column).reshape(lead) for column in zip(*rows, strict=True)]
 
 
 def followed(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[NDArray[np.complex64], Course]:

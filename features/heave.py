@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .following import followed, standing
+from .following import by_recording, followed, standing
 from .spectrum import SPEED_OF_LIGHT_MPS
 from .wingbeat import GAIT_HZ, GAIT_MPS, LEAST_S, WING_MPS
 
@@ -73,11 +73,7 @@ def heave(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float) 
     -------
     Heave
     """
-    samples = np.asarray(iq, np.complex64)
-    lead = samples.shape[:-1]
-    rows = [_one(samples[index], carrier_hz, prf_hz) for index in np.ndindex(lead)]
-    rate, amplitude, walks = (np.array(column).reshape(lead) for column in zip(*rows, strict=True))
-    return Heave(rate, amplitude, walks)
+    return Heave(*by_recording(iq, lambda samples: _one(samples, carrier_hz, prf_hz)))
 
 
 def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[float, float, bool]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .following import followed, standing
+from .following import by_recording, followed, standing
 from .repetition import HARMONICS, LevelSpectrum, Repetition, level_spectrum, repetition
 from .spectrum import LEAST_FLOOR, SPEED_OF_LIGHT_MPS
 from .stft import stft
@@ -128,11 +128,7 @@ def wingbeat(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: floa
     -------
     Wingbeat
     """
-    samples = np.asarray(iq, np.complex64)
-    lead = samples.shape[:-1]
-    rows = [_one(samples[index], carrier_hz, prf_hz) for index in np.ndindex(lead)]
-    columns = [np.array(column).reshape(lead) for column in zip(*rows, strict=True)]
-    return Wingbeat(*columns)
+    return Wingbeat(*by_recording(iq, lambda samples: _one(samples, carrier_hz, prf_hz)))
 
 
 def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
