@@ -29,14 +29,14 @@ KINDS: dict[str, dict[str, float]] = {
     "uav": {"fixed_wing": 0.25, "quadcopter": 0.3, "hexacopter": 0.15, "octocopter": 0.1, "helicopter": 0.2},
     "bird": {"flapping_bird": 0.6, "gliding_bird": 0.15, "flock": 0.25},
     "clutter": {
-        "noise": 0.16,
-        "ground": 0.11,
+        "noise": 0.2,
+        "ground": 0.1,
         "rain": 0.09,
-        "sea": 0.11,
+        "sea": 0.1,
         "person": 0.09,
-        "vehicle": 0.17,
-        "wind_turbine": 0.14,
-        "mover": 0.13,
+        "vehicle": 0.18,
+        "wind_turbine": 0.12,
+        "mover": 0.12,
     },
 }
 

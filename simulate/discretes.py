@@ -25,7 +25,10 @@ LIMBS = (
 
 
 #: Scatterers of a vehicle's body, and at most of its wheels together.
-BODY_POINTS, MAX_WHEEL_POINTS = 9, 40
+BODY_POINTS, MAX_WHEEL_POINTS = 16, 40
+
+#: Width of a vehicle's body [m].
+VEHICLE_WIDTH_M = 1.8
 
 #: Most scatterers of a wind turbine's blade.
 MAX_BLADE_POINTS = 30
@@ -58,34 +61,55 @@ def draw_person(draws: Draws, radar: Radar) -> Target:
 
 
 def draw_vehicle(draws: Draws, radar: Radar) -> Target:
-    """Draw a road vehicle: several body scatterers of slightly unlike radial speed, and wheels from 0 to 2 v."""
+    """Draw a road vehicle that passes: scatterers all over it, each on its own way past the radar, and turning wheels.
+
+    From afar it is one line. Beside the road its parts are seen under angles so unlike that it fills all speeds up to
+    its own, and each of them changes as fast as the vehicle passes.
+    """
     speed = draws.value("vehicle_mps") * draws.sign()
-    acceleration = draws.acceleration_mps2("vehicle_acceleration_mps2", radar.dwell_s)
-    spread = draws.value("aspect_spread")  # close to the road each part has its own aspect
+    pull = draws.acceleration_mps2("road_acceleration_mps2", radar.dwell_s)
+    aside, sight = draws.value("road_m"), draws.value("sight_rad")
+    ahead = aside * np.tan(sight)  # at the middle of the dwell
+    gone = straight_path(radar.times_s - radar.times_s[radar.pulses // 2], speed, pull)
+    length = draws.value("vehicle_length_m")
     body = np.zeros((len(draws), radar.pulses), np.complex64)
     for _ in range(BODY_POINTS):
-        own = speed * (1 - spread * draws.uniform())
-        level, phase = np.exp(0.6 * draws.normal()), draws.value("phase_rad")
-        path = {"velocity_mps": own, "acceleration_mps2": acceleration}
-        body_echo(radar, len(draws), **path, phase_rad=phase, amplitude=level, out=body)
-    wheels, turn = _wheels(draws, radar, speed, acceleration)
-    truth = {"velocity_mps": speed, "acceleration_mps2": acceleration, "rotation_hz": np.abs(turn)}
+        x, y = ahead + length * (draws.uniform() - 0.5), aside + VEHICLE_WIDTH_M * draws.uniform()
+        level = np.exp(0.6 * draws.normal()) * (aside**2 + ahead**2) / (x**2 + y**2)  # near parts are strong
+        echo = level * np.exp(1j * draws.value("phase_rad"))
+        body += echo.astype(np.complex64)[:, None] * _passing(radar, x, y, gone)
+    wheels, turn = _wheels(draws, radar, speed, np.abs(np.sin(sight)))
+    wheels *= _passing(radar, ahead, aside, gone)
+    truth = {
+        "velocity_mps": speed * np.sin(sight),
+        "acceleration_mps2": pull * np.sin(sight) + (speed * np.cos(sight)) ** 2 / np.hypot(ahead, aside),
+        "rotation_hz": np.abs(turn),
+    }
     return Target(wheels, body, -draws.value("wheel_db"), truth=truth)
 
 
+def _passing(
+    radar: Radar, ahead_m: NDArray[np.float64], aside_m: NDArray[np.float64], gone_m: NDArray[np.float64]
+) -> NDArray[np.complex64]:
+    """Phasor of a point that moves along a road, `ahead_m` of the radar's side and `aside_m` off at the middle."""
+    distance = np.hypot(ahead_m[:, None] + gone_m, aside_m[:, None])
+    distance -= np.hypot(ahead_m, aside_m)[:, None]
+    return range_phasor(distance, radar.wavelength_m)
+
+
 def _wheels(
-    draws: Draws, radar: Radar, speed_mps: NDArray[np.float64], acceleration_mps2: NDArray[np.float64]
+    draws: Draws, radar: Radar, speed_mps: NDArray[np.float64], cosine: NDArray[np.float64]
 ) -> tuple[NDArray[np.complex64], NDArray[np.float64]]:
-    """Echo of a vehicle's wheels and their rotation rate [Hz].
+    """Echo of a vehicle's wheels about the vehicle itself, and their rotation rate [Hz].
 
     A point on the rim rolls: its radial speed runs from 0 at the ground to twice the vehicle's at the top, at the rate
-    of the speed along the road. Half of the wheels have even spokes that echo alike, whose lines are those of a rotor;
-    the others' points lie and echo as they will.
+    of the speed along the road; `cosine` is that of the angle between the road and the line of sight. Half of the
+    wheels have even spokes that echo alike, whose lines are those of a rotor; the others' points lie and echo as they
+    will.
     """
     records = len(draws)
-    cosine = np.cos(draws.value("wheel_aspect_rad"))
     radius = draws.value("wheel_radius_m")
-    turn = speed_mps / cosine / (TWO_PI * radius)
+    turn = speed_mps / (TWO_PI * radius)
     wheels, spokes = (np.floor(draws.value(law)).astype(int) for law in ("wheels", "spokes"))
     points, own_phase = wheels * spokes, draws.value("phase_rad", 4)
     even, rim_only = draws.chance(0.5), draws.chance(0.5)
@@ -103,8 +127,6 @@ def _wheels(
         out[rows] += body_echo(
             radar,
             len(rows),
-            velocity_mps=speed_mps[rows],
-            acceleration_mps2=acceleration_mps2[rows],
             phase_rad=TWO_PI * echo[rows, np.where(alike, wheel, point)],
             vibration_rad=-2 * TWO_PI / radar.wavelength_m * rim,
             vibration_hz=turn[rows],

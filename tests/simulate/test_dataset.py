@@ -136,8 +136,8 @@ def test_any_dwell_from_5_ms_to_5_s_is_drawn_and_stays_physical(prf_hz, dwell_s)
     assert np.isfinite(records.iq).all()
     assert (np.mean(abs(records.iq) ** 2, axis=1) > 0).all()
     draws = Draws(np.random.default_rng(0).random((4000, 2)))
-    # over the dwell a rotor's rate changes by 30 % at most, and a vehicle's speed by 10 m/s
-    for law, most in (("drift_per_s", 0.3), ("vehicle_acceleration_mps2", 10.0)):
+    # over the dwell a rotor's rate changes by 30 % at most, and a vehicle's speed by 4 m/s
+    for law, most in (("drift_per_s", 0.3), ("road_acceleration_mps2", 4.0)):
         assert abs(draws.change(law, radar.dwell_s)).max() * radar.dwell_s <= most * 1.0001
 
 

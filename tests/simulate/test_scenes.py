@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bladewing.simulate import Radar
 from bladewing.simulate.bird import draw_bird
-from bladewing.simulate.discretes import draw_discrete
+from bladewing.simulate.discretes import _passing, draw_discrete
 from bladewing.simulate.laws import STEADY, WIDTH, Draws
 from bladewing.simulate.uav import ROTORS, draw_uav
 
@@ -60,8 +60,35 @@ def test_wheels_run_from_rest_to_twice_the_vehicle():
     assert (np.where(inside, power, 0).sum(axis=1) / power.sum(axis=1)).min() > 0.999
 
 
+def test_a_point_passes_at_the_distance_that_pythagoras_gives():
+    times_s = RADAR.times_s - RADAR.dwell_s / 2
+    for ahead, aside, speed in ((-30.0, 3.0, 25.0), (0.0, 1.5, -40.0), (900.0, 400.0, 10.0)):
+        gone = speed * times_s[None, :]
+        turned = np.unwrap(np.angle(_passing(RADAR, np.array([ahead]), np.array([aside]), gone)[0].astype(complex)))
+        exact = np.array([np.hypot(np.longdouble(ahead) + g, np.longdouble(aside)) for g in gone[0]])
+        measured = -turned * RADAR.wavelength_m / (4 * np.pi)
+        np.testing.assert_allclose(measured - measured[0], (exact - exact[0]).astype(float), atol=1e-8)
+
+
+def test_far_vehicles_are_a_line_and_near_ones_fill_the_speeds_up_to_their_own():
+    target = draw_discrete(draws(400, 8), RADAR, "vehicle")
+    truth = target.truth
+    power, velocity = spectrum(target.body)
+    mean = (power * velocity).sum(axis=1) / power.sum(axis=1)
+    width = np.sqrt((power * (velocity - mean[:, None]) ** 2).sum(axis=1) / power.sum(axis=1))
+    steady = abs(truth["acceleration_mps2"]) < 0.5
+    assert 0.25 < steady.mean() < 0.7  # a bend is no sign of a vehicle
+    strongest = velocity[power.argmax(axis=1)]
+    assert np.mean(abs(strongest - truth["velocity_mps"])[steady] < 1) > 0.95
+    assert np.median(width[steady]) < 0.4
+    bent = abs(truth["acceleration_mps2"]) > 8
+    assert bent.sum() > 30
+    assert np.median(width[bent]) > 0.8
+    assert max(abs(mean)) < 44
+
+
 def test_steady_and_manoeuvring_bodies_are_as_frequent_in_every_class():
-    for kind, draw in (("quadcopter", draw_uav), ("flapping_bird", draw_bird), ("vehicle", draw_discrete)):
+    for kind, draw in (("quadcopter", draw_uav), ("flapping_bird", draw_bird), ("mover", draw_discrete)):
         acceleration = abs(draw(draws(600, 6), RADAR, kind).truth["acceleration_mps2"])
         most = acceleration.max()
         # a steady one has at most a twentieth, and so has one in twenty of the others
@@ -69,17 +96,18 @@ def test_steady_and_manoeuvring_bodies_are_as_frequent_in_every_class():
 
 
 def test_even_spokes_show_only_lines_of_their_own_rate():
-    radar = Radar(9.85e9, 10e3, 5000)
-    target = draw_discrete(draws(1200, 7), radar, "vehicle")
-    turn = target.truth["rotation_hz"]
-    unfolded = 2 * abs(target.truth["velocity_mps"]) < 0.9 * radar.unambiguous_mps
-    chosen = np.flatnonzero((turn > 25) & (abs(target.truth["acceleration_mps2"]) < 0.3) & unfolded)
+    radar = Radar(3e9, 4e3, 4000)
+    target = draw_discrete(draws(1500, 7), radar, "vehicle")
+    turn, speed = target.truth["rotation_hz"], abs(target.truth["velocity_mps"])
+    unfolded = 2 * speed < 0.9 * radar.unambiguous_mps
+    steady = abs(target.truth["acceleration_mps2"]) < 0.2
+    chosen = np.flatnonzero((turn > 12) & steady & unfolded & (speed > 8))
     power = abs(np.fft.fft(target.micro * np.kaiser(radar.pulses, 12.5), axis=-1)) ** 2
     frequency_hz = np.fft.fftfreq(radar.pulses, 1 / radar.prf_hz)
     shares = []
     for row in chosen:
         turns = (frequency_hz + 2 * target.truth["velocity_mps"][row] / radar.wavelength_m) / turn[row]
-        combs = [abs(turns - n * np.rint(turns / n)) * turn[row] < 16 for n in range(2, 11)]
+        combs = [abs(turns - n * np.rint(turns / n)) * turn[row] < 7 for n in range(2, 11)]
         shares.append(max(power[row, comb].sum() for comb in combs) / power[row].sum())
     assert len(chosen) > 30
     # half of those that have two spokes or more
