@@ -88,7 +88,7 @@ def train_network(
     validation
         Inputs and labels of other records, which choose the best epoch.
     seed
-        Draws the order of the records, the dropout and the augmentation.
+        Draws the order of the records and the augmentation.
     epochs
         Passes over the records, at least 1.
     batch
@@ -145,41 +145,39 @@ def train_network(
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, learning_rate, total_steps=epochs * steps, pct_start=0.2)
     criterion = nn.CrossEntropyLoss(label_smoothing=label_smoothing)
     rng = torch.Generator().manual_seed(seed)
-    with torch.random.fork_rng(devices=[place] if place.type == "cuda" else []):
-        torch.manual_seed(seed)
-        work = Work(net, optimiser, schedule, rng)
-        if snapshot is not None:
-            work.restore(snapshot, epochs=epochs, steps=steps)
-            started -= work.history[-1]["seconds"]
-        while len(work.history) < epochs and not 0 < patience <= len(work.history) - work.best_epoch:
-            net.train()
-            total = torch.zeros((), device=place)
-            order = torch.randperm(count, generator=rng)[: steps * batch].to(place)
-            for rows in order.split(batch):
-                part: Mapping[str, Tensor] = {name: values[rows].float() for name, values in tensors.items()}
-                if augment:
-                    part = augment(part, rng)
-                loss = criterion(net(*(part[name] for name in net.input_shapes)), truth[rows])
-                optimiser.zero_grad(set_to_none=True)
-                loss.backward()
-                optimiser.step()
-                rate = optimiser.param_groups[0]["lr"]
-                schedule.step()
-                total += loss.detach()
-            scores = torch.from_numpy(network_scores(net, validation[0]))
-            labels = torch.as_tensor(validation[1], dtype=torch.int64)
-            metrics = {
-                "learning_rate": float(rate),
-                "train_loss": float(total) / steps,
-                "validation_loss": float(nn.functional.cross_entropy(scores, labels)),
-                "validation_accuracy": float((scores.argmax(1) == labels).float().mean()),
-                "seconds": time.perf_counter() - started,
-            }
-            work.add(metrics)
-            if on_snapshot:
-                on_snapshot(work.snapshot())
-            if on_epoch:
-                on_epoch(len(work.history), epochs, metrics)
+    work = Work(net, optimiser, schedule, rng)
+    if snapshot is not None:
+        work.restore(snapshot, epochs=epochs, steps=steps)
+        started -= work.history[-1]["seconds"]
+    while len(work.history) < epochs and not 0 < patience <= len(work.history) - work.best_epoch:
+        net.train()
+        total = torch.zeros((), device=place)
+        order = torch.randperm(count, generator=rng)[: steps * batch].to(place)
+        for rows in order.split(batch):
+            part: Mapping[str, Tensor] = {name: values[rows].float() for name, values in tensors.items()}
+            if augment:
+                part = augment(part, rng)
+            loss = criterion(net(*(part[name] for name in net.input_shapes)), truth[rows])
+            optimiser.zero_grad(set_to_none=True)
+            loss.backward()
+            optimiser.step()
+            rate = optimiser.param_groups[0]["lr"]
+            schedule.step()
+            total += loss.detach()
+        scores = torch.from_numpy(network_scores(net, validation[0]))
+        labels = torch.as_tensor(validation[1], dtype=torch.int64)
+        metrics = {
+            "learning_rate": float(rate),
+            "train_loss": float(total) / steps,
+            "validation_loss": float(nn.functional.cross_entropy(scores, labels)),
+            "validation_accuracy": float((scores.argmax(1) == labels).float().mean()),
+            "seconds": time.perf_counter() - started,
+        }
+        work.add(metrics)
+        if on_snapshot:
+            on_snapshot(work.snapshot())
+        if on_epoch:
+            on_epoch(len(work.history), epochs, metrics)
     if not work.best:
         raise FloatingPointError(f"no epoch gave a finite validation loss; learning_rate {learning_rate} is too high")
     net.to("cpu").load_state_dict(work.best)

@@ -34,7 +34,7 @@ class Work:
     schedule
         One-cycle schedule over the optimiser.
     rng
-        Generator of the order and the augmentation. Dropout draws from torch's own of the network's device.
+        Generator of the order and the augmentation.
 
     Attributes
     ----------
@@ -54,7 +54,6 @@ class Work:
         rng: torch.Generator,
     ) -> None:
         self._net, self._optimiser, self._schedule, self._rng = net, optimiser, schedule, rng
-        self._place = next(net.parameters()).device
         self.history: list[dict[str, float]] = []
         self.best_epoch, self.best = 0, dict[str, Tensor]()
 
@@ -116,9 +115,6 @@ class Work:
                 if not name.startswith("generator/"):
                     value.copy_(tensors[name])
         self._rng.set_state(tensors["generator/batches"])
-        torch.random.set_rng_state(tensors["generator/dropout"])
-        if self._place.type == "cuda":
-            torch.cuda.set_rng_state(tensors["generator/cuda"], self._place)
         at = {"last_epoch": count * steps - 1, "_step_count": count * steps + 1}
         self._schedule.load_state_dict(self._schedule.state_dict() | at)
         self._schedule.step()  # a rate of this schedule follows from the number of steps alone
@@ -136,7 +132,4 @@ class Work:
             for name, value in self._optimiser.state[parameter].items():
                 moving[f"optimiser/{place}/{name}"] = value
         moving["generator/batches"] = self._rng.get_state()
-        moving["generator/dropout"] = torch.random.get_rng_state()
-        if self._place.type == "cuda":
-            moving["generator/cuda"] = torch.cuda.get_rng_state(self._place)
         return moving
