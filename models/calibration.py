@@ -178,7 +178,9 @@ def _fit(scores: NDArray[np.floating], labels: NDArray[np.integer], *, biased: b
     return Calibration(scale=float(np.exp(best[0])), bias=tuple(float(b) for b in bias))
 
 
-def expected_calibration_error(probabilities: ArrayLike, labels: NDArray[np.integer], bins: int = 15) -> float:
+def expected_calibration_error(
+    probabilities: ArrayLike, labels: NDArray[np.integer], bins: int = 15, weights: ArrayLike = 1.0
+) -> float:
     """Return the mean gap between the winning probability and how often the winner is right.
 
     Parameters
@@ -189,11 +191,13 @@ def expected_calibration_error(probabilities: ArrayLike, labels: NDArray[np.inte
         Shape (n,), whole numbers 0 to 2.
     bins
         Number of equal bins of the winning probability over 0 to 1, at least 1.
+    weights
+        What each record counts, shape (n,), at least 0, not all 0; alike by default.
 
     Returns
     -------
     float
-        Gap weighted by the number of records in each bin, 0 to 1. Never quite 0 on a sample: up to about
+        Gap weighted by the records in each bin, 0 to 1. Never quite 0 on a sample: up to about
         0.4 sqrt(bins / n) for perfectly calibrated probabilities.
 
     Raises
@@ -207,8 +211,9 @@ def expected_calibration_error(probabilities: ArrayLike, labels: NDArray[np.inte
     winner = table.max(axis=1)
     right = table.argmax(axis=1) == labels
     place = np.clip(np.ceil(winner * bins).astype(int) - 1, 0, bins - 1)
-    gaps = np.bincount(place, weights=winner - right, minlength=bins)
-    return float(np.abs(gaps).sum() / len(table))
+    share = np.broadcast_to(np.asarray(weights, np.float64), len(table))
+    gaps = np.bincount(place, weights=share * (winner - right), minlength=bins)
+    return float(np.abs(gaps).sum() / share.sum())
 
 
 def acceptance_thresholds(

@@ -55,7 +55,8 @@ def left_out(
         ``model``, ``train_records``, ``test_records`` and ``families``: for each its ``name``, its test ``records``
         and, with it in the training (``kept``) and without (``left_out``), the balanced ``accuracy`` (the classes that
         the family does not belong to stand with all their records), the shares ``unknown`` and ``wrong`` (named, and
-        not what they are) of its records, and their ``calibration_error``.
+        not what they are) of its records, and the ``calibration_error`` over the records that the accuracy is of, each
+        class counting a third.
     """
     from bladewing.models import LADDER
 
@@ -120,12 +121,15 @@ def _described(
 ) -> dict[str, Any]:
     """What is said of a family's records."""
     winner, own = probabilities.argmax(axis=1), np.unique(test.labels[of])
-    recalls = []
+    recalls, weights = [], np.zeros(len(winner))
     for index in range(probabilities.shape[1]):
         among = (test.labels == index) & (of if index in own else True)
         recalls.append(rate(winner[among] == index))
+        weights[among] = 1 / max(1, among.sum())
     named, right = answers[of] != UNKNOWN, winner[of] == test.labels[of]
-    error = expected_calibration_error(probabilities[of], test.labels[of]) if of.any() else None
+    # of a balanced world in which the family stands for its class: among records of one class alone even probabilities
+    # that are right on the whole err
+    error = expected_calibration_error(probabilities, test.labels, weights=weights) if of.any() else None
     return {
         "accuracy": mean_of_rates(recalls),
         "unknown": rate(~named),

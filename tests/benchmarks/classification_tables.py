@@ -21,7 +21,9 @@ from bladewing.classify.training_account import figures
 from bladewing.features.wingbeat import wingbeat
 from bladewing.models.calibration import conformal_thresholds
 from bladewing.simulate import Radar, draw_records
-from bladewing.simulate.dataset import KINDS, draw_radar
+from bladewing.simulate.dataset import KIND_CLASS, KINDS, _powered, _target, draw_radar
+from bladewing.simulate.laws import LAWS, WIDTH, Draws
+from bladewing.simulate.uav import ROTORS
 
 SURE_LIMITS = [(one, one) for one in (0.0, 0.6, 0.7, 0.8, 0.9, 0.95, 1.01)] + [(0.95, 0.85), (0.97, 0.85), (0.99, 0.9)]
 """Probabilities of "uav" and of the others from which on the first model of a cascade is sure."""
@@ -53,6 +55,45 @@ def scored(
         given = classifier.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
         parts.append({"p": given.probabilities, "answer": given.labels, **truth})
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def ideal(radar: Radar, count: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
+    """Records of a kind through a receiver without faults, nothing behind the target, and their SNRs [dB]."""
+    rng = np.random.default_rng([7, list(KIND_CLASS).index(kind)])
+    parts, snrs = [], []
+    for _ in range(0, count, 250):
+        draws = Draws(rng.random((250, WIDTH)))
+        noise = rng.standard_normal((250, radar.pulses, 2), np.float32).view(np.complex64)[..., 0] * np.float32(
+            0.5**0.5
+        )
+        target = _target(
+            draws, radar, kind, lambda _: lambda n: rng.standard_normal((250, n), np.float32), np.arange(250)
+        )
+        snr_db = LAWS[target.snr_law](rng.random(250))
+        parts.append(noise if kind == "noise" else noise + _powered(target, snr_db))
+        snrs.append(snr_db)
+    return np.concatenate(parts), np.concatenate(snrs)
+
+
+def ideal_detection(classifier: Classifier, count: int) -> None:
+    """Detection of UAVs in white noise alone, receivers without faults, at a false-alarm rate of 1 %."""
+
+    def p_uav(iq: np.ndarray) -> np.ndarray:
+        return classifier.predict(iq, carrier_hz=PAPER_RADAR.carrier_hz, prf_hz=PAPER_RADAR.prf_hz).probabilities[:, 0]
+
+    found = {kind: ideal(PAPER_RADAR, count, kind) for kind in KIND_CLASS}
+    p = {kind: p_uav(iq) for kind, (iq, _) in found.items()}
+    others = [np.concatenate([p[kind] for kind in KINDS[name] if kind != "noise"]) for name in ("bird", "clutter")]
+    thresholds = [np.quantile(p["noise"], 0.99), np.quantile(np.concatenate(others), 0.99)]
+    print(
+        f"\ndetection at 1 % false alarms, {PAPER_RADAR.pulses} pulses at 9.85 GHz and 25 kHz, receivers without faults"
+    )
+    for against, threshold in zip(("noise", "birds and clutter"), thresholds, strict=True):
+        print(f"against {against}, at blades of [dB]: {' '.join(f'{kind:>12s}' for kind in ROTORS)}    all")
+        for low, high in pairwise(SNR_EDGES_DB[SNR_EDGES_DB <= 12]):
+            hits = [p[kind][(found[kind][1] >= low) & (found[kind][1] < high)] > threshold for kind in ROTORS]
+            cells = " ".join(f"{one.mean() if len(one) else np.nan:12.3f}" for one in hits)
+            print(f"{low:20d} .. {high:<14d} {cells} {np.concatenate(hits).mean():6.3f}")
 
 
 def any_radars(count: int, pulses: int) -> list[Radar]:
@@ -244,6 +285,7 @@ def cascade(classifier: Classifier, count: int) -> None:
 
 TABLES: dict[str, Callable[[Classifier, int], None]] = {
     "detection": detection,
+    "ideal": ideal_detection,
     "kinds": kinds,
     "tracks": tracks,
     "coverage": coverage,

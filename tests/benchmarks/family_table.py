@@ -24,7 +24,8 @@ def main() -> None:
         "shares of the family's records"
     )
     print(
-        f"{'':16s} {'n':>6s} | accuracy with  without  fall | unknown with  without | wrong with  without | ECE without"
+        f"{'':16s} {'n':>6s} | accuracy with  without  fall | unknown with  without | wrong with  without | "
+        "ECE with  without"
     )
     for row in found["families"]:
         a, b = row["kept"], row["left_out"]
@@ -32,7 +33,7 @@ def main() -> None:
         print(
             f"{row['name']:16s} {row['records']:6d} | {accuracy[0]:13.3f} {accuracy[1]:8.3f} "
             f"{accuracy[0] - accuracy[1]:5.3f} | {unknown[0]:12.3f} {unknown[1]:8.3f} | "
-            f"{wrong[0]:10.3f} {wrong[1]:8.3f} | {b['calibration_error']:11.3f}"
+            f"{wrong[0]:10.3f} {wrong[1]:8.3f} | {a['calibration_error']:8.3f} {b['calibration_error']:8.3f}"
         )
 
 

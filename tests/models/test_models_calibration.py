@@ -115,6 +115,15 @@ def test_a_known_gap_is_the_error(right, confidence):
     assert expected_calibration_error(table, labels) == pytest.approx(abs(confidence - right / 100))
 
 
+def test_a_weight_of_two_counts_as_two_records():
+    scores, labels = _draw(300, 1)
+    p, weights = softmax(scores), 1 + np.arange(300) % 2
+    twice = np.repeat(np.arange(300), weights)
+    assert expected_calibration_error(p, labels, weights=weights) == pytest.approx(
+        expected_calibration_error(p[twice], labels[twice])
+    )
+
+
 def test_gaps_of_two_bins_do_not_cancel():
     table = np.array([[0.9, 0.1, 0.0]] * 50 + [[0.6, 0.4, 0.0]] * 50)
     labels = np.array([0] * 25 + [1] * 25 + [0] * 50)  # 0.9 said and 0.5 right; 0.6 said and 1.0 right
