@@ -188,14 +188,12 @@ def test_looks_count_by_their_duration():
     assert between[31] == LOOKS[31]
     p = np.array([[0.7, 0.2, 0.1], [0.6, 0.3, 0.1]])
     looks = np.array([[0.1, 0.8, 0.1]])
-    short, long_ = (fuse(p, labelled(p), longer={2: (looks, labelled(looks))}, dwell_s=s) for s in (0.04, 0.5))
-    mean = (
-        np.log(p).mean(axis=0) + np.log(looks[0])
-    ) / 2  # dwells and looks of no more than the fitted dwell count alike
-    worth = 2 / (1 + CORRELATION)
-    expected = np.exp(worth * mean)
-    assert short.probabilities == pytest.approx(expected / expected.sum(), rel=1e-5)
-    assert long_.probabilities[1] > short.probabilities[1]
+    # of no more than the fitted dwell, dwells and looks count alike
+    for dwell_s, counts in ((FITTED_DWELL_S / 2, [1, 1]), (0.5, [weights(0.5)[1], weights(0.5)[2]])):
+        mean = np.average([np.log(p).mean(axis=0), np.log(looks[0])], axis=0, weights=counts)
+        expected = np.exp(2 / (1 + CORRELATION) * mean)
+        found = fuse(p, labelled(p), longer={2: (looks, labelled(looks))}, dwell_s=dwell_s)
+        assert found.probabilities == pytest.approx(expected / expected.sum(), rel=1e-5)
 
 
 def test_a_silent_longer_look_changes_nothing():
@@ -259,7 +257,7 @@ def test_reason_shows_that_the_probability_is_below_the_limit():
     ],
 )
 def test_what_the_whole_track_shows_multiplies_odds_at_the_end_alone(found, name, factor):
-    p = [[0.4, 0.3, 0.3]] * 4
+    p = [[0.36, 0.32, 0.32]] * 4
     # so low that what is found lets the class be declared
     plain, shown = (fuse(p, ["unknown"] * 4, accept=(0.3,) * 3, **known) for known in ({}, found))
     best = CLASSES.index(name)
