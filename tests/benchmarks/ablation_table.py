@@ -8,11 +8,11 @@ import argparse
 from collections.abc import Callable
 
 import numpy as np
-import torch
 from bladewing.classify.gather import Gathered, gather
 from bladewing.features import INPUT_SHAPES
 from bladewing.features.schema import FEATURES, LEVEL_CHANNELS
 from bladewing.models.augment import VelocityMirror
+from bladewing.models.calibration import negative_log_likelihood, softmax
 from bladewing.models.cnn import SpectrumNet
 from bladewing.models.training import network_scores, train_network
 from numpy.typing import NDArray
@@ -66,8 +66,7 @@ def trial(
         augment=mirror,
     )
     scores, labels = network_scores(net, test), sets["bench"].labels
-    nats = float(torch.nn.functional.cross_entropy(torch.from_numpy(scores), torch.from_numpy(labels)))
-    return (*judged(scores, labels), nats)
+    return (*judged(scores, labels), negative_log_likelihood(softmax(scores), labels))
 
 
 def main() -> None:

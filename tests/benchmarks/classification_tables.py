@@ -70,7 +70,7 @@ def ideal(radar: Radar, count: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
             draws, radar, kind, lambda _: lambda n: rng.standard_normal((250, n), np.float32), np.arange(250)
         )
         snr_db = LAWS[target.snr_law](rng.random(250))
-        parts.append(noise if kind == "noise" else noise + _powered(target, snr_db))
+        parts.append(noise + _powered(target, snr_db))
         snrs.append(snr_db)
     return np.concatenate(parts), np.concatenate(snrs)
 
