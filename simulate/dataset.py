@@ -29,14 +29,14 @@ KINDS: dict[str, dict[str, float]] = {
     "uav": {"fixed_wing": 0.25, "quadcopter": 0.3, "hexacopter": 0.15, "octocopter": 0.1, "helicopter": 0.2},
     "bird": {"flapping_bird": 0.6, "gliding_bird": 0.15, "flock": 0.25},
     "clutter": {
-        "noise": 0.2,
-        "ground": 0.1,
+        "noise": 0.18,
+        "ground": 0.09,
         "rain": 0.09,
         "sea": 0.1,
         "person": 0.09,
         "vehicle": 0.18,
         "wind_turbine": 0.12,
-        "mover": 0.12,
+        "mover": 0.15,
     },
 }
 
@@ -237,7 +237,7 @@ def _render(
         rows = np.flatnonzero(kinds == kind)
         own = Draws(uniforms[rows, 1 + draws.taken :])
         target = _target(own, radar, str(kind), normals_of, rows)
-        snr_db = LAWS[target.snr_law](common[rows, 0])
+        snr_db = target.snr_db(common[rows, 0])
         signal[rows] += _powered(target, snr_db)
         columns = dict(target.truth)
         if target.body_db is not None:

@@ -66,7 +66,7 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
     From afar it is one line. Beside the road its parts are seen under angles so unlike that it fills all speeds up to
     its own, and each of them changes as fast as the vehicle passes.
     """
-    speed = draws.value("vehicle_mps") * draws.sign()
+    speed = draws.value("vehicle_mps")
     pull = draws.acceleration_mps2("road_acceleration_mps2", radar.dwell_s)
     aside, sight = draws.value("road_m"), draws.value("sight_rad")
     ahead = aside * np.tan(sight)  # at the middle of the dwell
@@ -78,14 +78,16 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
         level = np.exp(0.6 * draws.normal()) * (aside**2 + ahead**2) / (x**2 + y**2)  # near parts are strong
         echo = level * np.exp(1j * draws.value("phase_rad"))
         body += echo.astype(np.complex64)[:, None] * _passing(radar, x, y, gone)
-    wheels, turn = _wheels(draws, radar, speed, np.abs(np.sin(sight)))
+    along = ahead[:, None] + gone
+    wheels, radius = _wheels(draws, radar, gone, along / np.hypot(along, aside[:, None]))
     wheels *= _passing(radar, ahead, aside, gone)
     truth = {
         "velocity_mps": speed * np.sin(sight),
         "acceleration_mps2": pull * np.sin(sight) + (speed * np.cos(sight)) ** 2 / np.hypot(ahead, aside),
-        "rotation_hz": np.abs(turn),
+        "rotation_hz": speed / (TWO_PI * radius),
     }
-    return Target(wheels, body, -draws.value("wheel_db"), truth=truth)
+    # most vehicles' wheels cannot be seen: were the SNR theirs, a line alone would be a UAV that hides its blades
+    return Target(wheels, body, -draws.value("wheel_db"), snr_law="clutter_snr_db", snr_of_body=True, truth=truth)
 
 
 def _passing(
@@ -98,24 +100,23 @@ def _passing(
 
 
 def _wheels(
-    draws: Draws, radar: Radar, speed_mps: NDArray[np.float64], cosine: NDArray[np.float64]
+    draws: Draws, radar: Radar, gone_m: NDArray[np.float64], cosine: NDArray[np.float64]
 ) -> tuple[NDArray[np.complex64], NDArray[np.float64]]:
-    """Echo of a vehicle's wheels about the vehicle itself, and their rotation rate [Hz].
+    """Echo of a vehicle's wheels about the vehicle itself, and their radius [m].
 
-    A point on the rim rolls: its radial speed runs from 0 at the ground to twice the vehicle's at the top, at the rate
-    of the speed along the road; `cosine` is that of the angle between the road and the line of sight. Half of the
+    A point on the rim rolls as far as the vehicle has `gone_m`: its radial speed runs from 0 at the ground to twice the
+    vehicle's at the top; `cosine` is that of the angle between the road and the line of sight, a pulse. Half of the
     wheels have even spokes that echo alike, whose lines are those of a rotor; the others' points lie and echo as they
     will.
     """
-    records = len(draws)
     radius = draws.value("wheel_radius_m")
-    turn = speed_mps / (TWO_PI * radius)
+    rolled = gone_m / radius[:, None]
     wheels, spokes = (np.floor(draws.value(law)).astype(int) for law in ("wheels", "spokes"))
     points, own_phase = wheels * spokes, draws.value("phase_rad", 4)
     even, rim_only = draws.chance(0.5), draws.chance(0.5)
     depth, angle, echo = (draws.uniform(MAX_WHEEL_POINTS) for _ in range(3))
     level = np.exp(0.4 * draws.normal(MAX_WHEEL_POINTS))
-    out = np.zeros((records, radar.pulses), np.complex64)
+    out = np.zeros((len(draws), radar.pulses), np.complex64)
     for point in range(int(points.max(initial=0))):
         rows = np.flatnonzero(points > point)
         wheel = point % wheels[rows]
@@ -123,17 +124,12 @@ def _wheels(
         at = TWO_PI * np.where(alike, (point // wheels[rows]) / spokes[rows], angle[rows, point])
         at += own_phase[rows, wheel]
         deep = np.where(rim_only[rows], 0.03, 0.5) * depth[rows, np.where(alike, wheel, point)]
-        rim = radius[rows] * (1 - deep) * cosine[rows]
-        out[rows] += body_echo(
-            radar,
-            len(rows),
-            phase_rad=TWO_PI * echo[rows, np.where(alike, wheel, point)],
-            vibration_rad=-2 * TWO_PI / radar.wavelength_m * rim,
-            vibration_hz=turn[rows],
-            vibration_phase_rad=at,
-            amplitude=np.where(alike, 1.0, level[rows, point]),
+        gain = np.where(alike, 1.0, level[rows, point]) * np.exp(
+            1j * TWO_PI * echo[rows, np.where(alike, wheel, point)]
         )
-    return out, turn
+        ahead = (radius[rows] * (1 - deep))[:, None] * cosine[rows] * np.sin(rolled[rows] + at[:, None])
+        out[rows] += gain.astype(np.complex64)[:, None] * range_phasor(ahead, radar.wavelength_m)
+    return out, radius
 
 
 def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:

@@ -101,7 +101,7 @@ LAWS: dict[str, Law] = {
     "texture_hz": Law("log", 0.2, 2.5, "Hz", "swells and gusts; decorrelation 0.1-1 s"),
     "person_mps": Law("uniform", -2.5, 2.5, "m/s", "walking to running"),
     "gait_hz": Law("uniform", 0.8, 2.2, "Hz", "1-2 Hz"),
-    "vehicle_mps": Law("uniform", 0.5, 42.0, "m/s", "along the road, towns to motorways; sign drawn apart"),
+    "vehicle_mps": Law("uniform", 0.5, 42.0, "m/s", "along the road, towns to motorways"),
     "road_acceleration_mps2": Law("uniform", -4.0, 4.0, "m/s^2", "pulling away and braking"),
     "road_m": Law("log", 1.5, 3000.0, "m", "from the verge to far away, where a vehicle is one line"),
     "sight_rad": Law("uniform", np.deg2rad(-85.0), np.deg2rad(85.0), "rad", "line of sight off the square of the road"),

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from .laws import LAWS
+
 #: Draws that many standard normal numbers from each record's own generator: (count) -> (records, count) float32.
 Normals = Callable[[int], NDArray[np.float32]]
 
@@ -17,13 +19,15 @@ class Target:
     Parameters
     ----------
     micro : ndarray of complex64, shape (records, pulses)
-        The part whose power the SNR counts: blades, wings, limbs, or a clutter process as a whole.
+        The part whose power the truth's SNR counts: blades, wings, limbs, or a clutter process as a whole.
     body : ndarray of complex64 or None, shape (records, pulses)
         The rest of the target, if it has one.
     body_db : ndarray or None, shape (records,)
         Power of the body over that of the micro-motion [dB].
     snr_law : str
-        The law of the micro-motion's SNR.
+        The law of the SNR.
+    snr_of_body : bool
+        Whether the law is that of the body's SNR; else it is the micro-motion's.
     truth : dict of str to ndarray, each of shape (records,)
         What is true of each record; names carry their units.
     """
@@ -32,7 +36,13 @@ class Target:
     body: NDArray[np.complex64] | None = None
     body_db: NDArray[np.float64] | None = None
     snr_law: str = "snr_db"
+    snr_of_body: bool = False
     truth: dict[str, NDArray] = field(default_factory=dict)
+
+    def snr_db(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """SNR of the micro-motion [dB] that the law makes of uniform numbers in [0, 1), shape (records,)."""
+        drawn_db = LAWS[self.snr_law](u)
+        return drawn_db - self.body_db if self.snr_of_body and self.body_db is not None else drawn_db
 
 
 def mean_power(iq: NDArray[np.complex64]) -> NDArray[np.float32]:

@@ -22,7 +22,7 @@ from bladewing.features.wingbeat import wingbeat
 from bladewing.models.calibration import conformal_thresholds
 from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.dataset import KIND_CLASS, KINDS, _powered, _target, draw_radar
-from bladewing.simulate.laws import LAWS, WIDTH, Draws
+from bladewing.simulate.laws import WIDTH, Draws
 from bladewing.simulate.uav import ROTORS
 
 SURE_LIMITS = [(one, one) for one in (0.0, 0.6, 0.7, 0.8, 0.9, 0.95, 1.01)] + [(0.95, 0.85), (0.97, 0.85), (0.99, 0.9)]
@@ -69,7 +69,7 @@ def ideal(radar: Radar, count: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
         target = _target(
             draws, radar, kind, lambda _: lambda n: rng.standard_normal((250, n), np.float32), np.arange(250)
         )
-        snr_db = LAWS[target.snr_law](rng.random(250))
+        snr_db = target.snr_db(rng.random(250))
         parts.append(noise + _powered(target, snr_db))
         snrs.append(snr_db)
     return np.concatenate(parts), np.concatenate(snrs)
