@@ -24,7 +24,8 @@ LOWEST_DB = -20.0
 LEAST_FLOOR = np.float32(1e-9)
 
 # Arrays without axes: to NumPy a number is one more thing to convert at every call.
-_HALF, _ONE, _TEN, _NO_LIMIT = (np.array(value, np.float32) for value in (0.5, 1, 10, np.inf))
+_HALF, _ONE, _NO_LIMIT = (np.array(value, np.float32) for value in (0.5, 1, np.inf))
+_DB_A_NEPER = np.array(10 / math.log(10), np.float32)  # of power
 
 _LEAST = np.array(1e-36, np.float32)  # under any power that is not 0: divides in its stead
 # Energies of a record: neither its lines, at most that strong, nor its floor leave float32.
@@ -110,8 +111,8 @@ def to_db(
 ) -> NDArray[np.float32]:
     """10 log10 of a power ratio [dB], held at `lowest_db` from below."""
     out = at_least(relative_power, 10 ** (lowest_db / 10), out=out)
-    np.log10(out, out=out)
-    return np.multiply(out, _TEN, out=out)
+    np.log(out, out=out)  # a decadic one takes 3.7 times as long in float32 where there is no AVX-512
+    return np.multiply(out, _DB_A_NEPER, out=out)
 
 
 def at_least(values: NDArray[np.float32], low: float, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
