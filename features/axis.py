@@ -141,10 +141,27 @@ class Pooling:
     def _pooled(self, operation: np.ufunc, relative_power: NDArray[np.float32], out: NDArray[np.float32]) -> None:
         """Write the sum or the largest of the spectrum bins of each seen axis bin, in rising velocity."""
         side, middle, reach = len(self.starts), self.spectrum_bins // 2, int(self.starts[-1] + self.counts[-1])
-        rising = relative_power[..., middle : middle + reach]
-        falling = relative_power[..., middle + 1 - reach : middle + 1][..., ::-1]
-        operation.reduceat(rising, self.starts, axis=-1, out=out[..., :side][..., ::-1])
-        operation.reduceat(falling, self.starts, axis=-1, out=out[..., side:])
+        alone = self._alone
+        if alone:  # copied, at a tenth of the price
+            out[..., side - alone : side + alone] = relative_power.take(self._copied, axis=-1)
+        if alone < side:
+            outer = self.starts[alone:]
+            rising = relative_power[..., middle : middle + reach]
+            falling = relative_power[..., middle + 1 - reach : middle + 1][..., ::-1]
+            operation.reduceat(rising, outer, axis=-1, out=out[..., : side - alone][..., ::-1])
+            operation.reduceat(falling, outer, axis=-1, out=out[..., side + alone :])
+
+    @cached_property
+    def _alone(self) -> int:
+        """Axis bins of a side, from velocity zero outwards, that hold one spectrum bin."""
+        more = np.flatnonzero(self.counts > 1)
+        return int(more[0]) if len(more) else len(self.counts)
+
+    @cached_property
+    def _copied(self) -> NDArray[np.intp]:
+        """The spectrum bin of each of these, in rising velocity."""
+        side = len(self.starts)
+        return self.spans[0][side - self._alone : side + self._alone]
 
 
 @lru_cache(maxsize=64)

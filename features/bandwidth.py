@@ -77,14 +77,12 @@ def energy_band_mps(
     flat = energy.reshape(-1, bins)
     total = _upto(_block_sums(flat))
     edges = _crossings(flat, total, _TAILS * total[:, -1])
-    first, last = edges.astype(np.uint32)
-    width = last - first
-    # as unsigned numbers, bins below the first are far above the width
-    within = (_positions(bins) - first[:, None]) <= width[:, None]
-    within &= flat > 0
     some = total[:, -1] > 0
     slow, fast = (spectrum.velocity_mps[edges] * some).astype(np.float32)
-    share = sums(within.astype(np.float32)) / (width + np.float32(1)) * some
+    first, after = edges[0], edges[1] + 1
+    spans = zip(flat > 0, first.tolist(), after.tolist(), strict=True)
+    held = np.array([np.count_nonzero(row[begin:end]) for row, begin, end in spans])
+    share = held / (after - first) * some
     lead = energy.shape[:-1]
     return fast.reshape(lead), slow.reshape(lead), share.astype(np.float32).reshape(lead)
 
