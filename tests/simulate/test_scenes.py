@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from bladewing.simulate import Radar
+from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.bird import draw_bird
-from bladewing.simulate.discretes import _passing, draw_discrete
-from bladewing.simulate.laws import STEADY, WIDTH, Draws
+from bladewing.simulate.discretes import _passing, _wheels, draw_discrete
+from bladewing.simulate.laws import LAWS, STEADY, WIDTH, Draws
 from bladewing.simulate.uav import ROTORS, draw_uav
 
 RADAR = Radar(9.85e9, 40e3, 4000)
@@ -85,6 +85,29 @@ def test_far_vehicles_are_a_line_and_near_ones_fill_the_speeds_up_to_their_own()
     assert bent.sum() > 30
     assert np.median(width[bent]) > 0.8
     assert max(abs(mean)) < 44
+
+
+def test_wheels_abreast_of_the_radar_do_not_move_and_roll_as_far_as_the_vehicle():
+    gone = 20.0 * (RADAR.times_s - RADAR.dwell_s / 2)[None, :] * np.ones((30, 1))
+    abreast, _ = _wheels(draws(30, 9), RADAR, gone, np.zeros_like(gone))
+    np.testing.assert_allclose(abreast, abreast[:, :1] * np.ones(RADAR.pulses), atol=1e-6)
+    ahead, radius = _wheels(draws(30, 9), RADAR, gone, np.ones_like(gone))
+    # a whole turn further on the wheels stand as they stood
+    pulses_a_turn = 2 * np.pi * radius / 20.0 * RADAR.prf_hz
+    for row, step in zip(ahead, pulses_a_turn, strict=True):
+        whole = round(step)
+        if whole < RADAR.pulses:
+            slip_rad = abs(whole - step) / RADAR.prf_hz * 20.0 * 4 * np.pi / RADAR.wavelength_m
+            assert abs(row[whole:] - row[:-whole]).max() <= slip_rad * abs(row).max() * 3 + 1e-3
+
+
+def test_a_vehicles_snr_is_its_bodys_so_that_most_wheels_lie_under_the_noise():
+    records = draw_records(Radar(9.85e9, 25e3, 512), 600, 5, kind="vehicle")
+    wheels_db, body_db = records.truth["snr_db"], records.truth["snr_db"] + records.truth["body_db"]
+    law = LAWS["clutter_snr_db"]
+    assert law.low <= body_db.min() < law.low + 5
+    assert law.high - 5 < body_db.max() <= law.high
+    assert 0.5 < np.mean(wheels_db < 0) < 0.8
 
 
 def test_steady_and_manoeuvring_bodies_are_as_frequent_in_every_class():
