@@ -40,6 +40,10 @@ KINDS: dict[str, dict[str, float]] = {
     },
 }
 
+#: Share of the records, of any kind, that hardly have thermal noise: simulated ones, near targets, laboratories. Were
+#: the levels over the noise another for each class up there, they would give the class away.
+QUIET = 0.12
+
 #: What a set of records is for; each has streams of its own, so a test record is never a training record.
 PURPOSES = {"train": 0, "validate": 1, "calibrate": 2, "test": 3, "bench": 4}
 
@@ -67,6 +71,7 @@ TRUTH_UNITS = {
     "gait_hz": "Hz",
     "body_db": "dB",
     "background_db": "dB",
+    "quiet_db": "dB",
 }
 
 #: Consecutive records of a stream that look through the same radar.
@@ -233,6 +238,7 @@ def _render(
     receiver = Receiver(draws)
     signal = _background(draws, radar, normals_of, truth["background_db"][part])
     common = draws.uniform(8)  # a target's own numbers begin behind those that all kinds share
+    quiet_db = np.where(common[:, 1] < QUIET, LAWS["quiet_db"](common[:, 2]), 0.0)
     for kind in np.unique(kinds):
         rows = np.flatnonzero(kinds == kind)
         own = Draws(uniforms[rows, 1 + draws.taken :])
@@ -243,9 +249,12 @@ def _render(
         if target.body_db is not None:
             columns["body_db"] = target.body_db
         if kind != "noise":
-            columns["snr_db"] = snr_db
+            columns["snr_db"] = snr_db + quiet_db[rows]
         for name, values in columns.items():
             truth[name][part.start + rows] = values
+    signal *= (10 ** (quiet_db / 20)).astype(np.float32)[:, None]
+    truth["background_db"][part] += quiet_db
+    truth["quiet_db"][part] = quiet_db
     iq[:] = receiver.receive(signal, noise, radar, lambda _: normals_of)
 
 

@@ -56,6 +56,7 @@ LAWS: dict[str, Law] = {
     # rising: a model that is shown many UAVs in which nothing can be seen learns to call an empty cell a UAV
     "snr_db": Law("rising", -20.0, 32.0, "dB", "micro-motion power over noise, a sample"),
     "clutter_snr_db": Law("uniform", -20.0, 50.0, "dB", "whole clutter return over noise, a sample"),
+    "quiet_db": Law("uniform", 0.0, 100.0, "dB", "thermal noise under the usual, to none that float32 holds"),
     "phase_rad": Law("uniform", -np.pi, np.pi, "rad", "no phase is special"),
     "background_db": Law(
         "uniform", -10.0, 65.0, "dB", "static return over noise; measured drone: 35-54 dB over blades"

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.bird import wing_size, wingbeat_hz
+from bladewing.simulate.dataset import QUIET
 from bladewing.simulate.laws import LAWS, Draws
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -43,8 +44,12 @@ def test_rates_levels_and_lengths_of_records_follow_their_laws(seed):
     inside = (tip > LAWS["tip_mps"].low * 0.9) & (tip < LAWS["tip_mps"].high * 1.1)
     assert inside.all()
     for column, law in (("snr_db", "snr_db"), ("blade_length_m", "blade_length_m"), ("beta_rad", "uav_beta_rad")):
-        values = np.sort(truth[column])
+        drawn = truth[column] - (truth["quiet_db"] if column == "snr_db" else 0)
+        values = np.sort(drawn)
         assert distance(values, distribution(LAWS[law], values)) < 3, column
+    quiet = truth["quiet_db"][truth["quiet_db"] > 0]
+    assert abs(len(quiet) / 1200 - QUIET) < 4 * np.sqrt(QUIET / 1200)
+    assert distance(np.sort(quiet), distribution(LAWS["quiet_db"], np.sort(quiet))) < 3
     bird = draw_records(radar, 1200, seed, kind="flapping_bird").truth
     mass = np.sort(bird["mass_kg"])
     assert distance(mass, distribution(LAWS["bird_mass_kg"], mass)) < 3
