@@ -83,11 +83,14 @@ def white(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def noise_power(scene: Scene, snr_db: float, of: str) -> float:
-    """Noise power a sample: `snr_db` under the whole target ("total"), or under its micro-motion ("micro") if any."""
+    """Noise power a sample: `snr_db` under the whole target ("total"), or under its micro-motion ("micro") if any.
+
+    Infinite: none, but for an empty cell.
+    """
     whole = np.mean(np.abs(scene.body + scene.micro) ** 2)
     moving = np.mean(np.abs(scene.micro) ** 2)
     power = moving if of == "micro" and moving > 0 else whole
-    return float(power / 10 ** (snr_db / 10)) or 1.0
+    return float(power / 10 ** (snr_db / 10)) if whole > 0 else 1.0
 
 
 def received(scene: Scene, power: float, rng: np.random.Generator) -> np.ndarray:

@@ -22,7 +22,7 @@ RADARS = (
     Radar(10e9, 25e3, 256),
     Radar(9.4e9, 5e3, 4096),
 )
-SNRS_DB = (0.0, 10.0, 20.0, 40.0)
+SNRS_DB = (0.0, 10.0, 20.0, 40.0, 70.0, np.inf)
 ANSWERS = ("uav", "bird", "clutter", "unknown")
 
 Counts = dict[tuple[str, str, str, str, float], Counter[str]]
