@@ -256,6 +256,8 @@ def _render(
     truth["background_db"][part] += quiet_db
     truth["quiet_db"][part] = quiet_db
     iq[:] = receiver.receive(signal, noise, radar, lambda _: normals_of)
+    # the noise is to sink, not the echo to rise out of float32; a power of two changes no digit
+    iq *= np.exp2(-np.rint(quiet_db * np.log2(10) / 20)).astype(np.float32)[:, None]
 
 
 def _kind_of(index: int, u: float, only: str | None) -> str:
