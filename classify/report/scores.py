@@ -16,6 +16,8 @@ from . import metrics
 UNKNOWN = -1
 FALSE_ALARM_RATE = 1e-2
 SNR_STEP_DB = 5.0
+#: Beyond lie records that hardly have noise, and moving parts that nobody could see.
+SNR_RANGE_DB = (-20.0, 50.0)
 BETA_STEP_DEG = 10.0
 #: The dwell rate that false UAVs are quoted at: one range cell looked at without a pause, 80 ms at a time [1/h].
 DWELLS_PER_HOUR = 3600 / 0.08
@@ -76,8 +78,8 @@ def describe_records(truth: Truth) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``total``, ``radars``, ``by_class`` and ``by_kind`` counts, ``without_snr``, the extremes of the SNR [dB] and
-        of the dwell [s].
+        ``total``, ``radars``, ``by_class`` and ``by_kind`` counts, ``without_snr``, the SNRs [dB] between which nine in
+        ten lie, and the extremes of the dwell [s].
     """
     snr_db = truth.snr_db[np.isfinite(truth.snr_db)]
     kinds, counts = np.unique(truth.kind, return_counts=True)
@@ -87,7 +89,7 @@ def describe_records(truth: Truth) -> dict[str, Any]:
         "by_class": {name: int(np.sum(truth.label == i)) for i, name in enumerate(truth.classes)},
         "by_kind": {str(kind): int(count) for kind, count in zip(kinds, counts, strict=True)},
         "without_snr": int(truth.label.size - snr_db.size),
-        "snr_db": [float(snr_db.min()), float(snr_db.max())] if snr_db.size else None,
+        "snr_db": np.quantile(snr_db, [0.05, 0.95]).tolist() if snr_db.size else None,
         "dwell_s": [float(truth.dwell_s.min()), float(truth.dwell_s.max())],
     }
 
@@ -202,11 +204,12 @@ def _by_beta(
 
 
 def _snr_edges(snr_db: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Edges of equal steps that hold every finite SNR; none where there is no finite SNR."""
-    finite = snr_db[np.isfinite(snr_db)]
-    if finite.size == 0:
+    """Edges of equal steps that hold every SNR within `SNR_RANGE_DB`; none where there is none."""
+    low, high = SNR_RANGE_DB
+    within = snr_db[(snr_db >= low) & (snr_db < high)]
+    if within.size == 0:
         return np.zeros(1)
-    first, last = math.floor(finite.min() / SNR_STEP_DB), math.floor(finite.max() / SNR_STEP_DB) + 1
+    first, last = math.floor(within.min() / SNR_STEP_DB), math.floor(within.max() / SNR_STEP_DB) + 1
     return np.arange(first, last + 1) * SNR_STEP_DB
 
 

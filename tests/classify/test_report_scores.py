@@ -2,7 +2,7 @@ import json
 
 import numpy as np
 import pytest
-from bladewing.classify.report.scores import UNKNOWN, Answers, Truth, describe_records, score
+from bladewing.classify.report.scores import SNR_RANGE_DB, UNKNOWN, Answers, Truth, describe_records, score
 from bladewing.classify.report.trade import weigh_up
 
 CLASSES = ("uav", "bird", "clutter")
@@ -49,6 +49,9 @@ def test_slices_share_out_every_record_that_has_the_quantity() -> None:
     found, seen = score(truth, answers), answers.answered
     by_snr, by_dwell = found["by_snr"], found["by_dwell"]
     assert sum(one["all"]["count"] for one in by_snr) == np.sum(seen & np.isfinite(truth.snr_db))
+    far = Truth(**{**vars(truth), "snr_db": truth.snr_db * np.where(np.arange(len(truth.snr_db)) % 7, 1, 9)})
+    held = seen & (far.snr_db >= SNR_RANGE_DB[0]) & (far.snr_db < SNR_RANGE_DB[1])
+    assert sum(one["all"]["count"] for one in score(far, answers)["by_snr"]) == np.sum(held) < np.sum(seen)
     assert sum(one["all"]["count"] for one in by_dwell) == np.sum(seen)
     for one in by_snr + by_dwell:
         assert one["from"] < one["to"]
