@@ -86,7 +86,8 @@ def expectations(report: Mapping[str, Any]) -> str:
         f"Frankly, what fails first (shipped `{name}`; figures from `docs/report.json`: "
         f"{count(report['records']['total'])} synthetic test records of {count(report['records']['radars'])} radars "
         f"over the whole envelope, many of which hold nothing to see: SNR of nine in ten {number(low)} to "
-        f"{number(high)} dB, dwells from {number(shortest)} ms, blades seen along their axis; 95 % intervals in brackets):",
+        f"{number(high)} dB, dwells from {number(shortest)} ms, blades seen along their axis; 95 % intervals in "
+        "brackets):",
         "",
         f"- balanced accuracy over the three classes {_rate(found['balanced_accuracy'])}"
         + (f" ({others})" if others else "")
