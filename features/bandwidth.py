@@ -12,6 +12,7 @@ TAIL_SHARE = 0.025
 
 #: Bins summed together before the energy is followed bin by bin, where it matters.
 _BLOCK = 32
+_WITHIN_BLOCK = np.arange(_BLOCK)
 
 _TAILS = np.array([[TAIL_SHARE], [1 - TAIL_SHARE]])
 
@@ -87,12 +88,6 @@ def energy_band_mps(
     return fast.reshape(lead), slow.reshape(lead), share.astype(np.float32).reshape(lead)
 
 
-@lru_cache(maxsize=64)
-def _positions(bins: int) -> NDArray[np.uint32]:
-    """Numbers of the bins."""
-    return np.arange(bins, dtype=np.uint32)
-
-
 def _block_sums(energy: NDArray[np.float32]) -> NDArray[np.float32]:
     """Energy of each block of `_BLOCK` bins, shape (records, blocks); the last one may be shorter."""
     records, bins = energy.shape
@@ -132,7 +127,7 @@ def _crossings(
     before = np.zeros((records, total.shape[1] + 1))
     before[:, 1:] = total
     block = np.minimum((total >= levels[..., None]).argmax(axis=-1), total.shape[1] - 1)
-    inside = np.minimum(block[..., None] * _BLOCK + _positions(_BLOCK), bins - 1)
+    inside = np.minimum(block[..., None] * _BLOCK + _WITHIN_BLOCK, bins - 1)
     upto = _upto(energy[rows[:, None], inside])
     upto += before[rows, block][..., None]
     # rounding alone may leave the whole block short of its level

@@ -123,10 +123,9 @@ def _wheels(
         alike = even[rows]
         at = TWO_PI * np.where(alike, (point // wheels[rows]) / spokes[rows], angle[rows, point])
         at += own_phase[rows, wheel]
-        deep = np.where(rim_only[rows], 0.03, 0.5) * depth[rows, np.where(alike, wheel, point)]
-        gain = np.where(alike, 1.0, level[rows, point]) * np.exp(
-            1j * TWO_PI * echo[rows, np.where(alike, wheel, point)]
-        )
+        own = np.where(alike, wheel, point)  # even spokes share what is drawn for their wheel
+        deep = np.where(rim_only[rows], 0.03, 0.5) * depth[rows, own]
+        gain = np.where(alike, 1.0, level[rows, point]) * np.exp(1j * TWO_PI * echo[rows, own])
         ahead = (radius[rows] * (1 - deep))[:, None] * cosine[rows] * np.sin(rolled[rows] + at[:, None])
         out[rows] += gain.astype(np.complex64)[:, None] * range_phasor(ahead, radar.wavelength_m)
     return out, radius
