@@ -204,7 +204,8 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
         flap = np.ones(len(rows))
         if kind == "gliding_bird":
             cycle = _pause(cycle, pause[rows], radar.dwell_s * rate[rows, member])
-            flap = np.where(still[rows], 0.05, 1.0)  # a glide through the whole dwell hardly moves the wings
+            # a glide through the whole dwell hardly moves the wings, or not at all
+            flap = np.where(still[rows], 0.05 * 1e-4 ** pause[rows], 1.0)
         wings = wing_echo(
             cycle,
             wavelength_m=radar.wavelength_m,

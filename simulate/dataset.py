@@ -80,7 +80,7 @@ RADAR_GROUP = 24
 _RADAR_STREAM = 1 << 40  # beyond any record's index
 _CHUNK_SAMPLES = 1 << 19  # samples rendered at a time: memory stays flat whatever the count
 _MAX_PULSES = 8192  # longest training record of most radars; beyond it a record only gains resolution
-_LONG_CHANCE = 0.03  # of a radar whose dwell is `long_dwell_s`: more would be most of the cost of all records
+_LONG_CHANCE = 0.12  # of a radar whose dwell is `long_dwell_s`, as tracks' are: half the cost of all records
 _MAX_LONG_PULSES = 65536  # longest record of those
 
 

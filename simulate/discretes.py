@@ -10,7 +10,7 @@ from .airframe import body_echo
 from .laws import Draws
 from .motion import TWO_PI, range_phasor, straight_path
 from .radar import Radar
-from .target import Target
+from .target import Target, mean_power
 
 #: Limbs of a walker: (amplitude, swing of its speed over the torso's, phase of the gait in turns). Feet reach 3x.
 LIMBS = (
@@ -64,7 +64,36 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
     """Draw a road vehicle that passes: scatterers all over it, each on its own way past the radar, and turning wheels.
 
     From afar it is one line. Beside the road its parts are seen under angles so unlike that it fills all speeds up to
-    its own, and each of them changes as fast as the vehicle passes.
+    its own, and each of them changes as fast as the vehicle passes. Some are not alone in the beam.
+    """
+    body, passage = _vehicle_body(draws, radar)
+    other, _ = _vehicle_body(draws, radar)
+    level = 10 ** (draws.value("company_db") / 20) * draws.chance(0.3)  # another one in the beam
+    body += level.astype(np.float32)[:, None] * other
+    speed, pull, ahead, aside, sight, gone = passage
+    along = ahead[:, None] + gone
+    wheels, radius = _wheels(draws, radar, gone, along / np.hypot(along, aside[:, None]))
+    wheels *= _passing(radar, ahead, aside, gone)
+    truth = {
+        "velocity_mps": speed * np.sin(sight),
+        "acceleration_mps2": pull * np.sin(sight) + (speed * np.cos(sight)) ** 2 / np.hypot(ahead, aside),
+        "rotation_hz": speed / (TWO_PI * radius),
+    }
+    # Were the SNR always the wheels', a line alone would be a UAV that hides its blades; were it always the body's,
+    # wheels would be rare, and those that are seen a UAV's rotors.
+    return Target(wheels, body, -draws.value("wheel_db"), snr_of_body=draws.chance(0.5), truth=truth)
+
+
+def _vehicle_body(draws: Draws, radar: Radar) -> tuple[NDArray[np.complex64], tuple[NDArray[np.float64], ...]]:
+    """Echo of a vehicle but for its wheels, of unit power, and how it passes.
+
+    Returns
+    -------
+    body : ndarray of complex64, shape (records, pulses)
+    passage : tuple of ndarray
+        Speed [m/s] and acceleration [m/s^2] along the road; place ahead and aside [m] at the middle of the dwell, and
+        the line of sight off the square of the road [rad] there, each of shape (records,); way gone since [m], shape
+        (records, pulses).
     """
     speed = draws.value("vehicle_mps")
     pull = draws.acceleration_mps2("road_acceleration_mps2", radar.dwell_s)
@@ -78,16 +107,8 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
         level = np.exp(0.6 * draws.normal()) * (aside**2 + ahead**2) / (x**2 + y**2)  # near parts are strong
         echo = level * np.exp(1j * draws.value("phase_rad"))
         body += echo.astype(np.complex64)[:, None] * _passing(radar, x, y, gone)
-    along = ahead[:, None] + gone
-    wheels, radius = _wheels(draws, radar, gone, along / np.hypot(along, aside[:, None]))
-    wheels *= _passing(radar, ahead, aside, gone)
-    truth = {
-        "velocity_mps": speed * np.sin(sight),
-        "acceleration_mps2": pull * np.sin(sight) + (speed * np.cos(sight)) ** 2 / np.hypot(ahead, aside),
-        "rotation_hz": speed / (TWO_PI * radius),
-    }
-    # most vehicles' wheels cannot be seen: were the SNR theirs, a line alone would be a UAV that hides its blades
-    return Target(wheels, body, -draws.value("wheel_db"), snr_law="clutter_snr_db", snr_of_body=True, truth=truth)
+    body /= np.sqrt(mean_power(body))[:, None]
+    return body, (speed, pull, ahead, aside, sight, gone)
 
 
 def _passing(

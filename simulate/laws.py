@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Uniform numbers a record owns; a wind turbine behind its receiver, the widest, takes 452 of them.
-WIDTH = 464
+#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 465 of them.
+WIDTH = 472
 
 #: What a steady body's acceleration is of a manoeuvring one's. Half of all bodies are steady, whatever they are: if one
 #: class alone accelerated, a line that bends would be all there is to learn of it.
@@ -107,6 +107,7 @@ LAWS: dict[str, Law] = {
     "road_m": Law("log", 1.5, 3000.0, "m", "from the verge to far away, where a vehicle is one line"),
     "sight_rad": Law("uniform", np.deg2rad(-85.0), np.deg2rad(85.0), "rad", "line of sight off the square of the road"),
     "vehicle_length_m": Law("log", 1.5, 13.0, "m", "motorcycle to bus"),
+    "company_db": Law("uniform", -25.0, -3.0, "dB", "another vehicle in the beam, under the first"),
     "mover_mps": Law("uniform", -60.0, 60.0, "m/s", "boats, balloons, far vehicles, aircraft on a slant path"),
     "wheel_radius_m": Law("log", 0.2, 0.55, "m", "motorcycle to lorry"),
     "wheel_db": Law("uniform", -35.0, -5.0, "dB", "wheels under the body"),

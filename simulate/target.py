@@ -26,8 +26,8 @@ class Target:
         Power of the body over that of the micro-motion [dB].
     snr_law : str
         The law of the SNR.
-    snr_of_body : bool
-        Whether the law is that of the body's SNR; else it is the micro-motion's.
+    snr_of_body : ndarray of bool or None, shape (records,)
+        Where the SNR is drawn for the body instead, as that of clutter is.
     truth : dict of str to ndarray, each of shape (records,)
         What is true of each record; names carry their units.
     """
@@ -36,13 +36,15 @@ class Target:
     body: NDArray[np.complex64] | None = None
     body_db: NDArray[np.float64] | None = None
     snr_law: str = "snr_db"
-    snr_of_body: bool = False
+    snr_of_body: NDArray[np.bool_] | None = None
     truth: dict[str, NDArray] = field(default_factory=dict)
 
     def snr_db(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """SNR of the micro-motion [dB] that the law makes of uniform numbers in [0, 1), shape (records,)."""
         drawn_db = LAWS[self.snr_law](u)
-        return drawn_db - self.body_db if self.snr_of_body and self.body_db is not None else drawn_db
+        if self.snr_of_body is None or self.body_db is None:
+            return drawn_db
+        return np.where(self.snr_of_body, LAWS["clutter_snr_db"](u) - self.body_db, drawn_db)
 
 
 def mean_power(iq: NDArray[np.complex64]) -> NDArray[np.float32]:

@@ -121,9 +121,9 @@ def test_radars_stay_inside_the_envelope():
     assert all(64 <= r.pulses <= (8192 if r.dwell_s <= 1.001 else 65536) or r.pulses == 65536 for r in radars)
     assert all(r.unambiguous_mps > 9.99 for r in radars)
     assert all(0.00499 < r.dwell_s < 5.001 for r in radars)
-    # one radar in 33 dwells for 1 to 5 s, as long as 65 536 pulses last
+    # one radar in 8 dwells for 1 to 5 s, as long as 65 536 pulses last
     long = sum(r.dwell_s > 1.001 or r.pulses > 8192 for r in radars)
-    assert abs(long - 36) < 4.5 * 6
+    assert abs(long - 144) < 4.5 * np.sqrt(0.12 * 0.88 * 1200)
     assert max(r.dwell_s for r in radars) > 3
     # the mean cost of a record stays near that of the short dwells
     assert np.mean([r.pulses for r in radars]) < 1.6 * np.mean([min(r.pulses, 8192) for r in radars])
