@@ -25,7 +25,7 @@ from .cost import BATCHES, in_turn
 from .memory import peak_bytes
 from .operations import counted_transforms, network_operations
 from .pictures import PICTURES
-from .scores import FALSE_ALARM_RATE, SNR_STEP_DB
+from .scores import FALSE_ALARM_RATE, snr_edges
 from .settings import ReportConfig
 from .storage import RECORDS_QUOTED
 from .timing import Work, quote, ratio, time_in_turns
@@ -207,10 +207,9 @@ def _found_by_snr(
     """UAVs found in slices of the SNR, at the false-alarm rate over all birds and clutter."""
     threshold = metrics.detection_at(score, labels == 0, false_alarm_rate=FALSE_ALARM_RATE)["threshold"]
     found, uav_db = score[labels == 0] > threshold, snr_db[labels == 0]
-    edges = np.arange(-20.0, 35.0 + SNR_STEP_DB, SNR_STEP_DB)
     return [
         {"from": float(low), "to": float(high), "found": metrics.rate(found[(uav_db >= low) & (uav_db < high)])}
-        for low, high in pairwise(edges)
+        for low, high in pairwise(snr_edges(uav_db))
     ]
 
 

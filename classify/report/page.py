@@ -10,7 +10,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from ..errors import BadInput
-from . import draw_cost, draw_examples, draw_front, draw_scores, summary, words
+from . import draw_cost, draw_examples, draw_front, draw_scores, scores, summary, words
 from .series import Look, choice_looks, looks
 
 SCHEMA_VERSION = "3"
@@ -69,6 +69,7 @@ def draw_page(report: Mapping[str, Any]) -> str:
     template = environment.from_string(_read("page.html.j2"))
     return template.render(
         report=report,
+        snr_range_db=scores.SNR_RANGE_DB,
         css=Markup(_read("page.css")),
         js=Markup(_read("page.js")),
         legend=_legend(looks(names)),

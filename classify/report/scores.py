@@ -139,7 +139,7 @@ def score(truth: Truth, answers: Answers) -> dict[str, Any]:
         "false_uav": false_uav,
         "false_per_hour": {name: _per_hour(one) for name, one in false_uav.items()},
         "reliability": metrics.reliability(probabilities.max(axis=-1, initial=0.0), right),
-        "by_snr": _sliced(truth, seen, right, truth.snr_db[seen], _snr_edges(truth.snr_db)),
+        "by_snr": _sliced(truth, seen, right, truth.snr_db[seen], snr_edges(truth.snr_db)),
         "by_dwell": _sliced(truth, seen, right, truth.dwell_s[seen], _one_two_five(truth.dwell_s)),
         "by_beta": _by_beta(
             truth.beta_rad[seen & (truth.label == uav)],
@@ -150,6 +150,16 @@ def score(truth: Truth, answers: Answers) -> dict[str, Any]:
         "by_kind": _by_kind(truth, seen, best, accepted),
         "acceptance": _acceptance(truth, seen, accepted),
     }
+
+
+def snr_edges(snr_db: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Edges of equal steps that hold every SNR within `SNR_RANGE_DB`; none where there is none."""
+    low, high = SNR_RANGE_DB
+    within = snr_db[(snr_db >= low) & (snr_db < high)]
+    if within.size == 0:
+        return np.zeros(1)
+    first, last = math.floor(within.min() / SNR_STEP_DB), math.floor(within.max() / SNR_STEP_DB) + 1
+    return np.arange(first, last + 1) * SNR_STEP_DB
 
 
 def _confusion(
@@ -201,16 +211,6 @@ def _by_beta(
         rates = {"answered": metrics.rate(right[inside]), "found": metrics.rate(probability[inside] > threshold)}
         slices.append({"from": float(low), "to": float(high), **rates})
     return slices
-
-
-def _snr_edges(snr_db: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Edges of equal steps that hold every SNR within `SNR_RANGE_DB`; none where there is none."""
-    low, high = SNR_RANGE_DB
-    within = snr_db[(snr_db >= low) & (snr_db < high)]
-    if within.size == 0:
-        return np.zeros(1)
-    first, last = math.floor(within.min() / SNR_STEP_DB), math.floor(within.max() / SNR_STEP_DB) + 1
-    return np.arange(first, last + 1) * SNR_STEP_DB
 
 
 def _one_two_five(values: NDArray[np.float64]) -> NDArray[np.float64]:
