@@ -88,7 +88,7 @@ def remove_bands(samples: NDArray[np.complex128], bands: Iterable[tuple[float, f
     seen = [times(basis, samples * turn.conj()) for basis, turn in zip(bases, turns, strict=True)]
     if len(bands) > 1:
         # jointly: taken out one after the other, each band would keep what the first took of the second's strong line
-        factor = np.concatenate([np.where(_odd(basis), 1j, 1) for basis in bases])
+        factor = np.concatenate([np.where(_odd(pulses, float(half)), 1j, 1) for _, half in bands])
         together = factor * (_gram_inverse(pulses, bands) @ (factor.conj() * np.concatenate(seen)))
         seen = np.split(together, np.cumsum([len(basis) for basis in bases])[:-1])
     out = samples
@@ -105,8 +105,10 @@ def _turn(pulses: int, frequency: float) -> NDArray[np.complex128]:
     return out
 
 
-def _odd(basis: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """True for the sequences that change sign in the middle."""
+@lru_cache(maxsize=32)
+def _odd(pulses: int, half_bins: float) -> NDArray[np.bool_]:
+    """True for the sequences of `slepian` that change sign in the middle."""
+    basis = slepian(pulses, half_bins)
     return np.asarray((basis * basis[:, ::-1]).sum(axis=1) < 0)
 
 
@@ -122,7 +124,7 @@ def _held(pulses: int, half_bins: float) -> NDArray[np.float32]:
     time = np.arange(pulses) - (pulses - 1) / 2
     turn = (np.exp(1j * np.pi * (pulses - 1) / size * place) / np.sqrt(pulses)).astype(np.complex64)
     plain, timed = (fft.fft(v.astype(np.complex64), size)[:, place % size] * turn for v in (basis, basis * time))
-    odd = _odd(basis)[:, None]
+    odd = _odd(pulses, half_bins)[:, None]
     seen = np.where(odd, -plain.imag, plain.real), np.where(odd, timed.real, timed.imag)
     out = np.ascontiguousarray(np.stack(seen).transpose(2, 0, 1))
     out.setflags(write=False)
@@ -217,7 +219,7 @@ def _gram_inverse(pulses: int, bands: tuple[tuple[float, float], ...]) -> NDArra
     """Inverse of the products between the sequences of all bands, odd ones times j, which makes them real."""
     time = np.arange(pulses) - (pulses - 1) / 2
     bases = [slepian(pulses, half) for _, half in bands]
-    odds = [_odd(basis) for basis in bases]
+    odds = [_odd(pulses, float(half)) for _, half in bands]
     rows = []
     for (one, _), first, odd in zip(bands, bases, odds, strict=True):
         row = []
