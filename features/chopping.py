@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
+from scipy import fft, special
 
 from .notch import Mask, parabola_offset, weights
 from .spectrum import KAISER_BETA, Spectrum, at_least, sums
@@ -71,9 +71,8 @@ def noise_shape(pulses: int, bins: int) -> NDArray[np.float32]:
         Length of the spectrum.
     """
     squared = np.kaiser(pulses, KAISER_BETA) ** 2
-    correlation = np.abs(fft.fft(squared / squared.sum(), n=bins)) ** 2
-    dilogarithm = sum(correlation**n / n**2 for n in range(1, 40))
-    variance = fft.rfft(dilogarithm).real
+    correlation = np.minimum(np.abs(fft.fft(squared / squared.sum(), n=bins)) ** 2, 1)
+    variance = fft.rfft(special.spence(1 - correlation)).real  # Li2(x) is scipy's spence(1 - x)
     return np.sqrt(np.maximum(variance, 1e-3 * variance.max())).astype(np.float32)
 
 
