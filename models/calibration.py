@@ -256,7 +256,7 @@ def acceptance_thresholds(
         right = np.cumsum((labels[won] == index)[order])
         accepted = np.arange(1, len(winner) + 1)
         last_of_ties = np.append(winner[1:] != winner[:-1], True)[: len(winner)]
-        kept = np.flatnonzero((right >= precision * accepted) & last_of_ties & (accepted >= support))
+        kept = np.flatnonzero((right / accepted >= precision) & last_of_ties & (accepted >= support))
         if kept.size:
             thresholds[index] = 1 / CLASS_COUNT if kept[-1] == len(winner) - 1 else winner[kept[-1]]
     return thresholds

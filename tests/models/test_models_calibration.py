@@ -13,7 +13,7 @@ from bladewing.models.calibration import (
     negative_log_likelihood,
     softmax,
 )
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 
@@ -133,6 +133,7 @@ def test_gaps_of_two_bins_do_not_cancel():
 
 @settings(deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), precision=st.floats(0.5, 0.99))
+@example(seed=53939, precision=0.68)  # 17 of 25 are 0.68, and a product's rounding says they are less
 def test_thresholds_keep_the_promise_and_are_the_least_that_do(seed, precision):
     scores, labels = _draw(500, seed, spread=1.5)
     table = softmax(scores)
