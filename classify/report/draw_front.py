@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator, PercentFormatter
 
 from .draw_scores import LEAST_RECORDS
-from .scores import SNR_RANGE_DB
 from .series import choice_looks
 from .svg import INK, MUTED, PAPER, SERIES, Panel, banded, drawing, panel
 from .words import batch_words, micros, millis, number, percent, size
@@ -156,7 +155,7 @@ def by_snr(report: Mapping[str, Any]) -> list[Panel]:
                 rates = [one["found"] for one in slices]
                 banded(axes, x, rates, look.colour, look.marker)
                 words.append(f"{_name(row)}: {percent(rates[-1]['value'])} at the highest SNR.")
-            axes.set_xlim(-35, SNR_RANGE_DB[1])
+            axes.set_xlim(left=-35)
             axes.set_xlabel("SNR of the rotors, a sample [dB]")
             _share(axes, "UAVs found")
             alt = f"UAVs found against SNR, {title}, beside the bound of detection. {' '.join(words)}"
