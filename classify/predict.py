@@ -1,17 +1,18 @@
 """The work behind `bladewing predict`: recordings in, one answer a dwell and one a recording out."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from bladewing.features.heave import heave
+from bladewing.features.steady_comb import steady_comb
 from bladewing.features.wingbeat import wingbeat
 
 from .errors import BadInput, one_line
-from .fusion import HEAVE_ODDS, LOOKS, STEP_ODDS, WING_ODDS
+from .fusion import LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
 from .recording import Recording, find_recording, load_recording
 from .samples import positive
@@ -26,8 +27,16 @@ if TYPE_CHECKING:
 DWELL_S = 0.08
 """Default length of a dwell [s]."""
 
-WINGS_S = 5.0
-"""How much of a recording, from its start, a wingbeat and a heave are sought in [s]."""
+LONG_S = 5.0
+"""How much of a recording, from its start, what only a long look shows is sought in [s]."""
+
+_SHOWN = {
+    "comb": "the comb of {:.1f} Hz stays",
+    "wings": "wingbeat {:.1f} Hz",
+    "heaves": "body heaves as a bird's at {:.1f} Hz",
+    "steps": "body sways as a walker's at {:.1f} Hz",
+}
+_WHOSE = {"uav": "a UAV", "bird": "a bird", "clutter": "clutter"}
 
 _COLOURS = {"uav": "bold red", "bird": "green", "clutter": "cyan", UNKNOWN: "yellow"}
 
@@ -53,13 +62,10 @@ class Answer:
     dwells
         The answers, shape (dwells,).
     track
-        The dwells together, the wingbeat and the heave.
-    wingbeat_hz
-        Wingbeat rate of the recording [Hz]; None where none is found, or it is shorter than 1.5 s.
-    heave_hz
-        Rate at which the body itself goes to and fro [Hz], or None likewise.
-    steps
-        Whether that is a walker's step, and not a beat of wings.
+        The dwells together, and what the whole recording shows.
+    shown
+        What that is [Hz], by the keys of `ODDS`: the chopping frequency of a comb that stays, the rate of wings, of a
+        body that heaves or of a walker's steps. The last three are sought in 1.5 s and more.
     """
 
     name: str
@@ -67,9 +73,7 @@ class Answer:
     stop_s: np.ndarray
     dwells: "Prediction"
     track: Track
-    wingbeat_hz: float | None = None
-    heave_hz: float | None = None
-    steps: bool = False
+    shown: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def declared_s(self) -> float | None:
@@ -92,15 +96,17 @@ class Answer:
                 "probabilities": _named(probabilities),
                 "reason": str(reason) or None,
             }
+        rates = {name: round(rate_hz, 3) for name, rate_hz in self.shown.items()}
         track = {
             "label": self.track.label,
             "probabilities": _named(self.track.probabilities),
             "dwells": len(self.dwells.labels),
             "declared": self.track.declared or None,
             "declared_s": self.declared_s,
-            "wingbeat_hz": None if self.wingbeat_hz is None else round(self.wingbeat_hz, 3),
-            "heave_hz": None if self.heave_hz is None else round(self.heave_hz, 3),
-            "steps": self.steps,
+            "chopping_hz": rates.get("comb"),
+            "wingbeat_hz": rates.get("wings"),
+            "heave_hz": rates.get("heaves", rates.get("steps")),
+            "steps": "steps" in rates,
         }
         yield {"file": self.name, "track": track}
 
@@ -133,12 +139,10 @@ class Answer:
         if self.track.reason:
             line.append(f"  ({self.track.reason})")
         console.print(line)
-        if self.wingbeat_hz is not None:
-            console.print(Text(f"wingbeat {self.wingbeat_hz:.1f} Hz: the odds of a bird count {WING_ODDS:g} times"))
-        if self.heave_hz is not None:
-            what, odds = ("sways as a walker's", STEP_ODDS) if self.steps else ("heaves as a bird's", HEAVE_ODDS)
-            whose = "clutter" if self.steps else "a bird"
-            console.print(Text(f"body {what} at {self.heave_hz:.1f} Hz: the odds of {whose} count {odds:g} times"))
+        for name, rate_hz in self.shown.items():
+            whose, odds = ODDS[name]
+            said = f"{_SHOWN[name].format(rate_hz)}: the odds of {_WHOSE[whose]} count {odds:g} times"
+            console.print(Text(said))
         if self.declared_s is not None:
             later = "" if self.track.declared == self.track.label else ", which later dwells do not bear out"
             console.print(Text(f"declared {self.track.declared} after {self.declared_s:.3g} s{later}"))
@@ -192,30 +196,31 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
         joined = iq[: count // length * length].reshape(count // length, length * wanted)
         looks = classifier.predict(joined, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
         longer[length] = looks.probabilities, looks.labels
-    beat_hz = heave_hz = None
-    steps = False
+    shown: dict[str, float] = {}
     if any(dwells.labels != UNKNOWN) or np.ptp(dwells.probabilities) > 0:  # else nothing could be judged
-        start = recording.iq[: round(WINGS_S * recording.prf_hz)]
-        wings = wingbeat(start, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
-        body = heave(start, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
-        beat_hz, heave_hz = _finite(wings.wingbeat_hz), _finite(body.heave_hz)
-        steps = bool(body.walks)
+        shown = long_look(recording.iq[: round(LONG_S * recording.prf_hz)], recording.carrier_hz, recording.prf_hz)
     track = fuse(
         dwells.probabilities,
         dwells.labels,
         longer=longer,
-        wings=beat_hz is not None,
-        heaves=heave_hz is not None and not steps,
-        steps=steps,
+        shown=shown,
         rule=classifier.decide,
         dwell_s=wanted / recording.prf_hz,
     )
     stop_s = start_s + wanted / recording.prf_hz
-    return Answer(recording.name, start_s, stop_s, dwells, track, beat_hz, heave_hz, steps)
+    return Answer(recording.name, start_s, stop_s, dwells, track, shown)
 
 
-def _finite(value: np.ndarray) -> float | None:
-    return float(value) if np.isfinite(value) else None
+def long_look(iq: np.ndarray, carrier_hz: float, prf_hz: float) -> dict[str, float]:
+    """What a long look shows of one target and a single dwell does not [Hz], by the keys of `ODDS`."""
+    radar = {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
+    body = heave(iq, **radar)
+    rates_hz = {
+        "comb": steady_comb(iq, **radar).chopping_hz,
+        "wings": wingbeat(iq, **radar).wingbeat_hz,
+        "steps" if body.walks else "heaves": body.heave_hz,
+    }
+    return {name: float(rate_hz) for name, rate_hz in rates_hz.items() if np.isfinite(rate_hz)}
 
 
 def answers(

@@ -1,13 +1,13 @@
 """One answer for a track: the dwells of one target put together, and when it was safe to say."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .fusion import CORRELATION, HEAVE_ODDS, LOOKS, STEP_ODDS, WING_ODDS
+from .fusion import CORRELATION, LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN, decide
 
 LONGER = 5
@@ -61,9 +61,7 @@ def fuse(
     labels: Sequence[str] | NDArray[np.str_],
     *,
     longer: Looks | Mapping[int, Looks] | None = None,
-    wings: bool = False,
-    heaves: bool = False,
-    steps: bool = False,
+    shown: Collection[str] = (),
     accept: Sequence[float] = (0.5, 0.5, 0.5),
     rule: Decide | None = None,
     correlation: float = CORRELATION,
@@ -91,9 +89,9 @@ def fuse(
     longer
         By their lengths in dwells, keys of `LOOKS`: probabilities and labels of the looks at so many dwells in a row;
         number k of length n is known after dwell k n. Looks without their length are of `LONGER` dwells.
-    wings, heaves, steps
-        Whether a wingbeat is found in the whole track; whether the body heaves as wings lift it; whether it sways as a
-        walker's does. They speak for a bird and for clutter at the end, not while dwells come in; that nothing is found
+    shown
+        What the whole track shows, of the keys of `ODDS`: a comb that stays, a wingbeat, a body that heaves as wings
+        lift it or sways as a walker's does. It speaks at the end, not while dwells come in; that nothing is found
         says nothing.
     accept
         Least probability at which each class is named, as `Classifier.accept`.
@@ -134,10 +132,10 @@ def fuse(
     shares = np.exp(evidence - evidence.max(axis=1, keepdims=True))
     fused = shares / shares.sum(axis=1, keepdims=True)
     fused[used == 1] = p[np.argmax(heard)]  # to the last digit
-    if wings or heaves or steps:
-        fused[-1, CLASSES.index("bird")] *= (WING_ODDS if wings else 1) * (HEAVE_ODDS if heaves else 1)
-        fused[-1, CLASSES.index("clutter")] *= STEP_ODDS if steps else 1
-        fused[-1] /= fused[-1].sum()
+    for name in shown:
+        whose, odds = ODDS[name]
+        fused[-1, CLASSES.index(whose)] *= odds
+    fused[-1] /= fused[-1].sum() if shown else 1  # the only dwell of a track stays as it is, to the last digit
     rule = rule or partial(decide, accept=accept)
     (named, reasons), (doubted, _) = rule(fused), rule(_doubted(fused))
     # the same class, or halved odds would let the second speak

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from bladewing.classify import Classifier
+from bladewing.classify.fusion import ODDS
 from bladewing.classify.inference import COVERAGES
 from bladewing.classify.labels import CLASSES, decide, decide_by_sets
 from bladewing.classify.ladder import COST_KEY, by_place, shipped_account
@@ -185,7 +186,7 @@ def tracks(classifier: Classifier, count: int) -> None:
                 {name: values[row] for name, values in truth.items()}
                 | said
                 | {"beat": beat.wingbeat_hz, "beat_std": beat.wingbeat_hz_std}
-                | {"heave": np.nan if given.heave_hz is None else given.heave_hz, "steps": given.steps}
+                | {name: given.shown.get(name, np.nan) for name in ODDS}
             )
     every = {name: np.array([part[name] for part in parts]) for name in parts[0]}
     truth = every["label"]
@@ -220,11 +221,11 @@ def tracks(classifier: Classifier, count: int) -> None:
     print(
         "wingbeats where there is none: " + ", ".join(f"{kind} {hit.sum()}/{len(hit)}" for kind, hit in false.items())
     )
-    heaves = {kind: np.isfinite(every["heave"][every["kind"] == kind]) for group in KINDS.values() for kind in group}
-    print("heaves, walkers' steps among them: " + ", ".join(f"{kind} {hit.mean():.2f}" for kind, hit in heaves.items()))
-    walkers, beats = every["kind"] == "person", np.abs(every["heave"] - every["wingbeat_hz"])[flapping]
+    for name in ODDS:
+        shares = {kind: np.isfinite(every[name][every["kind"] == kind]) for group in KINDS.values() for kind in group}
+        print(f"{name}: " + ", ".join(f"{kind} {hit.mean():.3f}" for kind, hit in shares.items()))
+    beats = np.abs(every["heaves"] - every["wingbeat_hz"])[flapping]
     print(
-        f"steps: walkers {every['steps'][walkers].mean():.2f}, others {every['steps'][~walkers].mean():.3f}; "
         f"heaves of flapping birds within 0.3 Hz of the wingbeat {(beats <= 0.3).sum() / np.isfinite(beats).sum():.2f}"
     )
     print(f"{'':16s} {'n':>6s} {'best':>8s} " + " ".join(f"{name:>8s}" for name in (*CLASSES, "unknown")))

@@ -13,11 +13,10 @@ from pathlib import Path
 
 import numpy as np
 from bladewing.classify import Classifier
-from bladewing.classify.fusion import CORRELATION, HEAVE_ODDS, LOOKS, STEP_ODDS, WING_ODDS
+from bladewing.classify.fusion import CORRELATION, LOOKS, ODDS
 from bladewing.classify.labels import CLASSES
+from bladewing.classify.predict import long_look
 from bladewing.classify.track import fuse
-from bladewing.features.heave import heave
-from bladewing.features.wingbeat import wingbeat
 from bladewing.models.calibration import expected_calibration_error, negative_log_likelihood
 from bladewing.simulate import draw_records
 from scipy import optimize
@@ -52,9 +51,8 @@ def seen(model: str | None, group: int) -> Arrays:
         count = WHOLE // length
         looks = _classifier(model).predict(records.iq[:, : count * pulses].reshape(-1, count, pulses), **shown)
         out |= {f"p{length}": looks.probabilities, f"label{length}": looks.labels}
-    body = heave(records.iq, **shown)
-    out["wings"] = np.isfinite(wingbeat(records.iq, **shown).wingbeat_hz)
-    out["steps"], out["heaves"] = body.walks, np.isfinite(body.heave_hz) & ~body.walks
+    found = [long_look(samples, radar.carrier_hz, radar.prf_hz) for samples in records.iq]
+    out |= {name: np.array([name in rates_hz for rates_hz in found]) for name in ODDS}
     return out
 
 
@@ -71,10 +69,10 @@ class Model:
     lengths
         Looks that count; the weight of the first is 1.
     numbers
-        Names of what the whole track shows, among "wings", "heaves" and "steps".
+        Names of what the whole track shows, keys of `ODDS`.
     """
 
-    def __init__(self, lengths: Sequence[int] = LENGTHS, numbers: Sequence[str] = ("wings", "heaves", "steps")) -> None:
+    def __init__(self, lengths: Sequence[int] = LENGTHS, numbers: Sequence[str] = tuple(ODDS)) -> None:
         self.lengths, self.numbers = tuple(lengths), tuple(numbers)
         self.values = np.array([1.0, *[1.0] * (len(lengths) - 1), *[1.0] * len(numbers)])
 
@@ -116,7 +114,7 @@ def fused(
     evidence = total / sum(weights[length] for length in held) * (after / (1 + (after - 1) * correlation))
     if after == WHOLE:
         for name, factor in odds.items():
-            evidence[:, CLASSES.index("clutter" if name == "steps" else "bird")] += np.log(factor) * shown[name]
+            evidence[:, CLASSES.index(ODDS[name][0])] += np.log(factor) * shown[name]
     p = np.exp(evidence - evidence.max(axis=1, keepdims=True))
     return p / p.sum(axis=1, keepdims=True)
 
@@ -124,12 +122,12 @@ def fused(
 def checked(tracks: Arrays) -> None:
     """Compare `fused` with the product's own `fuse`, at the constants as they are."""
     held = {length: means(tracks, WHOLE, length) for length in LOOKS}
-    odds = {"wings": WING_ODDS, "heaves": HEAVE_ODDS, "steps": STEP_ODDS}
+    odds = {name: factor for name, (_, factor) in ODDS.items()}
     here = fused(held, WHOLE, tracks, CORRELATION, LOOKS, odds)
     for row in range(50):
         longer = {length: (tracks[f"p{length}"][row], tracks[f"label{length}"][row]) for length in LOOKS if length > 1}
-        found = {name: bool(tracks[name][row]) for name in odds}
-        there = fuse(tracks["p1"][row], tracks["label1"][row], longer=longer, **found).probabilities
+        found = [name for name in odds if tracks[name][row]]
+        there = fuse(tracks["p1"][row], tracks["label1"][row], longer=longer, shown=found).probabilities
         np.testing.assert_allclose(there, here[row], atol=1e-5)
 
 
@@ -146,12 +144,13 @@ def gains(tracks: Arrays) -> None:
         "and of 2, 12, 31": Model(LENGTHS, ()),
         "and wingbeat": Model(LENGTHS, ("wings",)),
         "and heave": Model(LENGTHS, ("wings", "heaves")),
-        "and step": Model(),
+        "and step": Model(LENGTHS, ("wings", "heaves", "steps")),
+        "and a comb that stays": Model(),
     }
     low = tracks["carrier_hz"] < MIDDLE_HZ
     bands = {"below": low, f"above {MIDDLE_HZ / 1e9:.1f} GHz": ~low}
-    print(f"tested          {'':5s}" + "   ".join(f"{name:>29s}" for name in bands))
-    print(f"{'':20s}" + "   ".join(f"{'accuracy':>10s} {'nats':>8s} {'ECE':>9s}" for _ in bands))
+    print(f"tested          {'':6s}" + "   ".join(f"{name:>29s}" for name in bands))
+    print(f"{'':21s}" + "   ".join(f"{'accuracy':>10s} {'nats':>8s} {'ECE':>9s}" for _ in bands))
     for name, piece in pieces.items():
         cells = []
         for band in bands.values():
@@ -161,7 +160,7 @@ def gains(tracks: Arrays) -> None:
             accuracy = np.mean([np.mean(right[clear & (test["label"] == k)]) for k in range(len(CLASSES))])
             nats = negative_log_likelihood(p, test["label"])
             cells.append(f"{accuracy:10.3f} {nats:8.4f} {expected_calibration_error(p, test['label']):9.3f}")
-        print(f"{name:20s}" + "   ".join(cells))
+        print(f"{name:21s}" + "   ".join(cells))
     print("accuracy at 0 dB and above, balanced; nats a track and calibration error at every SNR")
 
 
@@ -169,7 +168,7 @@ def written(model: Model, source: str, tracks: Arrays) -> str:
     """The file `TABLE`."""
     correlation, weights, odds = model.read(model.values)
     looks = ", ".join(f"{length}: {weight:.2f}" for length, weight in weights.items())
-    wings, heaves, steps = (f"{odds[name]:.1f}" for name in ("wings", "heaves", "steps"))
+    table = ", ".join(f'"{name}": ("{whose}", {odds[name]:.1f})' for name, (whose, _) in ODDS.items())
     error = expected_calibration_error(model.probabilities(tracks), tracks["label"])
     return f'''"""How much each piece of a track counts: fitted, and written by `python -m tests.benchmarks.fusion_fit`.
 
@@ -182,9 +181,9 @@ CORRELATION = {correlation:.2f}
 LOOKS = {{{looks}}}
 """Weight of the mean of the looks at so many dwells in a row, as one; of dwells of 80 ms."""
 
-WING_ODDS, HEAVE_ODDS, STEP_ODDS = {wings}, {heaves}, {steps}
-"""What is multiplied in the whole track: the odds of a bird by a wingbeat, and by a body that heaves as wings lift it;
-the odds of clutter by one that sways as a walker's does."""
+ODDS = {{{table}}}
+"""What the whole track shows: whose odds it multiplies, and by what. A comb that stays, a wingbeat, a body that heaves
+as wings lift it, one that sways as a walker's does."""
 '''
 
 

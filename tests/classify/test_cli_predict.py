@@ -14,7 +14,7 @@ from bladewing.classify.cli import main
 PRF_HZ = 20e3
 NAMES = ["uav", "bird", "clutter"]
 
-STILL = {"wingbeat_hz": None, "heave_hz": None, "steps": False}  # of a recording without wings and limbs
+STILL = {"chopping_hz": None, "wingbeat_hz": None, "heave_hz": None, "steps": False}  # without rotors, wings and limbs
 
 
 def noise(pulses: int) -> np.ndarray:
@@ -65,8 +65,7 @@ def test_one_line_a_dwell_and_a_closing_line(run_json, sigmf_pair):
     assert second == said | {"start_s": 0.08, "stop_s": 0.16, "reason": None}
     assert list(first) == ["file", "start_s", "stop_s", "label", "probabilities", "reason"]
     assert list(closing) == ["file", "track"]
-    fields = ["label", "probabilities", "dwells", "declared", "declared_s", "wingbeat_hz", "heave_hz", "steps"]
-    assert list(closing["track"]) == fields
+    assert list(closing["track"]) == ["label", "probabilities", "dwells", "declared", "declared_s", *STILL]
     assert (closing["track"]["label"], closing["track"]["dwells"]) == ("uav", 2)
     assert (closing["track"]["declared"], closing["track"]["declared_s"]) == ("uav", 0.08)
     assert list(closing["track"]["probabilities"]) == NAMES

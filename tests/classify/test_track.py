@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from bladewing.classify.fusion import CORRELATION, HEAVE_ODDS, LOOKS, STEP_ODDS, WING_ODDS
+from bladewing.classify.fusion import CORRELATION, LOOKS, ODDS
 from bladewing.classify.inference import Classifier, Envelope, Prediction
 from bladewing.classify.labels import CLASSES, UNKNOWN, decide
 from bladewing.classify.predict import answer
@@ -248,25 +248,23 @@ def test_reason_shows_that_the_probability_is_below_the_limit():
 
 
 @pytest.mark.parametrize(
-    ("found", "name", "factor"),
+    ("shown", "name", "factor"),
     [
-        ({"wings": True}, "bird", WING_ODDS),
-        ({"heaves": True}, "bird", HEAVE_ODDS),
-        ({"wings": True, "heaves": True}, "bird", WING_ODDS * HEAVE_ODDS),
-        ({"steps": True}, "clutter", STEP_ODDS),
+        *(([name], whose, factor) for name, (whose, factor) in ODDS.items()),
+        (["wings", "heaves"], "bird", ODDS["wings"][1] * ODDS["heaves"][1]),
     ],
 )
-def test_what_the_whole_track_shows_multiplies_odds_at_the_end_alone(found, name, factor):
+def test_what_the_whole_track_shows_multiplies_odds_at_the_end_alone(shown, name, factor):
     p = [[0.36, 0.32, 0.32]] * 4
     # so low that what is found lets the class be declared
-    plain, shown = (fuse(p, ["unknown"] * 4, accept=(0.3,) * 3, **known) for known in ({}, found))
+    plain, more = (fuse(p, ["unknown"] * 4, accept=(0.3,) * 3, shown=found) for found in ((), shown))
     best = CLASSES.index(name)
-    odds = [track.probabilities / (1 - track.probabilities) for track in (plain, shown)]
+    odds = [track.probabilities / (1 - track.probabilities) for track in (plain, more)]
     assert odds[1][best] == pytest.approx(factor * odds[0][best], rel=1e-5)
     others = [k for k in range(3) if k != best]
-    ratios = [track.probabilities[others[0]] / track.probabilities[others[1]] for track in (plain, shown)]
+    ratios = [track.probabilities[others[0]] / track.probabilities[others[1]] for track in (plain, more)]
     assert ratios[1] == pytest.approx(ratios[0], rel=1e-5)
-    assert (plain.declared, shown.declared, shown.declared_after) == ("", name, 4)
+    assert (plain.declared, more.declared, more.declared_after) == ("", name, 4)
 
 
 class Asked:
@@ -299,18 +297,32 @@ def test_a_body_that_goes_to_and_fro_is_reported_and_counts(velocity_mps, rate_h
     noise = np.random.default_rng(4).normal(scale=0.2, size=(10_000, 2)).view(complex)[:, 0]
     recording = Recording("x", np.exp(-4j * np.pi * 10e9 / 299_792_458 * path) + noise, 10e9, 4e3)
     given = answer(recording, Asked(Envelope()))
-    assert given.heave_hz == pytest.approx(rate_hz, abs=0.05)
+    name = "steps" if steps else "heaves"
+    assert given.shown == {name: pytest.approx(rate_hz, abs=0.05)}
     closing = list(given.json_objects())[-1]["track"]
-    assert (closing["heave_hz"], closing["steps"]) == (round(given.heave_hz, 3), steps)
+    assert (closing["heave_hz"], closing["steps"]) == (round(given.shown[name], 3), steps)
     _, bird, clutter = given.track.probabilities  # alike in every look
     given.print(Console())
     said = capsys.readouterr().out
-    if steps:
-        assert f"body sways as a walker's at {rate_hz} Hz: the odds of clutter count {STEP_ODDS:g} times" in said
-        assert clutter / bird == pytest.approx(STEP_ODDS, rel=1e-5)
-    else:
-        assert f"body heaves as a bird's at {rate_hz} Hz: the odds of a bird count {HEAVE_ODDS:g} times" in said
-        assert bird / clutter == pytest.approx(HEAVE_ODDS, rel=1e-5)
+    what, whose = ("sways as a walker's", "clutter") if steps else ("heaves as a bird's", "a bird")
+    odds = ODDS[name][1]
+    assert f"body {what} at {rate_hz} Hz: the odds of {whose} count {odds:g} times" in said
+    assert (clutter / bird if steps else bird / clutter) == pytest.approx(odds, rel=1e-5)
+
+
+def test_a_comb_that_stays_is_reported_and_counts(capsys):
+    radar = Radar(9.85e9, 25e3, 25_000)
+    records = draw_records(radar, 6, 3, purpose="bench", kind="fixed_wing")
+    row = int(records.truth["snr_db"].argmax())
+    given = answer(Recording("x", records.iq[row], radar.carrier_hz, radar.prf_hz), Asked(Envelope()))
+    truth_hz = records.truth["chopping_hz"][row]
+    assert given.shown == {"comb": pytest.approx(truth_hz, rel=0.03)}
+    assert list(given.json_objects())[-1]["track"]["chopping_hz"] == round(given.shown["comb"], 3)
+    uav, bird, _ = given.track.probabilities
+    factor = (0.4 / 0.3) ** (given.track.used / (1 + (given.track.used - 1) * CORRELATION))
+    assert uav / bird == pytest.approx(factor * ODDS["comb"][1], rel=1e-4)
+    given.print(Console())
+    assert f"Hz stays: the odds of a UAV count {ODDS['comb'][1]:g} times" in capsys.readouterr().out
 
 
 def test_a_flapping_bird_shows_its_wingbeat_in_the_track_and_a_short_one_none():
@@ -321,9 +333,9 @@ def test_a_flapping_bird_shows_its_wingbeat_in_the_track_and_a_short_one_none():
         (answer(Recording("x", records.iq[row], radar.carrier_hz, radar.prf_hz), Classifier.load()), row)
         for row in clear
     ]
-    beats = [(one.wingbeat_hz, records.truth["wingbeat_hz"][row]) for one, row in found if one.wingbeat_hz is not None]
+    beats = [(one.shown["wings"], records.truth["wingbeat_hz"][row]) for one, row in found if "wings" in one.shown]
     assert beats
     for beat_hz, truth_hz in beats:
         assert beat_hz == pytest.approx(truth_hz, abs=0.3)
     short = Recording("x", records.iq[clear[0]][:8000], radar.carrier_hz, radar.prf_hz)
-    assert answer(short, Classifier.load()).wingbeat_hz is None
+    assert "wings" not in answer(short, Classifier.load()).shown

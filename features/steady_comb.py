@@ -1,0 +1,93 @@
+"""A comb that stays: the same chopping frequency in dwell after dwell of a recording, as a rotor's does.
+
+In one dwell a few strong bins of noise, or what a spur and a fading target make of each other, may pass for a comb.
+They do not pass for the same one again.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .comb import find_comb
+from .following import by_recording
+from .periodogram import prepare
+from .spectrum import SPEED_OF_LIGHT_MPS
+
+#: Length of a dwell [s], short enough for a rate that changes, and pulses at most: more cost time and find little more.
+DWELL_S, MOST_PULSES = 0.08, 4096
+
+#: Dwells that are looked at, spread over the recording, and how many must show the comb.
+DWELLS, LEAST = 8, 3
+
+#: Chopping frequencies are the same where their logarithms differ by less: in flight a controller moves them so far.
+SAME = 0.08
+
+#: A wheel rolls: its lines reach from rest to twice the body's velocity, as far from the body as that moves. A rotor's
+#: must reach further by this factor. On simulated tracks of 2.5 s it keeps 0.02 of vehicles (0.12 without it).
+OVER_BODY = 1.15
+
+
+@dataclass(frozen=True)
+class SteadyComb:
+    """The comb that stays in each recording of a batch; NaN and 0 where there is none.
+
+    Parameters
+    ----------
+    chopping_hz : ndarray of float64, shape (...)
+        Its chopping frequency, the median of the dwells that show it [Hz].
+    seen : ndarray of int, shape (...)
+        Number of dwells that show it, of `DWELLS` or as many as there are.
+    """
+
+    chopping_hz: NDArray[np.float64]
+    seen: NDArray[np.intp]
+
+
+def steady_comb(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float) -> SteadyComb:
+    """Seek one comb in several dwells of each recording.
+
+    On simulated tracks of 2.5 s it is found in 0.56 of UAVs of every SNR and in 0.008 of birds and clutter.
+
+    Parameters
+    ----------
+    iq : ndarray of complex, shape (..., pulses)
+        Slow-time samples of one range cell, of three dwells or more: nothing is found in less.
+    carrier_hz, prf_hz : float
+        Carrier and pulse repetition frequency [Hz], > 0.
+
+    Returns
+    -------
+    SteadyComb
+    """
+    return SteadyComb(*by_recording(iq, lambda samples: _one(samples, carrier_hz, prf_hz)))
+
+
+def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[float, int]:
+    """The fields of `SteadyComb` of one recording."""
+    pulses = min(round(DWELL_S * prf_hz), MOST_PULSES)
+    count = min(len(iq) // max(pulses, 1), DWELLS)
+    scale = np.abs(iq).max(initial=0)
+    if count < LEAST or not 0 < scale < np.inf:
+        return np.nan, 0
+    starts = np.rint(np.linspace(0, len(iq) - pulses, count)).astype(np.intp)
+    found = [_rotor_hz(iq[start : start + pulses] / scale, carrier_hz, prf_hz) for start in starts]
+    choppings = np.array([chopping_hz for chopping_hz in found if chopping_hz is not None])
+    same = np.abs(np.log(choppings[:, None] / choppings)) < SAME
+    seen = same.sum(axis=1)
+    if seen.max(initial=0) < LEAST:
+        return np.nan, 0
+    most = int(seen.argmax())
+    return float(np.median(choppings[same[most]])), int(seen[most])
+
+
+def _rotor_hz(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> float | None:
+    """Chopping frequency of a dwell whose comb is no wheel's [Hz], or None."""
+    data = prepare(iq, carrier_hz=carrier_hz, prf_hz=prf_hz)
+    comb = find_comb(data)[0] if data is not None else None
+    if comb is None:
+        return None
+    per_mps = 2 * carrier_hz / SPEED_OF_LIGHT_MPS
+    reach_mps = comb.last * comb.fit.spacing * prf_hz / per_mps
+    body_mps = abs(comb.fit.centre) * prf_hz / per_mps
+    return comb.chopping * prf_hz if reach_mps > OVER_BODY * body_mps else None

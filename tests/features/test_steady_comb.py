@@ -1,0 +1,78 @@
+"""A comb that stays is found with its chopping frequency; one that does not, or that is a wheel's, is not."""
+
+import numpy as np
+import pytest
+from bladewing.features import measure
+from bladewing.features.steady_comb import DWELL_S, DWELLS, LEAST, OVER_BODY, steady_comb
+
+from .signals import white
+
+RADAR = {"carrier_hz": 9.85e9, "prf_hz": 10e3}
+WAVELENGTH_M = 299_792_458 / RADAR["carrier_hz"]
+DWELL = round(DWELL_S * RADAR["prf_hz"])
+PULSES = 25 * DWELL
+TIME_S = np.arange(PULSES) / RADAR["prf_hz"]
+
+
+def comb(chopping_hz=160.0, *, orders=range(-20, 21), velocity_mps=3.0, snr_db=3.0, seed=0, pulses=PULSES):
+    """Lines of equal power and random phases about a body, in noise of unit power; the spacing may be a course."""
+    rng = np.random.default_rng(seed)
+    turns = np.cumsum(np.broadcast_to(chopping_hz, PULSES)[:pulses]) / RADAR["prf_hz"]
+    lines = sum(np.exp(2j * np.pi * (n * turns + rng.random())) for n in orders if n)
+    lines *= np.sqrt(10 ** (snr_db / 10) / len(orders))
+    body = 2.0 + lines
+    return body * np.exp(-4j * np.pi / WAVELENGTH_M * velocity_mps * TIME_S[:pulses]) + white(rng, pulses)
+
+
+def test_a_rotor_is_found_though_its_rate_moves_and_none_where_it_does_not_stay():
+    never = np.repeat(160 * 1.3 ** np.random.default_rng(1).permutation(np.arange(-12, 13) / 3), DWELL)
+    wheel = np.arange(-16, 17)  # from rest to twice the body's velocity
+    speed_mps = 16 * 160 * WAVELENGTH_M / 2
+    seldom = np.concatenate([comb(pulses=3 * DWELL), white(np.random.default_rng(3), PULSES - 3 * DWELL)])
+    records = {
+        "steady": (comb(), True),
+        "wanders": (comb(160 * (1 + 0.02 * np.sin(2 * np.pi * 0.7 * TIME_S)), seed=1), True),
+        "at -9 dB": (comb(snr_db=-9.0, seed=2), True),
+        "approaches": (comb(velocity_mps=-20.0, seed=3), True),
+        "another in every dwell": (comb(never, seed=4), False),
+        "in two dwells": (seldom, False),
+        "a wheel": (comb(orders=wheel, velocity_mps=speed_mps, seed=5), False),
+        "as slow as wings": (comb(40.0, orders=range(-8, 9), seed=6), False),
+        "noise": (white(np.random.default_rng(7), PULSES), False),
+        "a line": (comb(orders=[0], seed=8), False),
+        "zeros": (np.zeros(PULSES), False),
+        "one value": (np.full(PULSES, 6.2 + 14.9j), False),
+    }
+    given = np.stack([iq for iq, _ in records.values()]).astype(np.complex64)
+    found = steady_comb(given, **RADAR)
+    assert dict(zip(records, np.isfinite(found.chopping_hz), strict=True)) == {
+        name: stays for name, (_, stays) in records.items()
+    }
+    here = np.isfinite(found.chopping_hz)
+    np.testing.assert_allclose(found.chopping_hz[here], 160, rtol=0.03)
+    assert (found.seen[here] >= LEAST).all()
+    assert (found.seen[~here] == 0).all()
+    # each alone, at any gain
+    for row, (iq, _) in enumerate(records.values()):
+        alone = steady_comb((iq * np.float32(1e-12)).astype(np.complex64), **RADAR)
+        assert alone.chopping_hz == pytest.approx(found.chopping_hz[row], rel=1e-6, nan_ok=True)
+
+
+def test_a_wheel_has_a_comb_in_every_dwell():
+    """So that it is the reach of its lines, and nothing else, that speaks against a rotor."""
+    speed_mps = 16 * 160 * WAVELENGTH_M / 2
+    iq = comb(orders=np.arange(-16, 17), velocity_mps=speed_mps, seed=5)[: 8 * DWELL].reshape(8, DWELL)
+    found = measure(iq.astype(np.complex64), **RADAR)
+    assert np.isfinite(found.chopping_hz).sum() >= LEAST
+    further = comb(orders=np.arange(-24, 25), velocity_mps=speed_mps / OVER_BODY, seed=5).astype(np.complex64)
+    assert steady_comb(further, **RADAR).seen == DWELLS
+
+
+@pytest.mark.parametrize(("dwells", "seen"), [(2.9, 0), (3, 3), (5.5, 5), (20, DWELLS)])
+def test_dwells_of_short_recordings(dwells, seen):
+    assert steady_comb(comb(snr_db=10.0, pulses=round(dwells * DWELL)), **RADAR).seen == seen
+
+
+def test_not_in_noise():
+    noise = white(np.random.default_rng(11), 100, PULSES).astype(np.complex64)
+    assert np.isfinite(steady_comb(noise, **RADAR).chopping_hz).sum() == 0
