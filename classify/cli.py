@@ -8,11 +8,14 @@ import warnings
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, cast
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
 from .errors import BadInput, one_line
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 app = typer.Typer(
     name="bladewing",
@@ -31,6 +34,7 @@ _DISK_ERRORS = {
     errno.EEXIST, errno.ENAMETOOLONG, errno.ENOENT,
 }  # fmt: skip
 _TRACEBACK = "BLADEWING_TRACEBACK"
+_LONGEST_LINE = 10_000
 
 Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]
 
@@ -94,8 +98,6 @@ def predict(
     as_json: AsJson = False,
 ) -> None:
     """Say of each dwell of each recording: uav, bird, clutter or unknown, with probabilities and the reason."""
-    from rich.console import Console
-
     from . import predict as work
     from .inference import Classifier
 
@@ -117,7 +119,7 @@ def predict(
             for line in result.json_objects():
                 print(json.dumps(line, allow_nan=False))
         else:
-            result.print(Console(highlight=False))
+            result.print(_console())
         sys.stdout.flush()
     if not as_json and said.total() + unreadable > 1:
         print(work.summary(said, unreadable), flush=True)
@@ -157,11 +159,10 @@ def measure(
     as_json: AsJson = False,
 ) -> None:
     """Measure the rotor in each dwell, with error bars: body velocity, chopping, single rotors, band, blade."""
-    from rich.console import Console
-
     from . import measure as work
 
     settings = work.Settings.checked(dwell_s=dwell, blades=blades, beta_deg=beta_deg)
+    work.checked_plot(plot)
     unreadable = 0
     clearest = None
     for result in work.measured(recordings, settings, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable):
@@ -173,7 +174,7 @@ def measure(
             for line in result.json_objects():
                 print(json.dumps(line, allow_nan=False))
         else:
-            result.print(Console(highlight=False))
+            result.print(_console())
         sys.stdout.flush()
         clearest = result.clearer(clearest)
     if plot is not None and clearest is not None:
@@ -390,6 +391,14 @@ def _unexpected(error: Exception) -> int:
         traceback.print_exc()
     _complain(f"unexpected {type(error).__name__}: {error} (set {_TRACEBACK}=1 to see where)")
     return 1
+
+
+def _console() -> "Console":
+    """Where answers are printed: as wide as the terminal, and in a pipe or a file as wide as a line is."""
+    from rich.console import Console
+
+    unbounded = not sys.stdout.isatty() and "COLUMNS" not in os.environ
+    return Console(highlight=False, width=_LONGEST_LINE if unbounded else None)
 
 
 def _complain(message: str, kind: str = "error") -> None:

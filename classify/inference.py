@@ -116,6 +116,8 @@ def read_model(given: str) -> tuple[bytes, str]:
     """
     if given in model_names():
         return resources.files("bladewing.models.pretrained").joinpath(f"{given}.onnx").read_bytes(), given
+    if not given:
+        raise BadInput(f"the model's name is empty: give one of the shipped, {', '.join(model_names())}, or a file")
     path = Path(given)
     if path.is_dir():
         raise BadInput(f"{given} is a directory: name the .onnx file in it")

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
 from bladewing.features.measure import Measurements, measure
+from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
+from bladewing.features.steady_comb import OVER_BODY
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
 from .errors import BadInput, one_line
 from .predict import checked_dwell_s, distinct
+from .progress import Progress
 from .recording import Recording, load_recording
 
 if TYPE_CHECKING:
@@ -51,6 +54,12 @@ VALUES = (
 #: What a recording's JSON object holds of the wingbeat.
 WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std")
 
+#: Radars that are measured [Hz]: beyond, a frequency was given in another unit.
+CARRIER_RANGE_HZ, PRF_RANGE_HZ = (1e8, 1e12), (1.0, 1e8)
+
+#: No rotor has more; eight is the most that fly.
+MOST_BLADES = 64
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -77,10 +86,10 @@ class Settings:
         Raises
         ------
         BadInput
-            The dwell is not above 0, there is less than one blade, or beta is not in 0 to below 90 degrees.
+            The dwell is not above 0, there is no such number of blades, or beta is not in 0 to below 90 degrees.
         """
-        if blades is not None and blades < 1:
-            raise BadInput(f"--blades is {blades}: it must be a whole number of at least 1")
+        if blades is not None and not 1 <= blades <= MOST_BLADES:
+            raise BadInput(f"--blades is {blades}: it must be a whole number of 1 to {MOST_BLADES}")
         if beta_deg is not None and not 0 <= beta_deg < 90:
             raise BadInput(f"--beta-deg is {beta_deg:g}: it must be at least 0 and below 90 [deg]")
         return cls(checked_dwell_s(dwell_s), blades, None if beta_deg is None else math.radians(beta_deg))
@@ -196,9 +205,12 @@ class Measured:
                 with_error(v.tip_speed_mps[n], v.tip_speed_mps_std[n]),
             )
         if table.row_count:
+            # a number is never cut: a narrow terminal wraps the lines
+            wide = table.__rich_measure__(console, console.options.update(max_width=1000)).maximum
+            console.width = max(console.width, wide)
             console.print(table)
         for reason, dwells in silent.items():
-            console.print(Text(f"{dwells} dwells: {reason}"))
+            console.print(Text(f"{counted(dwells)}: {reason}"), soft_wrap=True)
         console.print(Text(self.sentence()), soft_wrap=True)
         if beat := self.beat_sentence():
             console.print(Text(beat), soft_wrap=True)
@@ -207,13 +219,13 @@ class Measured:
         """The recording in one line: the answer an engineer wants."""
         all_together = self.together()
         if not all_together["with_comb"]:
-            return f"no rotor in {all_together['dwells']} dwells"
+            return f"no rotor in {counted(all_together['dwells'])}"
         clear = self.clearest()
         v = self.values
         rates = v.rotor_rates_hz[clear]
         rates = rates[np.isfinite(rates)]
         turns = v.chopping_hz[clear] / v.rotation_hz[clear]
-        body = f"body {all_together['body_velocity_mps']:+.2f} m/s"
+        body = f"body {all_together['body_velocity_mps'] + 0.0:+.2f} m/s"
         bound = "at least " if v.length_is_lower_bound else ""
         if np.isfinite(turns):
             rpm = ", ".join(f"{60 * rate / turns:.0f}" for rate in rates)
@@ -226,7 +238,16 @@ class Measured:
                 for c in v.alternatives((clear,))[:4]
             )
             rotor = "blades x rate: " + " or ".join(options)
-        return f"comb in {all_together['with_comb']} of {all_together['dwells']} dwells; {rotor}; {body}{self.gear()}"
+        where = f"comb in {all_together['with_comb']} of {counted(all_together['dwells'])}"
+        return f"{where}; {rotor}; {body}{self.gear()}{self.wheel()}"
+
+    def wheel(self) -> str:
+        """Words of caution where the lines of most combs reach no further from the body than that moves; or ""."""
+        v = self.values
+        held = np.isfinite(v.chopping_hz)
+        edge_mps = v.bandwidth_hz[held] * SPEED_OF_LIGHT_MPS / self.recording.carrier_hz / 4
+        as_wheels = edge_mps <= OVER_BODY * np.abs(v.body_velocity_mps[held])
+        return "; as wheels would: the lines reach no further than the body moves" if as_wheels.mean() > 0.5 else ""
 
     def gear(self) -> str:
         """A helicopter's main and tail comb and their ratio in words, of the dwell with the smallest error; or ""."""
@@ -292,7 +313,30 @@ def with_error(value: float, std: float) -> str:
     return f"{value:.{digits}f} +- {std:.{digits}f}"
 
 
-def measure_recording(recording: Recording, settings: Settings) -> Measured:
+def counted(dwells: int) -> str:
+    """A number of dwells in words."""
+    return f"{dwells} dwell{'s' * (dwells != 1)}"
+
+
+def checked_plot(path: Path | None) -> None:
+    """Check the option --plot before anything is measured.
+
+    Raises
+    ------
+    BadInput
+        It is no .svg file, or there is no such folder.
+    """
+    if path is None:
+        return
+    if path.suffix.lower() != ".svg":
+        raise BadInput(f"--plot {path}: the drawing is SVG: name a file that ends in .svg")
+    if not path.parent.is_dir():
+        raise BadInput(f"--plot {path}: there is no folder {path.parent}: name a file in an existing folder")
+
+
+def measure_recording(
+    recording: Recording, settings: Settings, on_record: Callable[[int], None] | None = None
+) -> Measured:
     """Cut a recording into dwells and measure each.
 
     Parameters
@@ -301,14 +345,23 @@ def measure_recording(recording: Recording, settings: Settings) -> Measured:
         One range cell. A rest shorter than a dwell is dropped, but a recording shorter than one dwell is taken whole.
     settings
         What is asked.
+    on_record
+        Called with the number of dwells done.
 
     Raises
     ------
     BadInput
-        The recording holds fewer than 2 pulses.
+        The recording holds fewer than 2 pulses, or a frequency is no radar's.
     """
     if len(recording.iq) < 2:
         raise BadInput(f"{recording.name}: 1 pulse: a measurement needs at least 2")
+    for what, value, (low, high) in (
+        ("carrier", recording.carrier_hz, CARRIER_RANGE_HZ),
+        ("PRF", recording.prf_hz, PRF_RANGE_HZ),
+    ):
+        if not low <= value <= high:
+            said = f"the {what} is {value:g} Hz: it must be {low:g} to {high:g} Hz"
+            raise BadInput(f"{recording.name}: {said}: give it in that unit")
     iq = recording.dwells(settings.dwell_s, least=2)
     count, pulses = iq.shape
     radar = {"carrier_hz": recording.carrier_hz, "prf_hz": recording.prf_hz}
@@ -319,6 +372,7 @@ def measure_recording(recording: Recording, settings: Settings) -> Measured:
         **radar,
         blades=settings.blades,
         beta_rad=settings.beta_rad,
+        on_record=on_record,
     )
     start_s = recording.start_s + np.arange(count) * pulses / recording.prf_hz
     long = len(recording.iq) >= LEAST_S * recording.prf_hz
@@ -347,7 +401,11 @@ def measured(
     for path in distinct(paths):
         try:
             recording = load_recording(path, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable)
-            yield measure_recording(recording, settings)
+            with Progress(visible=True, passing=True) as bars:
+                dwells = max(1, round(len(recording.iq) / max(settings.dwell_s * recording.prf_hz, 2)))
+                with bars.phase(f"measure {dwells} dwells", dwells) as on_record:
+                    result = measure_recording(recording, settings, on_record)
+            yield result
         except BadInput as error:
             yield error
 

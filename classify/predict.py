@@ -31,7 +31,7 @@ LONG_S = 5.0
 """How much of a recording, from its start, what only a long look shows is sought in [s]."""
 
 _SHOWN = {
-    "comb": "the comb of {:.1f} Hz stays",
+    "comb": "a comb of about {:.0f} Hz stays",
     "wings": "wingbeat {:.1f} Hz",
     "heaves": "body heaves as a bird's at {:.1f} Hz",
     "steps": "body sways as a walker's at {:.1f} Hz",
@@ -64,8 +64,9 @@ class Answer:
     track
         The dwells together, and what the whole recording shows.
     shown
-        What that is [Hz], by the keys of `ODDS`: the chopping frequency of a comb that stays, the rate of wings, of a
-        body that heaves or of a walker's steps. The last three are sought in 1.5 s and more.
+        What that is [Hz], by the keys of `ODDS`: about what the chopping frequency of a comb is that stays (of several
+        rotors, one's), the rate of wings, of a body that heaves or of a walker's steps. The last three are sought in
+        1.5 s and more.
     """
 
     name: str
@@ -103,7 +104,7 @@ class Answer:
             "dwells": len(self.dwells.labels),
             "declared": self.track.declared or None,
             "declared_s": self.declared_s,
-            "chopping_hz": rates.get("comb"),
+            "comb_hz": rates.get("comb"),
             "wingbeat_hz": rates.get("wings"),
             "heave_hz": rates.get("heaves", rates.get("steps")),
             "steps": "steps" in rates,

@@ -23,16 +23,17 @@ class Progress:
     ----------
     visible : bool
         False: nothing is written.
+    passing : bool
+        The bars go when they are done, and nothing says so: what they were waited for is printed in their place.
     """
 
-    def __init__(self, *, visible: bool) -> None:
+    def __init__(self, *, visible: bool, passing: bool = False) -> None:
         columns = (TextColumn("{task.description:<24}"), BarColumn(), TaskProgressColumn())
         console = Console(stderr=True)
-        self._visible, self._drawn = visible, visible and console.is_terminal
+        self._visible, self._drawn, self._passing = visible, visible and console.is_terminal, passing
         self._console = console
-        self._bars = Bars(
-            *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, disable=not self._drawn
-        )
+        times = TimeElapsedColumn(), TimeRemainingColumn()
+        self._bars = Bars(*columns, *times, console=console, disable=not self._drawn, transient=passing)
 
     def __enter__(self) -> Progress:
         self._bars.start()
@@ -65,5 +66,5 @@ class Progress:
 
         yield on_done
         self._bars.update(task, completed=total)
-        if not self._drawn:
+        if not self._drawn and not self._passing:
             self.say(f"{title}: done in {time.monotonic() - started:.0f} s")

@@ -51,7 +51,15 @@ class Recording:
         -------
         ndarray
             Shape (dwells, pulses), complex64, a view.
+
+        Raises
+        ------
+        BadInput
+            A dwell is shorter than from one pulse to the next.
         """
+        if dwell_s * self.prf_hz < 0.5:
+            asked = f"a dwell of {dwell_s:g} s holds no pulse at a PRF of {self.prf_hz:g} Hz"
+            raise BadInput(f"{self.name}: {asked}: give more than {1 / self.prf_hz:.2g} s")
         pulses = max(least, round(min(dwell_s * self.prf_hz, len(self.iq))))
         count = len(self.iq) // pulses
         return self.iq[: count * pulses].reshape(count, pulses)

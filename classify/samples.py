@@ -45,9 +45,10 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
         where = int(first[0]) if iq.ndim == 1 else tuple(int(i) for i in first)
         with np.errstate(invalid="ignore"):  # a signalling NaN is cast to be shown
             shown = str(given[first])
+        cure = "lower the gain" if np.isfinite(given[first]) else "cut them out or replace them by 0"
         raise BadInput(
             f"{name}: sample {where} is {shown}: every sample must be finite in complex64 "
-            f"({int(np.sum(~finite))} of {iq.size} are not): cut them out or replace them by 0"
+            f"({int(np.sum(~finite))} of {iq.size} are not): {cure}"
         )
     return iq
 

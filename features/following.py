@@ -1,5 +1,6 @@
 """A body followed through a long recording: its steady course, and the samples as if it stood still."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -9,7 +10,7 @@ from scipy import fft
 
 from .notch import body_line
 from .periodogram import LINE_DB
-from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum
+from .spectrum import SPEED_OF_LIGHT_MPS, as_complex, doppler_spectrum
 
 #: Dwells by which the body is followed [s].
 BODY_DWELL_S = 0.1
@@ -24,11 +25,17 @@ Course = tuple[float, float, float]
 def by_recording(
     iq: NDArray[np.complexfloating], one: Callable[[NDArray[np.complex64]], tuple[Any, ...]]
 ) -> list[NDArray]:
-    """What is found in each recording of a batch (..., pulses), one after the other: an array (...) a field."""
-    samples = np.asarray(iq, np.complex64)
-    lead = samples.shape[:-1]
-    rows = [one(samples[index]) for index in np.ndindex(lead)]
-    return [np.array(column).reshape(lead) for column in zip(*rows, strict=True)]
+    """What is found in each recording of a batch (..., pulses), one after the other: an array (...) a field.
+
+    Raises
+    ------
+    ValueError
+        If the samples are not complex.
+    """
+    samples = as_complex(iq)
+    lead, pulses = samples.shape[:-1], samples.shape[-1:]
+    rows = [one(samples[index]) for index in np.ndindex(lead)] or [one(np.zeros(pulses, np.complex64))]
+    return [np.array(column)[: math.prod(lead)].reshape(lead) for column in zip(*rows, strict=True)]
 
 
 def followed(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[NDArray[np.complex64], Course]:

@@ -1,5 +1,7 @@
 """Measurements of a dwell with their standard deviations: body, chopping, single rotors, band, blade."""
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -12,11 +14,12 @@ from .comb_fit import CombFit
 from .helicopter import find_gear
 from .lines import LineSpace
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
+from .one_thread import one_thread
 from .periodogram import Periodogram, prepared
 from .rotor_band import LEAK_SHARE, fit_edge
 from .rotors import MAX_ROTORS, Rotors
 from .smearing import smearing_index
-from .spectrum import LEAST_PART, Spectrum, doppler_spectrum, largest_part
+from .spectrum import LEAST_PART, Spectrum, as_complex, doppler_spectrum, largest_part
 
 #: Threshold of the paper's bandwidth rule over the noise [dB]: it took 20 on measured data, 30 on simulated.
 PAPER_THRESHOLD_DB = 20.0
@@ -153,6 +156,7 @@ def measure(
     prf_hz: float,
     blades: int | None = None,
     beta_rad: float | None = None,
+    on_record: Callable[[int], None] | None = None,
 ) -> Measurements:
     """Measure the rotor in each record, or say why there is none.
 
@@ -166,6 +170,8 @@ def measure(
         Blades of a rotor, >= 1.
     beta_rad : float, optional
         Angle between the line of sight and the rotor plane [rad], 0 <= beta < pi/2.
+    on_record : callable, optional
+        Called after each record with the number of those done: a record takes some hundredths of a second.
 
     Returns
     -------
@@ -175,24 +181,29 @@ def measure(
     Raises
     ------
     ValueError
-        If `iq` has fewer than 2 pulses or holds a value that is not finite, or an argument is out of its range.
+        If `iq` is not complex, has fewer than 2 pulses or holds a value that is not finite, or an argument is out of
+        its range.
     """
     if blades is not None and (blades != int(blades) or blades < 1):
         raise ValueError(f"blades is {blades!r}: it must be a whole number of at least 1")
     if beta_rad is not None and not 0 <= beta_rad < np.pi / 2:
         raise ValueError(f"beta_rad is {beta_rad!r}: it must be at least 0 and below pi/2 [rad]")
-    samples = np.asarray(iq, np.complex64)
+    samples = as_complex(iq)
     if not np.isfinite(samples).all():
         raise ValueError("iq holds values that are not finite: cut them out or replace them by 0")
-    spectrum = doppler_spectrum(samples, carrier_hz=carrier_hz, prf_hz=prf_hz)
     shape = samples.shape[:-1]
+    some = samples if samples.size else np.zeros((1, *samples.shape[-1:]), np.complex64)  # of none, fields of no length
+    spectrum = doppler_spectrum(some, carrier_hz=carrier_hz, prf_hz=prf_hz)
     rows = []
-    for index in np.ndindex(shape):
-        rows.append(_measure_one(samples[index], _record(spectrum, index), blades, beta_rad))
+    with one_thread():
+        for index in np.ndindex(some.shape[:-1]):
+            rows.append(_measure_one(some[index], _record(spectrum, index), blades, beta_rad))
+            if on_record:
+                on_record(len(rows))
     columns = {}
     for field in fields(Measurements):
         if field.name != "length_is_lower_bound":
-            values = np.array([row[field.name] for row in rows])
+            values = np.array([row[field.name] for row in rows])[: math.prod(shape)]
             extra = (MAX_ROTORS,) if field.name.startswith("rotor_rates") else ()
             columns[field.name] = values.reshape((*shape, *extra))
     return Measurements(**columns, length_is_lower_bound=beta_rad is None)

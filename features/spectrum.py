@@ -308,6 +308,20 @@ def _quartile_of_noise(size: int) -> NDArray[np.float32]:
     return np.array(size * bias, np.float32)
 
 
+def as_complex(iq: ArrayLike) -> NDArray[np.complex64]:
+    """Samples as complex64; real ones would pass for a spectrum with two like sides.
+
+    Raises
+    ------
+    ValueError
+        If they are not complex.
+    """
+    samples = np.asarray(iq)
+    if samples.dtype.kind != "c":
+        raise ValueError(f"iq holds {samples.dtype}: its samples must be complex, I + jQ")
+    return samples.astype(np.complex64, copy=False)
+
+
 def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spectrum:
     """Doppler spectrum of a dwell, in units of its own noise floor.
 

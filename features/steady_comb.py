@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .comb import find_comb
 from .following import by_recording
+from .one_thread import one_thread
 from .periodogram import prepare
 from .spectrum import SPEED_OF_LIGHT_MPS
 
@@ -60,7 +61,8 @@ def steady_comb(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: f
     -------
     SteadyComb
     """
-    return SteadyComb(*by_recording(iq, lambda samples: _one(samples, carrier_hz, prf_hz)))
+    with one_thread():
+        return SteadyComb(*by_recording(iq, lambda samples: _one(samples, carrier_hz, prf_hz)))
 
 
 def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[float, int]:

@@ -14,7 +14,7 @@ from bladewing.classify.cli import main
 PRF_HZ = 20e3
 NAMES = ["uav", "bird", "clutter"]
 
-STILL = {"chopping_hz": None, "wingbeat_hz": None, "heave_hz": None, "steps": False}  # without rotors, wings and limbs
+STILL = {"comb_hz": None, "wingbeat_hz": None, "heave_hz": None, "steps": False}  # without rotors, wings and limbs
 
 
 def noise(pulses: int) -> np.ndarray:

@@ -121,15 +121,48 @@ def test_a_dwell_smeared_by_acceleration_is_measured(folder, tmp_path, capsys):
     [
         (["--beta-deg", "90"], "--beta-deg is 90"),
         (["--blades", "0"], "blades"),
+        (["--blades", "1000000000000"], "--blades is 1000000000000: it must be a whole number of 1 to 64"),
         (["--dwell", "0"], "--dwell"),
+        (["--dwell", "1e-9"], "a dwell of 1e-09 s holds no pulse at a PRF of 35000 Hz: give more than 2.9e-05 s"),
         (["--plot", "/nowhere/at/all.svg"], "--plot"),
+        (["--plot", "picture.png"], "--plot picture.png: the drawing is SVG"),
+        (["--carrier-hz", "9.85"], "the carrier is 9.85 Hz: it must be 1e+08 to 1e+12 Hz"),
+        (["--prf-hz", "1e-300"], "the PRF is 1e-300 Hz: it must be 1 to 1e+08 Hz"),
     ],
 )
 def test_bad_options_are_one_line_and_code_2(folder, capsys, options, said):
     assert main(["measure", str(folder / "drone.npy"), *RADAR, *options]) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
+    out, error = capsys.readouterr()
+    assert (out, error.count("\n")) == ("", 1)
     assert said in error
+
+
+@pytest.mark.parametrize("columns", ["40", None])
+def test_no_number_of_the_table_is_cut(folder, capsys, monkeypatch, columns):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    if columns:
+        monkeypatch.setenv("COLUMNS", columns)
+    assert main(["measure", str(folder / "drone.npy"), *RADAR, "--dwell", "0.0857"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    head = next(n for n, line in enumerate(lines) if line.startswith("start s"))
+    for line in lines[head + 1 : head + 3]:
+        assert line.count(" +- ") == 4
+        assert "…" not in line
+
+
+def test_a_comb_that_ends_where_the_body_s_speed_does_is_called_a_wheel_s(tmp_path, capsys):
+    rng = np.random.default_rng(2)
+    times_s, wavelength_m = np.arange(PULSES) / PRF_HZ, 299_792_458.0 / CARRIER_HZ
+    orders, rate_hz = np.arange(-16, 17), 80.0
+    iq = np.exp(2j * np.pi * (orders * rate_hz * times_s[:, None] + rng.random(33))).sum(axis=1) / np.sqrt(33) + 4.0
+    for speed_mps, wheel in ((16 * rate_hz * wavelength_m / 2, True), (5.0, False)):
+        moved = iq * np.exp(-4j * np.pi * speed_mps * times_s / wavelength_m)
+        noise = 0.1 * (rng.standard_normal(PULSES) + 1j * rng.standard_normal(PULSES))
+        np.save(tmp_path / "comb.npy", (moved + noise).astype(np.complex64))
+        assert main(["measure", str(tmp_path / "comb.npy"), *RADAR]) == 0
+        said = capsys.readouterr().out
+        assert "comb in 1 of 1 dwell; " in said
+        assert ("as wheels would" in said) == wheel
 
 
 def test_a_value_is_written_to_the_second_digit_of_its_error():

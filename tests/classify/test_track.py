@@ -317,7 +317,7 @@ def test_a_comb_that_stays_is_reported_and_counts(capsys):
     given = answer(Recording("x", records.iq[row], radar.carrier_hz, radar.prf_hz), Asked(Envelope()))
     truth_hz = records.truth["chopping_hz"][row]
     assert given.shown == {"comb": pytest.approx(truth_hz, rel=0.03)}
-    assert list(given.json_objects())[-1]["track"]["chopping_hz"] == round(given.shown["comb"], 3)
+    assert list(given.json_objects())[-1]["track"]["comb_hz"] == round(given.shown["comb"], 3)
     uav, bird, _ = given.track.probabilities
     factor = (0.4 / 0.3) ** (given.track.used / (1 + (given.track.used - 1) * CORRELATION))
     assert uav / bird == pytest.approx(factor * ODDS["comb"][1], rel=1e-4)

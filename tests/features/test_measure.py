@@ -6,8 +6,10 @@ from bladewing.features.comb_fit import fit_combs
 from bladewing.features.flashes import flash_nats
 from bladewing.features.lines import LineSpace, line_products, sum_of_lines
 from bladewing.features.periodogram import prepare, without_clicks
+from bladewing.features.rotors import MAX_ROTORS
 from bladewing.features.slow_lines import notched_products, remove_bands, slepian
 from bladewing.simulate import RotorMotion, rotor_echo
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
 
@@ -73,8 +75,8 @@ def test_without_blades_there_are_alternatives_instead_of_a_rate():
 @pytest.mark.parametrize(
     "iq",
     [
-        np.zeros(PULSES),
-        np.ones(PULSES),
+        np.zeros(PULSES, complex),
+        np.ones(PULSES, complex),
         tone(1234.0),
         100 * tone(1234.0) + white(np.random.default_rng(1), PULSES),
         100 * tone(1234.0) + 50 * tone(-4000.0) + white(np.random.default_rng(2), PULSES),
@@ -147,6 +149,24 @@ def test_bad_arguments_are_refused():
             measure(iq, **RADAR, **wrong)
     with pytest.raises(ValueError, match="not finite"):
         measure(np.where(np.arange(PULSES) == 5, np.nan, iq), **RADAR)
+    with pytest.raises(ValueError, match="iq holds float64: its samples must be complex"):
+        measure(iq.real, **RADAR)
+
+
+def test_no_record_gives_no_measurement():
+    found = measure(np.zeros((2, 0, PULSES), np.complex64), **RADAR)
+    assert (found.chopping_hz.shape, found.rotor_rates_hz.shape) == ((2, 0), (2, 0, MAX_ROTORS))
+    assert found.reason.dtype.kind == "U"
+
+
+def test_linear_algebra_has_one_thread_within_and_its_own_again_after():
+    def threads() -> set[int]:
+        return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+    with threadpool_limits(2, user_api="blas"):
+        before, within = threads(), []
+        measure(np.stack([drone([58.0])] * 2), **RADAR, on_record=lambda _: within.append(threads()))
+        assert (before, within, threads()) == ({2}, [{1}, {1}], {2})
 
 
 def test_slepian_sequences_take_out_a_band_and_leave_the_rest():

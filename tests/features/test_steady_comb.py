@@ -73,6 +73,12 @@ def test_dwells_of_short_recordings(dwells, seen):
     assert steady_comb(comb(snr_db=10.0, pulses=round(dwells * DWELL)), **RADAR).seen == seen
 
 
+def test_no_recording_and_real_samples():
+    assert steady_comb(np.zeros((0, PULSES), np.complex64), **RADAR).chopping_hz.shape == (0,)
+    with pytest.raises(ValueError, match="must be complex"):
+        steady_comb(comb().real, **RADAR)
+
+
 def test_not_in_noise():
     noise = white(np.random.default_rng(11), 100, PULSES).astype(np.complex64)
     assert np.isfinite(steady_comb(noise, **RADAR).chopping_hz).sum() == 0
