@@ -35,6 +35,7 @@ _DISK_ERRORS = {
 }  # fmt: skip
 _TRACEBACK = "BLADEWING_TRACEBACK"
 _LONGEST_LINE = 10_000
+_NUMBERS = {"int_parsing": "a whole number", "int_from_float": "a whole number", "float_parsing": "a number"}
 
 Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]
 
@@ -378,6 +379,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _usage(error: Exception) -> int:
     message = getattr(error, "format_message", lambda: str(error))()
+    wrong: list[dict] = getattr(
+        error.__cause__ or error.__context__, "errors", list
+    )()  # typer takes numbers by pydantic
+    if wrong and wrong[0]["type"] in _NUMBERS:
+        name = getattr(error, "param").opts[0]  # noqa: B009 - the class of the error has no public name
+        message = f"{name} is {wrong[0]['input']!r}: it must be {_NUMBERS[wrong[0]['type']]}"
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "bladewing"
     _complain(f"{' '.join(message.split())} (see {command} --help)")

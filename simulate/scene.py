@@ -84,7 +84,8 @@ class Scene(Setting):
                 ]
             ) from None
         except (ValueError, RecursionError) as error:  # not UTF-8, not TOML, or nested beyond reason
-            raise SceneError([f"{name}: not TOML: {error}"]) from None
+            what = "is a directory" if isinstance(file, Path) and file.is_dir() else f"not TOML: {error}"
+            raise SceneError([f"{name}: {what}: give a TOML file, or a shipped scene"]) from None
         return cls.build(values, name)
 
     def without(self, *names: str) -> "Scene":
@@ -121,6 +122,10 @@ def _line(problem: dict[str, Any], values: Any) -> str:
     rule = problem["msg"].removeprefix("Input ").removeprefix("Value error, ")
     if problem["type"] == "value_error":
         return f"{field}: {rule}" if field else rule
+    if problem["type"] == "tuple_type" and isinstance(problem["input"], dict):
+        return f"{field} is one table: there may be several: write [[{field}]] above each"
+    if problem["type"] == "model_type":
+        return f"{field} is {problem['input']!r}: it must be a table: write [{field}] above its fields"
     return f"{field} is {problem['input']!r}: it {rule}"
 
 

@@ -121,6 +121,8 @@ def test_a_dwell_smeared_by_acceleration_is_measured(folder, tmp_path, capsys):
     [
         (["--beta-deg", "90"], "--beta-deg is 90"),
         (["--blades", "0"], "blades"),
+        (["--blades", "2.5"], "--blades is '2.5': it must be a whole number"),
+        (["--beta-deg", "x"], "--beta-deg is 'x': it must be a number"),
         (["--blades", "1000000000000"], "--blades is 1000000000000: it must be a whole number of 1 to 64"),
         (["--dwell", "0"], "--dwell"),
         (["--dwell", "1e-9"], "a dwell of 1e-09 s holds no pulse at a PRF of 35000 Hz: give more than 2.9e-05 s"),

@@ -39,6 +39,8 @@ def power_spectrum(iq: np.ndarray) -> np.ndarray:
         (scene(uav=[uav(rotors=[{**ROTOR, "root_m": 0.2}])]), r"root_m is 0\.2: it must not exceed blade_length_m"),
         (scene(uav=[uav(rotors=[{**ROTOR, "blade_amplitudes": [1.0]}])]), r"one a blade, blades = 2"),
         (scene(uav=[uav(beta_deg=91.0)]), r"uav\[0\]\.beta_deg is 91\.0: it should be less than or equal to 90"),
+        (scene(uav=uav()), r"uav is one table: there may be several: write \[\[uav\]\] above each"),
+        ({**scene(), "radar": 3}, r"radar is 3: it must be a table: write \[radar\] above its fields"),
         (scene(uav=[uav(velocity=3.0)]), r"unknown field uav\[0\]\.velocity: the fields are .*velocity_mps"),
         (scene(uav=[uav(rotors=[{**ROTOR, "rpm": 3.0}])]), r"unknown field .*rpm: the fields are blade_length_m"),
         (scene(uav=[uav(range_m=0.1)]), r"range_m is 0\.1: .* must exceed its own reach of 0\.15 m"),
