@@ -3,6 +3,7 @@
 Levels are powers over the receiver's noise, a sample [dB]; angles are in degrees here, because people write them.
 """
 
+from difflib import get_close_matches
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -238,7 +239,10 @@ def _known_laws(values: dict[str, float]) -> dict[str, float]:
     laws = LAWS | INSECT_LAWS
     for name, value in values.items():
         if name not in laws:
-            raise ValueError(f"{name!r} is unknown: the parameters are {', '.join(laws)}")
+            near = ", ".join(get_close_matches(name, laws, n=5, cutoff=0.3)) or "none"
+            raise ValueError(
+                f"{name!r} is unknown: of the {len(laws)} parameters (simulate/laws.py) near it are {near}"
+            )
         if laws[name].kind == "log" and value <= 0:
             raise ValueError(f"{name} is {value}: it must be above 0 [{laws[name].unit}]")
     return values

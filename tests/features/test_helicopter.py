@@ -85,7 +85,7 @@ def test_what_is_no_second_comb_has_a_reason_and_no_number(iq):
 def test_the_reasons_of_no_comb_and_of_a_short_dwell():
     noise = white(np.random.default_rng(2), PULSES)
     assert measure(noise, **RADAR).gear_reason == "no comb"
-    assert measure(np.zeros(PULSES), **RADAR).gear_reason == "no comb"
+    assert measure(np.zeros(PULSES, complex), **RADAR).gear_reason == "no comb"
     # 1300 pulses: the main's lines are 3.1 bins apart, no room for others
     assert "dwell too short" in str(measure(helicopter(snr_db=20.0)[:1300], **RADAR).gear_reason)
 
