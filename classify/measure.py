@@ -225,7 +225,7 @@ class Measured:
         rates = v.rotor_rates_hz[clear]
         rates = rates[np.isfinite(rates)]
         turns = v.chopping_hz[clear] / v.rotation_hz[clear]
-        body = f"body {all_together['body_velocity_mps'] + 0.0:+.2f} m/s"
+        body = f"body {round(all_together['body_velocity_mps'], 2) + 0.0:+.2f} m/s"  # not -0.00
         bound = "at least " if v.length_is_lower_bound else ""
         if np.isfinite(turns):
             rpm = ", ".join(f"{60 * rate / turns:.0f}" for rate in rates)

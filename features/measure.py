@@ -144,8 +144,9 @@ class Measurements:
         rotation = float(self.rotation_hz[index])
         choices = [round(chopping / rotation)] if np.isfinite(rotation) else list(BLADE_CHOICES)
         tip = float(self.tip_speed_mps[index])
+        fastest = float(np.nanmax(self.rotor_rates_hz[index]))  # the tip is the fastest rotor's
         return [
-            {"blades": n, "rpm": 60 * chopping / n, "blade_length_m": tip * n / (2 * np.pi * chopping)} for n in choices
+            {"blades": n, "rpm": 60 * chopping / n, "blade_length_m": tip * n / (2 * np.pi * fastest)} for n in choices
         ]
 
 

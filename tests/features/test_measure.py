@@ -133,6 +133,12 @@ def test_rotors_20_rpm_apart_are_told_apart_and_like_ones_are_not():
     np.testing.assert_allclose(found.rotor_rates_hz[:4], 2 * rates_hz, rtol=2e-3)
     assert np.isnan(found.rotor_rates_hz[4:]).all()
     assert measure(drone([58.0, 58.0]), **RADAR).rotor_count == 1
+    # the edge is the fastest rotor's, and so is the blade's length, told of the blades or not
+    two = next(choice for choice in found.alternatives() if choice["blades"] == 2)
+    assert two["blade_length_m"] == pytest.approx(0.15, rel=0.003)
+    assert two["rpm"] == pytest.approx(60 * rates_hz.mean(), rel=1e-3)
+    told = measure(drone(rates_hz, snr_db=3, velocity_mps=5.0, body=10.0), **RADAR, blades=2)
+    assert two["blade_length_m"] == pytest.approx(told.blade_length_m, rel=1e-3)
 
 
 def test_strong_lines_of_unequal_blades():
