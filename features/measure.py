@@ -196,7 +196,7 @@ def measure(
     some = samples if samples.size else np.zeros((1, *samples.shape[-1:]), np.complex64)  # of none, fields of no length
     spectrum = doppler_spectrum(some, carrier_hz=carrier_hz, prf_hz=prf_hz)
     rows = []
-    with one_thread():
+    with one_thread:
         for index in np.ndindex(some.shape[:-1]):
             rows.append(_measure_one(some[index], _record(spectrum, index), blades, beta_rad))
             if on_record:

@@ -1,7 +1,8 @@
 """Linear algebra on one thread: products of some hundred lines take longer on several, which wait for one another."""
 
-from contextlib import AbstractContextManager
 from functools import lru_cache
+from threading import Lock
+from types import TracebackType
 from typing import Any
 
 
@@ -14,10 +15,28 @@ def _libraries() -> Any:
     return ThreadpoolController()
 
 
-def one_thread() -> AbstractContextManager[Any]:
-    """Hold NumPy's and scipy's linear algebra to one thread within a `with`, for the whole process.
+class _OneThread:
+    """Holds while anyone is inside: the first sets the limit, the last takes it away, in whichever order they leave."""
 
-    With as many threads as processors, which is what both take by themselves, fitting combs takes three to sixteen
-    times as long on two processors, the longer the busier they are.
-    """
-    return _libraries().limit(limits=1, user_api="blas")
+    def __init__(self) -> None:
+        self._lock, self._inside, self._limit = Lock(), 0, None
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if not self._inside:
+                self._limit = _libraries().limit(limits=1, user_api="blas")
+            self._inside += 1
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with self._lock:
+            self._inside -= 1
+            if not self._inside:
+                self._limit.restore_original_limits()  # type: ignore[attr-defined]
+
+
+#: Hold NumPy's and scipy's linear algebra to one thread within a `with`, for the whole process. With as many threads as
+#: processors, which is what both take by themselves, fitting combs takes three to sixteen times as long on two
+#: processors, the longer the busier they are.
+one_thread = _OneThread()

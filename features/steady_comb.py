@@ -15,8 +15,9 @@ from .one_thread import one_thread
 from .periodogram import prepare
 from .spectrum import SPEED_OF_LIGHT_MPS
 
-#: Length of a dwell [s], short enough for a rate that changes, and pulses at most: more cost time and find little more.
-DWELL_S, MOST_PULSES = 0.08, 4096
+#: Length of a dwell [s], short enough for a rate that changes, and its pulses at least and at most: more cost time and
+#: find little more.
+DWELL_S, PULSES = 0.08, (32, 4096)
 
 #: Dwells that are looked at, spread over the recording, and how many must show the comb.
 DWELLS, LEAST = 8, 3
@@ -53,7 +54,8 @@ def steady_comb(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: f
     Parameters
     ----------
     iq : ndarray of complex, shape (..., pulses)
-        Slow-time samples of one range cell, of three dwells or more: nothing is found in less.
+        Slow-time samples of one range cell, of three dwells or more, at a PRF of 400 Hz or more: nothing is found in
+        less.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz], > 0.
 
@@ -61,16 +63,16 @@ def steady_comb(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: f
     -------
     SteadyComb
     """
-    with one_thread():
+    with one_thread:
         return SteadyComb(*by_recording(iq, lambda samples: _one(samples, carrier_hz, prf_hz)))
 
 
 def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[float, int]:
     """The fields of `SteadyComb` of one recording."""
-    pulses = min(round(DWELL_S * prf_hz), MOST_PULSES)
+    pulses = round(min(DWELL_S * prf_hz, PULSES[1]))
     count = min(len(iq) // max(pulses, 1), DWELLS)
     scale = np.abs(iq).max(initial=0)
-    if count < LEAST or not 0 < scale < np.inf:
+    if pulses < PULSES[0] or count < LEAST or not 0 < scale < np.inf:
         return np.nan, 0
     starts = np.rint(np.linspace(0, len(iq) - pulses, count)).astype(np.intp)
     found = [_rotor_hz(iq[start : start + pulses] / scale, carrier_hz, prf_hz) for start in starts]

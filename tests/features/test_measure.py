@@ -5,6 +5,7 @@ from bladewing.features.comb import find_comb, strong_multiple
 from bladewing.features.comb_fit import fit_combs
 from bladewing.features.flashes import flash_nats
 from bladewing.features.lines import LineSpace, line_products, sum_of_lines
+from bladewing.features.one_thread import one_thread
 from bladewing.features.periodogram import prepare, without_clicks
 from bladewing.features.rotors import MAX_ROTORS
 from bladewing.features.slow_lines import notched_products, remove_bands, slepian
@@ -165,10 +166,21 @@ def test_no_record_gives_no_measurement():
     assert found.reason.dtype.kind == "U"
 
 
-def test_linear_algebra_has_one_thread_within_and_its_own_again_after():
-    def threads() -> set[int]:
-        return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+def threads() -> set[int]:
+    """Threads of linear algebra."""
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
 
+
+def test_who_leaves_first_does_not_give_the_others_threads_back():
+    with threadpool_limits(2, user_api="blas"):
+        one_thread.__enter__()
+        with one_thread:
+            one_thread.__exit__(None, None, None)
+            assert threads() == {1}
+        assert threads() == {2}
+
+
+def test_linear_algebra_has_one_thread_within_and_its_own_again_after():
     with threadpool_limits(2, user_api="blas"):
         before, within = threads(), []
         measure(np.stack([drone([58.0])] * 2), **RADAR, on_record=lambda _: within.append(threads()))

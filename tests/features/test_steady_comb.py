@@ -73,6 +73,10 @@ def test_dwells_of_short_recordings(dwells, seen):
     assert steady_comb(comb(snr_db=10.0, pulses=round(dwells * DWELL)), **RADAR).seen == seen
 
 
+def test_a_slow_radar_shows_no_comb():
+    assert steady_comb(comb().astype(np.complex64), carrier_hz=9.85e9, prf_hz=10.0).seen == 0
+
+
 def test_no_recording_and_real_samples():
     assert steady_comb(np.zeros((0, PULSES), np.complex64), **RADAR).chopping_hz.shape == (0,)
     with pytest.raises(ValueError, match="must be complex"):
