@@ -184,7 +184,7 @@ class Measured:
 
         v = self.values
         heads = ("start s", "body m/s", "chopping Hz", "rotors", "band Hz", "tip m/s")
-        table = Table(*heads, box=None, pad_edge=False, collapse_padding=True)
+        table = Table(*heads, box=None, pad_edge=False)
         for column in table.columns:
             column.justify, column.no_wrap = "right", True
         console.print(Text(one_line(self.recording.name), style="bold"), soft_wrap=True)
@@ -205,9 +205,10 @@ class Measured:
                 with_error(v.tip_speed_mps[n], v.tip_speed_mps_std[n]),
             )
         if table.row_count:
-            # a number is never cut: a narrow terminal wraps the lines
-            wide = table.__rich_measure__(console, console.options.update(max_width=1000)).maximum
-            console.width = max(console.width, wide)
+            # a number is never cut: a narrow terminal gets narrow gaps, then wraps the lines
+            endless = console.options.update(max_width=1000)
+            table.collapse_padding = table.__rich_measure__(console, endless).maximum > console.width
+            console.width = max(console.width, table.__rich_measure__(console, endless).maximum)
             console.print(table)
         for reason, dwells in silent.items():
             console.print(Text(f"{counted(dwells)}: {reason}"), soft_wrap=True)

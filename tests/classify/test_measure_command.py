@@ -54,7 +54,8 @@ def test_noise_has_nulls_and_a_reason(folder, capsys):
     assert closing["recording"]["with_comb"] == 0
 
 
-def test_the_table_says_rate_and_blade(folder, capsys):
+def test_the_table_says_rate_and_blade(folder, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
     assert main(["measure", str(folder / "drone.npy"), *RADAR, "--blades", "2"]) == 0
     said = capsys.readouterr().out
     assert "chopping Hz" in said
