@@ -54,3 +54,16 @@ def test_the_sea_at_1_khz_is_unknown_for_the_right_reason(answers):
 def test_no_walker_vehicle_or_sea_recording_is_a_uav(answers):
     for start in ("person", "vehicle", "sea"):
         assert "uav" not in {t["label"] for t in tracks(answers, start)}
+
+
+@pytest.mark.parametrize(("start", "spacing_hz"), [("drone-hover", 161), ("drone-idle", 64)])
+def test_the_drone_has_a_comb_that_stays(answers, start, spacing_hz):
+    """One tagged blade passes 161 times a second hovering and 64 times idling, two of them twice as often."""
+    for tags, multiple in (("10000000", 1), ("11000000", 2)):
+        found = [track["comb_hz"] for track in tracks(answers, f"{start}-{tags}")]
+        assert found == pytest.approx([multiple * spacing_hz] * 2, rel=0.03)
+
+
+def test_nothing_else_has_one(answers):
+    for start in ("person", "vehicle", "sea"):
+        assert {track["comb_hz"] for track in tracks(answers, start)} == {None}
