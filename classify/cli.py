@@ -35,7 +35,7 @@ _DISK_ERRORS = {
 }  # fmt: skip
 _TRACEBACK = "BLADEWING_TRACEBACK"
 _LONGEST_LINE = 10_000
-_NUMBERS = {"int_parsing": "a whole number", "int_from_float": "a whole number", "float_parsing": "a number"}
+_NUMBERS = {"int_parsing": "be a whole number", "float_parsing": "be a number"}
 
 Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]
 
@@ -191,7 +191,7 @@ def train(
         Path | None, typer.Option(metavar="FILE.toml", help="Settings; the options given here come first.")
     ] = None,
     records: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Synthetic records to train on.", show_default=False)
+        int | None, typer.Option(metavar="N", min=600, help="Synthetic records to train on.", show_default=False)
     ] = None,
     seed: Seed = None,
     quick: Annotated[bool, typer.Option("--quick", help="Few records and epochs: a try, not a model to use.")] = False,
@@ -210,7 +210,7 @@ def train(
 def dataset(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the data set: new, or to be gone on with.")],
     records: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Records to train on; the other sets follow from it.")
+        int, typer.Option(metavar="N", min=600, help="Records to train on; the other sets follow from it.")
     ],
     seed: Seed = None,
     config: Annotated[
@@ -382,9 +382,10 @@ def _usage(error: Exception) -> int:
     wrong: list[dict] = getattr(
         error.__cause__ or error.__context__, "errors", list
     )()  # typer takes numbers by pydantic
-    if wrong and wrong[0]["type"] in _NUMBERS:
+    if wrong:
         name = getattr(error, "param").opts[0]  # noqa: B009 - the class of the error has no public name
-        message = f"{name} is {wrong[0]['input']!r}: it must be {_NUMBERS[wrong[0]['type']]}"
+        rule = _NUMBERS.get(wrong[0]["type"], wrong[0]["msg"].removeprefix("Input should "))
+        message = f"{name} is {wrong[0]['input']!r}: it must {rule}"
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "bladewing"
     _complain(f"{' '.join(message.split())} (see {command} --help)")

@@ -57,8 +57,8 @@ def build_settings(table: type[Settings], values: Mapping[str, Any], *, where: s
         if first["type"] == "extra_forbidden":
             known = ", ".join(table.model_fields)
             raise BadInput(f"{where}: unknown field {field!r}: the fields are {known}") from None
-        rule = first["msg"].removeprefix("Input ")
-        raise BadInput(f"{where}: {field} is {first['input']!r}: it {rule}") from None
+        rule = first["msg"].replace("Input ", "it ", 1).replace("Tuple ", "it ", 1)
+        raise BadInput(f"{where}: {field} is {first['input']!r}: {rule}") from None
 
 
 def _read(file: Path) -> dict[str, Any]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _META, _DATA = ".sigmf-meta", ".sigmf-data"
 _ARCHIVES = (".sigmf", ".sigmf.gz", ".sigmf.xz", ".sigmf.zip")
-_DATATYPE = re.compile(r"([cr])([fiu])(8|16|32|64)(_le|_be)?")
+_DATATYPE = re.compile(r"([cr])(?!f8|f16)([fiu])(8|16|32|64)(_le|_be)?")
 
 
 class SigmfSamples(NamedTuple):
@@ -147,7 +147,8 @@ def _bounded_archive(path: Path) -> dict[str, Any]:
     require_size(path)
     with open(path, "rb") as file:
         if file.read(2) == b"PK":
-            with open_zip(path):
+            with open_zip(path) as packed:
+                _require_one([name for name in packed.namelist() if not name.endswith("/")], path)
                 file.seek(0)
                 return {"name": path} if path.name.endswith(".zip") else {"archive_buffer": io.BytesIO(file.read())}
         content = unpacked(path)
@@ -156,7 +157,18 @@ def _bounded_archive(path: Path) -> dict[str, Any]:
             for member in tar.getmembers():
                 if member.isfile() and (member.issparse() or member.size < 0):
                     raise ValueError(f"{member.name!r} is stored sparse: pack the recording without holes")
+            _require_one([member.name for member in tar.getmembers() if member.isfile()], path)
     return {"name": path} if content is None else {"archive_buffer": io.BytesIO(content)}
+
+
+def _require_one(names: list[str], path: Path) -> None:
+    """Refuse an archive of anything but one recording's two files: which of several is meant, nobody can tell."""
+    metas, datas = ([name for name in names if name.endswith(suffix)] for suffix in (_META, _DATA))
+    if len(metas) != 1 or len(datas) != 1:
+        held = f"{len(metas)} files {_META} and {len(datas)} files {_DATA}"
+        raise BadInput(f"{path}: the archive holds {held}: pack each recording, one of each, in an archive of its own")
+    if metas[0].removesuffix(_META) != datas[0].removesuffix(_DATA):
+        raise BadInput(f"{path}: {metas[0]} and {datas[0]} are not one recording: give them one name")
 
 
 def _library_message(path: Path, error: Exception) -> str:

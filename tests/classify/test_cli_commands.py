@@ -22,7 +22,7 @@ def calls(monkeypatch):
 def test_train_hands_its_options_on(calls):
     assert main(["train"]) == 0
     assert (
-        main(["train", "--out", "m", "--config", "c.toml", "--records", "50", "--seed", "7", "--quick", "--data", "d"])
+        main(["train", "--out", "m", "--config", "c.toml", "--records", "650", "--seed", "7", "--quick", "--data", "d"])
         == 0
     )
     assert calls == [
@@ -30,7 +30,7 @@ def test_train_hands_its_options_on(calls):
         (
             Path("m"),
             {
-                "records": 50,
+                "records": 650,
                 "seed": 7,
                 "quick": True,
                 "config": Path("c.toml"),

@@ -60,6 +60,7 @@ def test_every_complex_type_becomes_complex64(npy, dtype):
     [
         (np.zeros(0, dtype=np.complex64), r"no samples \(shape \(0,\)\): a recording needs at least one pulse"),
         (np.zeros((0, 5), dtype=np.complex64), r"no samples \(shape \(0, 5\)\)"),
+        (np.zeros((50, 2), np.float32), r"real samples of shape \(50, 2\): I and Q must be one complex number"),
         (np.complex64(1), r"samples of shape \(\): a recording is one range cell"),
         (noise(50, records=(2,)), r"samples of shape \(2, 50\): a recording is one range cell, shape \(pulses,\)"),
         (np.ones(100, dtype=np.float32), r"real samples \(float32\): IQ must be complex"),

@@ -1,6 +1,7 @@
 import json
 import re
 import tarfile
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -198,6 +199,32 @@ def test_an_undeclared_namespace_in_an_archive_is_no_ones_trouble(sigmf_pair, tm
         for path in (meta, meta.with_suffix(".sigmf-data")):
             archive.add(path, f"rec/{path.name}")
     assert load_recording(tmp_path / "packed.sigmf").iq.size == 4000
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["a.sigmf-meta", "a.sigmf-data", "b.sigmf-meta", "b.sigmf-data"], "holds 2 files .sigmf-meta and 2 files"),
+        (["a.sigmf-meta", "b.sigmf-data"], "a.sigmf-meta and b.sigmf-data are not one recording"),
+        (["a.sigmf-meta"], "holds 1 files .sigmf-meta and 0 files .sigmf-data"),
+        (["notes.txt"], "holds 0 files .sigmf-meta and 0 files .sigmf-data"),
+    ],
+)
+@pytest.mark.parametrize("packed", ["tar", "zip"])
+def test_an_archive_holds_one_recording(sigmf_pair, tmp_path, names, said, packed):
+    meta = sigmf_pair()
+    files = {name: meta if name.endswith("meta") else meta.with_suffix(".sigmf-data") for name in names}
+    path = tmp_path / ("packed.sigmf" if packed == "tar" else "packed.sigmf.zip")
+    if packed == "tar":
+        with tarfile.open(path, "w") as archive:
+            for name, file in files.items():
+                archive.add(file, name)
+    else:
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, file in files.items():
+                archive.write(file, name)
+    with pytest.raises(BadInput, match=said.replace(".", r"\.")):
+        load_recording(path)
 
 
 def test_archives_obey_the_same_rules(sigmf_pair, tmp_path):
