@@ -1,12 +1,14 @@
 """Synthetic records to model inputs: streamed, several processes at a time, nothing kept of the samples themselves."""
 
 import os
+import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context, parent_process
+from multiprocessing import active_children, get_context, parent_process, resource_tracker
 from typing import TypeVar
 
 import numpy as np
@@ -137,14 +139,34 @@ def in_order(work: Callable[[Task], Done], tasks: Sequence[Task], workers: int |
         waiting: list[Future[Done]] = []
         try:
             for task in tasks:
-                waiting.append(pool.submit(work, task))
+                with _deaf_children():
+                    waiting.append(pool.submit(work, task))
                 if len(waiting) >= 3 * workers:
                     yield waiting.pop(0).result()
             while waiting:
                 yield waiting.pop(0).result()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
+            for worker in active_children():  # else what they have begun is waited for
+                worker.terminate()
             raise
+
+
+@contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Processes started within never hear of Ctrl-C, which a terminal sends to all: they end with their parent.
+
+    It is held back, not ignored: the parent hears of it right after.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # whose own start would let it through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _end_with_parent() -> None:

@@ -287,7 +287,7 @@ def test_a_link_to_what_never_ends_is_refused(copy):
 
 def test_the_command_names_what_is_wrong(tmp_path, capsys):
     assert main(["dataset", str(tmp_path / "d"), "--records", "599"]) == 2
-    assert "records is 599: it should be greater than or equal to 600" in capsys.readouterr().err
+    assert "--records is '599': it must be greater than or equal to 600" in capsys.readouterr().err
     (tmp_path / "file").write_text("")
     assert main(["dataset", str(tmp_path / "file"), "--records", "600"]) == 2
     assert "cannot be written" in capsys.readouterr().err

@@ -72,3 +72,24 @@ def test_workers_end_with_a_killed_parent(tmp_path):
         time.sleep(0.2)
     os.killpg(parent.pid, signal.SIGKILL)
     pytest.fail("workers outlived their parent")
+
+
+INTERRUPTED = """
+import os, signal, threading
+
+from bladewing.classify import gather
+if __name__ == "__main__":
+    # to all of its group, as a terminal sends it: while the workers import, which takes them a second
+    threading.Timer(0.3, os.killpg, (0, signal.SIGINT)).start()
+    try:
+        gather.gather(0, "train", 24_000, names=("features",), workers=2)
+    except KeyboardInterrupt:
+        print("stopped")
+"""
+
+
+def test_an_interrupt_is_the_parent_s_alone(tmp_path):
+    script = tmp_path / "interrupted.py"
+    script.write_text(INTERRUPTED)
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, start_new_session=True, timeout=120)
+    assert (done.stdout, done.stderr, done.returncode) == ("stopped\n", "", 0)
