@@ -379,9 +379,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _usage(error: Exception) -> int:
     message = getattr(error, "format_message", lambda: str(error))()
-    wrong: list[dict] = getattr(
-        error.__cause__ or error.__context__, "errors", list
-    )()  # typer takes numbers by pydantic
+    # typer takes numbers by pydantic, whose error knows the value
+    wrong: list[dict] = getattr(error.__cause__ or error.__context__, "errors", list)()
     if wrong:
         name = getattr(error, "param").opts[0]  # noqa: B009 - the class of the error has no public name
         rule = _NUMBERS.get(wrong[0]["type"], wrong[0]["msg"].removeprefix("Input should "))

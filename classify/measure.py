@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -335,9 +335,7 @@ def checked_plot(path: Path | None) -> None:
         raise BadInput(f"--plot {path}: there is no folder {path.parent}: name a file in an existing folder")
 
 
-def measure_recording(
-    recording: Recording, settings: Settings, on_record: Callable[[int], None] | None = None
-) -> Measured:
+def measure_recording(recording: Recording, settings: Settings, progress: Progress | None = None) -> Measured:
     """Cut a recording into dwells and measure each.
 
     Parameters
@@ -346,8 +344,8 @@ def measure_recording(
         One range cell. A rest shorter than a dwell is dropped, but a recording shorter than one dwell is taken whole.
     settings
         What is asked.
-    on_record
-        Called with the number of dwells done.
+    progress
+        Shows the dwells that are done; by default nothing does.
 
     Raises
     ------
@@ -368,13 +366,8 @@ def measure_recording(
     radar = {"carrier_hz": recording.carrier_hz, "prf_hz": recording.prf_hz}
     acceleration, acceleration_std, smeared = body_acceleration(iq, **radar)
     iq = without_acceleration(iq, np.where(smeared, acceleration, 0.0), **radar)
-    values = measure(
-        iq,
-        **radar,
-        blades=settings.blades,
-        beta_rad=settings.beta_rad,
-        on_record=on_record,
-    )
+    with (progress or Progress(visible=False)).phase(f"measure {counted(count)}", count) as on_record:
+        values = measure(iq, **radar, blades=settings.blades, beta_rad=settings.beta_rad, on_record=on_record)
     start_s = recording.start_s + np.arange(count) * pulses / recording.prf_hz
     long = len(recording.iq) >= LEAST_S * recording.prf_hz
     beat = wingbeat(recording.iq, **radar) if long else None
@@ -403,9 +396,7 @@ def measured(
         try:
             recording = load_recording(path, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable)
             with Progress(visible=True, passing=True) as bars:
-                dwells = max(1, round(len(recording.iq) / max(settings.dwell_s * recording.prf_hz, 2)))
-                with bars.phase(f"measure {dwells} dwells", dwells) as on_record:
-                    result = measure_recording(recording, settings, on_record)
+                result = measure_recording(recording, settings, bars)
             yield result
         except BadInput as error:
             yield error
