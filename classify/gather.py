@@ -1,9 +1,11 @@
 """Synthetic records to model inputs: streamed, several processes at a time, nothing kept of the samples themselves."""
 
+from __future__ import annotations
+
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,11 +19,18 @@ from bladewing.simulate import stream
 from bladewing.simulate.dataset import RADAR_GROUP, Records
 from numpy.typing import NDArray
 
+from .parts import Parts
+
 #: Records of one task: whole radar groups, so that no record is drawn twice.
 TASK_RECORDS = 10 * RADAR_GROUP
 
+#: Tasks whose inputs are kept together as a part of a long run: some 90 MB.
+KEPT_TASKS = 50
+
 #: Inputs kept as float16 until a batch needs them: dB values of at most 120 keep 0.06 dB.
 _COMPACT = ("levels", "spectrum", "cadence", "image")
+
+_INPUT, _TRUTH = "input/", "truth/"
 
 
 @dataclass(frozen=True)
@@ -45,6 +54,54 @@ class Gathered:
     def __len__(self) -> int:
         return len(self.labels)
 
+    def arrays(self) -> dict[str, NDArray]:
+        """All of it as plain arrays by name."""
+        groups = (_INPUT, self.inputs), (_TRUTH, self.truth)
+        return {"labels": self.labels} | {prefix + name: a for prefix, group in groups for name, a in group.items()}
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, NDArray], names: Sequence[str]) -> Gathered:
+        """What `arrays` gave, with the inputs in the order of `names`.
+
+        Raises
+        ------
+        KeyError, ValueError
+            They are not what it gives for these inputs.
+        """
+        inputs = {name: arrays[_INPUT + name] for name in names}
+        truth = {name.removeprefix(_TRUTH): array for name, array in arrays.items() if name.startswith(_TRUTH)}
+        labels = arrays["labels"]
+        if any(array.shape != (len(labels), *INPUT_SHAPES[name]) for name, array in inputs.items()):
+            raise ValueError("its inputs have other shapes")
+        return cls(inputs, labels, truth)
+
+    @classmethod
+    def joined(cls, runs: Sequence[Gathered]) -> Gathered:
+        """Consecutive runs of records as one."""
+        whole = runs[0].like(sum(map(len, runs)))
+        at = 0
+        for run in runs:
+            whole.put(at, run)
+            at += len(run)
+        return whole
+
+    def like(self, count: int) -> Gathered:
+        """Room for so many records of this form; what it holds is not set."""
+        empty = {name: np.empty((count, *array.shape[1:]), array.dtype) for name, array in self.arrays().items()}
+        return Gathered.of(empty, tuple(self.inputs))
+
+    def put(self, at: int, run: Gathered) -> None:
+        """Set the records from `at` on to those of a run.
+
+        Raises
+        ------
+        KeyError, ValueError
+            The run is longer than the room, or of another form.
+        """
+        theirs = run.arrays()
+        for name, array in self.arrays().items():
+            array[at : at + len(run)] = theirs[name]
+
 
 def workers_at_hand() -> int:
     """Processors that this process may use."""
@@ -59,6 +116,7 @@ def gather(
     names: Sequence[str] = tuple(INPUT_SHAPES),
     workers: int | None = None,
     on_records: Callable[[int], None] | None = None,
+    parts: Parts | None = None,
 ) -> Gathered:
     """Draw `count` records of a purpose and turn them into model inputs.
 
@@ -72,23 +130,33 @@ def gather(
         Processes; by default one a processor. 1 works in this process. The result does not depend on it.
     on_records : callable, optional
         Called with the number of records of each finished task.
+    parts : Parts, optional
+        Where to keep what is done, and to find what an interrupted run did; they must depend on all that the inputs do.
 
     Returns
     -------
     Gathered
+
+    Raises
+    ------
+    BadInput
+        What was kept is damaged.
     """
     sources = [
         partial(stream, seed, purpose, min(TASK_RECORDS, count - at), start=at) for at in range(0, count, TASK_RECORDS)
     ]
-    return gather_from(sources, names=names, workers=workers, on_records=on_records)
+    return gather_from(sources, purpose, count, names=names, workers=workers, on_records=on_records, parts=parts)
 
 
 def gather_from(
     sources: Sequence[Callable[[], Iterable[Records]]],
+    purpose: str,
+    count: int,
     *,
     names: Sequence[str],
     workers: int | None = None,
     on_records: Callable[[int], None] | None = None,
+    parts: Parts | None = None,
 ) -> Gathered:
     """Turn records into model inputs, wherever they come from.
 
@@ -96,23 +164,67 @@ def gather_from(
     ----------
     sources : sequence of callable
         Each gives a run of consecutive records when it is called, in any process; at least one.
-    names, workers, on_records
+    purpose, count
+        Of the records: what they are called where they are kept, and their number.
+    names, workers, on_records, parts
         As in `gather`.
 
     Returns
     -------
     Gathered
+
+    Raises
+    ------
+    BadInput
+        As `gather`.
+    ValueError
+        The sources hold another number of records.
     """
-    parts = []
-    for part in in_order(partial(_inputs_of, tuple(names)), sources, workers):
-        parts.append(part)
+    whole: Gathered | None = None
+    at = 0
+    for done in _done(sources, purpose, names, workers, parts):
+        if whole is None:  # all at once: joined at the end, a million records would need their room twice
+            whole = done.like(count)
+        whole.put(at, done)
+        at += len(done)
         if on_records:
-            on_records(len(part))
-    return Gathered(
-        {name: np.concatenate([p.inputs[name] for p in parts]) for name in names},
-        np.concatenate([p.labels for p in parts]),
-        {name: np.concatenate([p.truth[name] for p in parts]) for name in parts[0].truth},
-    )
+            on_records(len(done))
+    if whole is None or at != count:
+        raise ValueError(f"the sources hold {at} records, not {count}")
+    return whole
+
+
+def _done(
+    sources: Sequence[Callable[[], Iterable[Records]]],
+    purpose: str,
+    names: Sequence[str],
+    workers: int | None,
+    parts: Parts | None,
+) -> Iterator[Gathered]:
+    """What was kept of the sources, and what is made of the rest, kept by `KEPT_TASKS` at a time; all in order."""
+    made = partial(in_order, partial(_inputs_of, tuple(names)), workers=workers)
+    if parts is None:
+        yield from made(sources)
+        return
+    kept = 0
+    while kept < len(sources) and (arrays := parts.arrays(name := _kept_name(purpose, kept))) is not None:
+        try:
+            yield Gathered.of(arrays, names)
+        except (KeyError, ValueError) as error:
+            raise parts.refusal(name, str(error)) from None
+        kept += KEPT_TASKS
+    waiting: list[Gathered] = []
+    for number, done in enumerate(made(sources[kept:]), kept + 1):
+        yield done
+        waiting.append(done)
+        if number % KEPT_TASKS == 0 or number == len(sources):
+            parts.keep_arrays(_kept_name(purpose, number - len(waiting)), Gathered.joined(waiting).arrays())
+            waiting = []
+
+
+def _kept_name(purpose: str, first: int) -> str:
+    """Name of the part that holds the inputs of the tasks from a first one on."""
+    return f"drawn-{purpose}-{first // KEPT_TASKS:05d}"
 
 
 Task = TypeVar("Task")
@@ -183,18 +295,12 @@ def _end_with_parent() -> None:
 
 def _inputs_of(names: tuple[str, ...], source: Callable[[], Iterable[Records]]) -> Gathered:
     """Inputs of one run of consecutive records."""
-    inputs: dict[str, list[NDArray]] = {name: [] for name in names}
-    labels, truths = [], []
+    runs = []
     for records in source():
         radar = records.radar
         computed = model_inputs(records.iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz, names=names)
-        for name in names:
-            inputs[name].append(computed[name].astype(np.float16 if name in _COMPACT else np.float32))
-        labels.append(records.label_indices)
+        inputs = {name: computed[name].astype(np.float16 if name in _COMPACT else np.float32) for name in names}
         given = {"carrier_hz": radar.carrier_hz, "prf_hz": radar.prf_hz, "pulses": radar.pulses}
-        truths.append(records.truth | {name: np.full(len(records), value) for name, value in given.items()})
-    return Gathered(
-        {name: np.concatenate(values) for name, values in inputs.items()},
-        np.concatenate(labels),
-        {name: np.concatenate([truth[name] for truth in truths]) for name in truths[0]},
-    )
+        radars = {name: np.full(len(records), value) for name, value in given.items()}
+        runs.append(Gathered(inputs, records.label_indices, records.truth | radars))
+    return Gathered.joined(runs)

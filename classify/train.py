@@ -16,7 +16,7 @@ from bladewing.features import INPUT_SHAPES, schema_hash
 from bladewing.models import LADDER
 from numpy.typing import NDArray
 
-from .dataset import DataSet, Plan
+from .dataset import DataSet, Plan, simulator_digest
 from .envelope import Envelope
 from .errors import BadInput
 from .files import result_folder, write_together
@@ -58,8 +58,8 @@ def run_training(
 ) -> dict[str, Any]:
     """Train the models of the ladder on synthetic records and write them to a folder.
 
-    Interrupted, the same call goes on: with the models that are finished, and with a network from its last whole
-    epoch. The records are drawn again. On the same machine with the same number of threads the models have the bytes
+    Interrupted, the same call goes on: with what is drawn, with the models that are finished, and with a network from
+    its last whole epoch. On the same machine with the same number of threads the models have the bytes
     of a run that nothing interrupted.
 
     Parameters
@@ -93,7 +93,12 @@ def run_training(
     versions = _versions()
     parts = Parts(
         out / PARTS,
-        {"settings": settings.model_dump(mode="json"), "schema_sha256": schema_hash(), "versions": versions},
+        {
+            "settings": settings.model_dump(mode="json"),
+            "simulator_sha256": simulator_digest(),
+            "schema_sha256": schema_hash(),
+            "versions": versions,
+        },
     )
     # Threads that spin while they wait make training several times slower beside another busy process.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -104,7 +109,7 @@ def run_training(
     with Progress(visible=progress) as bars:
         if resumed:
             bars.say(f"Going on with what an interrupted run left in {out / PARTS}")
-        sets = _gather(settings, stored, bars)
+        sets = _gather(settings, stored, bars, parts)
         gathered_s = time.perf_counter() - started
         files: dict[str, bytes] = {}
         models: dict[str, dict[str, Any]] = {}
@@ -132,7 +137,7 @@ def run_training(
     return account
 
 
-def _gather(settings: TrainingConfig, stored: DataSet | None, bars: Progress) -> Sets:
+def _gather(settings: TrainingConfig, stored: DataSet | None, bars: Progress, parts: Parts | None = None) -> Sets:
     """Draw or read the four sets, with only the inputs that the chosen models read."""
     names = tuple(name for name in INPUT_SHAPES if any(name in LADDER[model].inputs for model in settings.models))
     total, done = sum(settings.sets.values()), 0
@@ -145,10 +150,8 @@ def _gather(settings: TrainingConfig, stored: DataSet | None, bars: Progress) ->
                 done += number
                 on_done(done)
 
-            if stored is None:
-                sets[purpose] = gather(settings.seed, purpose, count, names=names, on_records=on_records)
-            else:
-                sets[purpose] = gather_from(stored.sources(purpose), names=names, on_records=on_records)
+            make = partial(gather, settings.seed) if stored is None else partial(gather_from, stored.sources(purpose))
+            sets[purpose] = make(purpose, count, names=names, on_records=on_records, parts=parts)
     return Sets(**sets)
 
 

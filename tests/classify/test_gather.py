@@ -7,7 +7,9 @@ import time
 import numpy as np
 import pytest
 from bladewing.classify import gather as gather_module
+from bladewing.classify.errors import BadInput
 from bladewing.classify.gather import gather
+from bladewing.classify.parts import Parts
 from bladewing.features import INPUT_SHAPES
 
 
@@ -43,6 +45,52 @@ def test_progress_counts_every_record():
     seen = []
     gather(0, "test", 50, names=("features",), workers=1, on_records=seen.append)
     assert sum(seen) == 50
+
+
+class StoppedError(Exception):
+    pass
+
+
+@pytest.fixture
+def interrupted(tmp_path, monkeypatch):
+    """What a run of 700 records left that was stopped after seven of its tasks of 48, kept three at a time."""
+    monkeypatch.setattr(gather_module, "TASK_RECORDS", 48)
+    monkeypatch.setattr(gather_module, "KEPT_TASKS", 3)
+    parts = Parts(tmp_path / "parts", {"seed": 3})
+    seen = []
+
+    def stop(count):
+        seen.append(count)
+        if len(seen) == 7:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        gather(3, "train", 700, names=("features", "levels"), workers=1, on_records=stop, parts=parts)
+    return parts
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_an_interrupted_drawing_goes_on_to_the_same_bits(interrupted, monkeypatch, workers):
+    drawn, seen = [], []
+    if workers == 1:  # another process would not see the patch
+        real = gather_module.stream
+        monkeypatch.setattr(gather_module, "stream", lambda *a, start: drawn.append(start) or real(*a, start=start))
+    resumed = gather(
+        3, "train", 700, names=("features", "levels"), workers=workers, on_records=seen.append, parts=interrupted
+    )
+    whole = gather(3, "train", 700, names=("features", "levels"), workers=1)
+    if workers == 1:
+        assert min(drawn[:9]) == 6 * 48  # six tasks were kept, the seventh not
+    assert sum(seen) == 700
+    assert resumed.arrays().keys() == whole.arrays().keys()
+    for name, array in whole.arrays().items():
+        np.testing.assert_array_equal(resumed.arrays()[name], array)
+        assert resumed.arrays()[name].dtype == array.dtype
+
+
+def test_drawn_records_of_other_inputs_are_refused(interrupted):
+    with pytest.raises(BadInput, match=r"drawn-train-00000\.npz: not what this run kept"):
+        gather(3, "train", 700, names=("features", "cadence"), workers=1, parts=interrupted)
 
 
 ORPHAN = """
