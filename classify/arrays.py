@@ -41,6 +41,8 @@ _NPY_ERRORS = (
 _HEADERS = {(1, 0): (np.lib.format.read_array_header_1_0, 2), (2, 0): (np.lib.format.read_array_header_2_0, 4)}
 _MOST_HEADER_BYTES = 10_000
 
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
 
 class _PickledError(BadInput):
     """An array of Python objects."""
@@ -92,16 +94,22 @@ def _parse_npy(file: IO[bytes], name: str, size: int) -> NDArray[np.generic]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about headers of old versions
-            _require_whole(file, size)
+            _require_whole(file, name, size)
             return np.lib.format.read_array(file, allow_pickle=False)
+    except BadInput:
+        raise
     except _NPY_ERRORS as error:
         if "Object arrays" in str(error):
             raise _PickledError(name) from None
         raise BadInput(_damaged(name, error)) from None
 
 
-def _require_whole(file: IO[bytes], size: int) -> None:
+def _require_whole(file: IO[bytes], name: str, size: int) -> None:
     """Refuse a header that speaks of more than the file holds, before any room is made for it."""
+    magic = file.read(len(np.lib.format.MAGIC_PREFIX))
+    if magic != np.lib.format.MAGIC_PREFIX:
+        raise BadInput(f"{name}: not an .npy file, whatever its name says: save the samples with numpy.save")
+    file.seek(0)
     version = np.lib.format.read_magic(file)
     if version not in _HEADERS:
         raise ValueError(f"version {version} of the format")
@@ -147,6 +155,9 @@ def _read_mat(path: Path, variable: str | None) -> dict[str, NDArray[np.generic]
     import scipy.io
 
     try:
+        with open(path, "rb") as file:
+            if file.read(len(_HDF5)) == _HDF5:  # without the head that MATLAB writes before it
+                raise NotImplementedError
         if scipy.io.matlab.matfile_version(path)[0] == 1:
             require_sound(path)
         with warnings.catch_warnings():

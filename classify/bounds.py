@@ -1,4 +1,4 @@
-"""What a file may cost before it is believed: how much it may hold, and what a packed one may unpack to."""
+"""Bounds on what is read and asked for: what a file may hold, what a packed one may unpack to, the fewest records."""
 
 import bz2
 import io
@@ -19,6 +19,9 @@ MOST_TEXT_BYTES = 16 << 20
 
 #: Largest model [bytes].
 MOST_MODEL_BYTES = 1 << 28
+
+#: Fewest records that can be trained on: of every kind the other three sets must hold some.
+LEAST_RECORDS = 600
 
 # Samples hardly compress; text does, but is small. What unpacks to more than this is no recording.
 _FREE_BYTES, _RATIO = 64 << 20, 100

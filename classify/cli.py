@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
+from .bounds import LEAST_RECORDS
 from .errors import BadInput, one_line
 
 if TYPE_CHECKING:
@@ -191,7 +192,8 @@ def train(
         Path | None, typer.Option(metavar="FILE.toml", help="Settings; the options given here come first.")
     ] = None,
     records: Annotated[
-        int | None, typer.Option(metavar="N", min=600, help="Synthetic records to train on.", show_default=False)
+        int | None,
+        typer.Option(metavar="N", min=LEAST_RECORDS, help="Synthetic records to train on.", show_default=False),
     ] = None,
     seed: Seed = None,
     quick: Annotated[bool, typer.Option("--quick", help="Few records and epochs: a try, not a model to use.")] = False,
@@ -210,7 +212,7 @@ def train(
 def dataset(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the data set: new, or to be gone on with.")],
     records: Annotated[
-        int, typer.Option(metavar="N", min=600, help="Records to train on; the other sets follow from it.")
+        int, typer.Option(metavar="N", min=LEAST_RECORDS, help="Records to train on; the other sets follow from it.")
     ],
     seed: Seed = None,
     config: Annotated[

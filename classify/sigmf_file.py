@@ -102,8 +102,13 @@ def _read_pair(path: Path) -> SigmfSamples:
 
     try:
         metadata = json.loads(read_bounded(path, MOST_TEXT_BYTES))
-    except (ValueError, RecursionError) as error:  # too large, not UTF-8, not JSON, or nested beyond reason
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
         raise BadInput(f"{path}: not JSON: {error}: SigMF metadata are a JSON object") from None
+    except RecursionError:
+        raise BadInput(f"{path}: nested too deep to be read: SigMF metadata are an object of a few levels") from None
+    except ValueError as error:  # the file too large, or a number that Python does not read
+        what = "a number in it has thousands of digits" if "digits" in str(error) else str(error)
+        raise BadInput(f"{path}: cannot be read: {what}: write the metadata again") from None
     _check_structure(metadata, path)
     data = path.with_suffix(_DATA)
     if metadata["global"].get("core:dataset"):

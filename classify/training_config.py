@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from .bounds import LEAST_RECORDS
 from .errors import BadInput
 from .settings_file import build_settings, given_settings
 
@@ -18,7 +19,7 @@ class TrainingConfig(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    records: Annotated[int, Field(ge=600, le=10_000_000)] = 30_000
+    records: Annotated[int, Field(ge=LEAST_RECORDS, le=10_000_000)] = 30_000
     seed: Annotated[int, Field(ge=0)] = 0
     epochs: Annotated[int, Field(ge=1, le=1000)] = 15
     #: Epochs in a row without a lower validation loss after which a network stops; 0: never.
@@ -42,7 +43,7 @@ class TrainingConfig(BaseModel):
     @property
     def held_out(self) -> int:
         """Records of each of the three sets that are not trained on: validation, calibration and test."""
-        return max(600, min(self.records // 6, 30_000))
+        return max(LEAST_RECORDS, min(self.records // 6, 30_000))
 
     @property
     def sets(self) -> dict[str, int]:

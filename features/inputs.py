@@ -12,7 +12,7 @@ from .change import change_db, parts_db
 from .joint import joint_vector, stft_image
 from .notch import Body, body_line, notch_mask
 from .schema import AXIS_BINS, INPUT_SHAPES
-from .spectrum import Spectrum, doppler_spectrum
+from .spectrum import Spectrum, as_complex, doppler_spectrum
 from .vector import feature_vector
 
 #: Fewest pulses that leave anything to measure outside the notches.
@@ -47,13 +47,13 @@ def model_inputs(
     Raises
     ------
     ValueError
-        If a name is unknown, there are fewer than `MIN_PULSES` pulses, or a frequency is not positive.
+        If a name is unknown, `iq` is not complex or has fewer than `MIN_PULSES` pulses, or a frequency is not positive.
     """
     wanted = frozenset(names)
     unknown = wanted - INPUT_SHAPES.keys()
     if unknown:
         raise ValueError(f"model input {sorted(unknown)[0]!r} is unknown: it must be one of {', '.join(INPUT_SHAPES)}")
-    samples = np.asarray(iq, np.complex64)
+    samples = as_complex(iq)
     if samples.ndim < 1 or samples.shape[-1] < MIN_PULSES:
         raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least {MIN_PULSES} pulses")
     framed = "image" in wanted or "joint_features" in wanted

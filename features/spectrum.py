@@ -340,9 +340,9 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spec
     Raises
     ------
     ValueError
-        If `iq` has fewer than 2 pulses or the frequencies are not positive.
+        If `iq` is not complex, it has fewer than 2 pulses, or the frequencies are not positive.
     """
-    samples = np.asarray(iq, np.complex64)
+    samples = as_complex(iq)
     if samples.ndim < 1 or samples.shape[-1] < 2:
         raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least 2 pulses")
     for name, value in (("carrier_hz", carrier_hz), ("prf_hz", prf_hz)):

@@ -1,5 +1,6 @@
 import io
 import os
+import pickle
 import re
 
 import numpy as np
@@ -85,9 +86,11 @@ def test_one_of_several_is_named(put, suffix, write):
         (".npz", npz(iq=IQ)[:-50], None, "damaged or cut short"),
         (".mat", mat(iq=IQ)[:-50], None, "damaged or cut short"),
         (".mat", mat(iq=IQ)[:100], None, "damaged or cut short"),
-        (".npy", b"not numpy at all", None, "damaged or cut short"),
+        (".npy", b"not numpy at all", None, "not an .npy file, whatever its name says"),
         (".npz", npy(IQ), None, "damaged or cut short"),
-        (".npy", npz(iq=IQ), None, "damaged or cut short"),
+        (".npy", npz(iq=IQ), None, "not an .npy file, whatever its name says"),
+        (".npy", pickle.dumps(IQ), None, "not an .npy file, whatever its name says"),
+        (".mat", b"\x89HDF\r\n\x1a\n" + bytes(600), None, r"a MATLAB 7.3 file \(HDF5\): save it with version 7"),
         (".npy", npy(IQ), "iq", "variable 'iq' given, but a .npy file holds one array"),
         (".npy", npy(np.array([1j], dtype=object)), None, "Python objects, which is never unpickled here"),
         (".npz", npz(iq=np.array([1j], dtype=object)), None, "iq.npy: an array of Python objects, which is never"),

@@ -118,7 +118,8 @@ def test_one_altered_byte_is_found_by_the_hash(sigmf_pair):
     [
         ("", "not JSON"),
         ("{", "not JSON"),
-        ("[" * 100_000, "not JSON"),
+        ("[" * 100_000, "nested too deep"),
+        ('{"global": ' + "9" * 6000 + "}", "a number in it has thousands of digits"),
         ("[]", "no 'global' object"),
         ('{"global": []}', "no 'global' object"),
         ('{"captures": []}', "no 'global' object"),

@@ -120,7 +120,7 @@ def test_it_is_what_its_definition_says():
         np.testing.assert_allclose(found[:, number], wanted, atol=0.05)
 
 
-@pytest.mark.parametrize("iq", [np.zeros(PULSES), np.full(PULSES, 2 - 1j), tone(1234.5)])
+@pytest.mark.parametrize("iq", [np.zeros(PULSES, complex), np.full(PULSES, 2 - 1j), tone(1234.5)])
 def test_a_lone_line_or_silence_has_no_cadence(iq):
     """What rounding leaves outside the notches is no signal; the window's side lobes come and go slowly."""
     assert cadence(iq)[:, cell_of(100) : cell_of(5000)].max() <= -10

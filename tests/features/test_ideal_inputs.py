@@ -160,7 +160,7 @@ EXTREMES = {
     "one spike": SPIKE,
     "constant": np.ones(PULSES, np.complex64),
     "alternating": tone(PRF_HZ / 2),
-    "real": tone(500.0).real,
+    "real": tone(500.0).real.astype(complex),
     "scene": rotors([58.6]) + noise()[0],
 }
 

@@ -100,7 +100,7 @@ def test_only_what_is_asked_for_is_computed():
     with pytest.raises(ValueError, match="'cepstrogram' is unknown"):
         model_inputs(scene(), **RADAR, names=("cepstrogram",))
     with pytest.raises(ValueError, match="at least 16 pulses"):
-        model_inputs(np.ones(15), **RADAR)
+        model_inputs(np.ones(15, complex), **RADAR)
 
 
 @pytest.mark.parametrize("gain", [1e-25, 3.7, -1.0, 1j, 1e25])
@@ -202,3 +202,9 @@ def test_schema_names_are_unique_and_its_hash_is_stable():
     assert len([n for n in names if n not in radar]) == len(set(names) - radar)
     assert len(schema_hash()) == 64
     assert schema_hash() == schema_hash()
+
+
+def test_real_samples_are_refused():
+    # they would pass for a spectrum with two like sides
+    with pytest.raises(ValueError, match="iq holds float32: its samples must be complex"):
+        model_inputs(np.ones(64, np.float32), carrier_hz=10e9, prf_hz=20e3)

@@ -90,7 +90,7 @@ def test_noise_floor_is_monotone_in_the_power():
 
 
 def test_an_all_zero_record_has_no_floor_and_no_power():
-    spectrum = doppler_spectrum(np.zeros((2, 64)), **RADAR)
+    spectrum = doppler_spectrum(np.zeros((2, 64), complex), **RADAR)
     assert not spectrum.floor.any()
     assert not spectrum.relative_power.any()
 
@@ -106,9 +106,10 @@ def test_batch_equals_loop():
 @pytest.mark.parametrize(
     ("iq", "radar", "match"),
     [
-        (np.ones(1), RADAR, "at least 2 pulses"),
-        (np.ones(9), RADAR | {"prf_hz": 0}, "prf_hz"),
-        (np.ones(9), RADAR | {"carrier_hz": np.nan}, "carrier_hz"),
+        (np.ones(1, complex), RADAR, "at least 2 pulses"),
+        (np.ones(9, complex), RADAR | {"prf_hz": 0}, "prf_hz"),
+        (np.ones(9, complex), RADAR | {"carrier_hz": np.nan}, "carrier_hz"),
+        (np.ones(9), RADAR, "samples must be complex"),
     ],
 )
 def test_impossible_input_is_refused(iq, radar, match):
