@@ -29,14 +29,14 @@ KINDS: dict[str, dict[str, float]] = {
     "uav": {"fixed_wing": 0.25, "quadcopter": 0.3, "hexacopter": 0.15, "octocopter": 0.1, "helicopter": 0.2},
     "bird": {"flapping_bird": 0.6, "gliding_bird": 0.15, "flock": 0.25},
     "clutter": {
-        "noise": 0.18,
-        "ground": 0.09,
-        "rain": 0.09,
-        "sea": 0.1,
-        "person": 0.09,
-        "vehicle": 0.18,
+        "noise": 0.13,
+        "ground": 0.08,
+        "rain": 0.08,
+        "sea": 0.08,
+        "person": 0.11,
+        "vehicle": 0.26,
         "wind_turbine": 0.12,
-        "mover": 0.15,
+        "mover": 0.14,
     },
 }
 

@@ -64,9 +64,13 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
     """Draw a road vehicle that passes: scatterers all over it, each on its own way past the radar, and turning wheels.
 
     From afar it is one line. Beside the road its parts are seen under angles so unlike that it fills all speeds up to
-    its own, and each of them changes as fast as the vehicle passes. Some are not alone in the beam.
+    its own, and each of them changes as fast as the vehicle passes. Its engine shakes it, as rotors shake an airframe:
+    lines beside the body's are no sign of a UAV. Some are not alone in the beam.
     """
     body, passage = _vehicle_body(draws, radar)
+    turns = draws.value("engine_hz")[:, None] * radar.times_s
+    shaken_m = draws.value("engine_m")[:, None] * np.sin(TWO_PI * turns + draws.value("phase_rad")[:, None])
+    body *= range_phasor(shaken_m, radar.wavelength_m)
     other, _ = _vehicle_body(draws, radar)
     level = 10 ** (draws.value("company_db") / 20) * draws.chance(0.3)  # another one in the beam
     body += level.astype(np.float32)[:, None] * other

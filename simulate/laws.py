@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 465 of them.
+#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 468 of them.
 WIDTH = 472
 
 #: What a steady body's acceleration is of a manoeuvring one's. Half of all bodies are steady, whatever they are: if one
@@ -102,7 +102,9 @@ LAWS: dict[str, Law] = {
     "texture_hz": Law("log", 0.2, 2.5, "Hz", "swells and gusts; decorrelation 0.1-1 s"),
     "person_mps": Law("uniform", -2.5, 2.5, "m/s", "walking to running"),
     "gait_hz": Law("uniform", 0.8, 2.2, "Hz", "1-2 Hz"),
-    "vehicle_mps": Law("uniform", 0.5, 42.0, "m/s", "along the road, towns to motorways"),
+    "vehicle_mps": Law("log", 1.5, 42.0, "m/s", "along the road, from a crawl over towns to motorways"),
+    "engine_hz": Law("log", 10.0, 120.0, "Hz", "four-stroke engines fire at 20-30 Hz idling, to 100 Hz driven"),
+    "engine_m": Law("log", 1e-6, 3e-4, "m", "panels shaken by it, micrometres to tenths of a millimetre"),
     "road_acceleration_mps2": Law("uniform", -4.0, 4.0, "m/s^2", "pulling away and braking"),
     "road_m": Law("log", 1.5, 3000.0, "m", "from the verge to far away, where a vehicle is one line"),
     "sight_rad": Law("uniform", np.deg2rad(-85.0), np.deg2rad(85.0), "rad", "line of sight off the square of the road"),

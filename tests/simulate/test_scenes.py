@@ -1,5 +1,7 @@
 """Physics of whole records: what the radar sees of a target is where the target's truth says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bladewing.simulate import Radar
@@ -87,6 +89,21 @@ def test_far_vehicles_are_a_line_and_near_ones_fill_the_speeds_up_to_their_own()
     assert max(abs(mean)) < 44
 
 
+def test_an_engine_shakes_the_whole_vehicle_by_its_displacement(monkeypatch):
+    radar, shaken_m, engine_hz = Radar(24e9, 4e3, 4000), 2e-4, 40.0
+
+    def bodies(**fixed):
+        for name, value in {"company_db": -300.0, "engine_hz": engine_hz, **fixed}.items():
+            monkeypatch.setitem(LAWS, name, replace(LAWS[name], low=value, high=value))
+        return draw_discrete(draws(20, 12), radar, "vehicle").body
+
+    turned = np.angle(bodies(engine_m=shaken_m) / bodies(engine_m=1e-15))  # a law of logarithms has no 0
+    lines = np.fft.fft(turned, axis=-1) * 2 / radar.pulses  # 1 Hz a bin
+    swing_rad = 4 * np.pi / radar.wavelength_m * shaken_m
+    np.testing.assert_allclose(abs(lines[:, round(engine_hz)]), swing_rad, rtol=1e-3)
+    np.testing.assert_allclose(np.mean(turned**2, axis=-1), swing_rad**2 / 2, rtol=1e-2)
+
+
 def test_wheels_abreast_of_the_radar_do_not_move_and_roll_as_far_as_the_vehicle():
     gone = 20.0 * (RADAR.times_s - RADAR.dwell_s / 2)[None, :] * np.ones((30, 1))
     abreast, _ = _wheels(draws(30, 9), RADAR, gone, np.zeros_like(gone))
@@ -123,7 +140,7 @@ def test_steady_and_manoeuvring_bodies_are_as_frequent_in_every_class():
 
 def test_even_spokes_show_only_lines_of_their_own_rate():
     radar = Radar(3e9, 4e3, 4000)
-    target = draw_discrete(draws(1500, 7), radar, "vehicle")
+    target = draw_discrete(draws(3000, 7), radar, "vehicle")
     turn, speed = target.truth["rotation_hz"], abs(target.truth["velocity_mps"])
     unfolded = 2 * speed < 0.9 * radar.unambiguous_mps
     steady = abs(target.truth["acceleration_mps2"]) < 0.2
