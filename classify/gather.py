@@ -76,13 +76,23 @@ class Gathered:
         return cls(inputs, labels, truth)
 
     @classmethod
-    def joined(cls, runs: Sequence[Gathered]) -> Gathered:
-        """Consecutive runs of records as one."""
-        whole = runs[0].like(sum(map(len, runs)))
+    def joined(cls, runs: Iterable[Gathered], count: int) -> Gathered:
+        """Consecutive runs of `count` records together as one: room for all at once, which a list would need twice.
+
+        Raises
+        ------
+        ValueError
+            The runs hold another number of records.
+        """
+        whole: Gathered | None = None
         at = 0
         for run in runs:
+            if whole is None:
+                whole = run.like(count)
             whole.put(at, run)
             at += len(run)
+        if whole is None or at != count:
+            raise ValueError(f"the sources hold {at} records, not {count}")
         return whole
 
     def like(self, count: int) -> Gathered:
@@ -180,18 +190,14 @@ def gather_from(
     ValueError
         The sources hold another number of records.
     """
-    whole: Gathered | None = None
-    at = 0
-    for done in _done(sources, purpose, names, workers, parts):
-        if whole is None:  # all at once: joined at the end, a million records would need their room twice
-            whole = done.like(count)
-        whole.put(at, done)
-        at += len(done)
-        if on_records:
-            on_records(len(done))
-    if whole is None or at != count:
-        raise ValueError(f"the sources hold {at} records, not {count}")
-    return whole
+
+    def told() -> Iterator[Gathered]:
+        for done in _done(sources, purpose, names, workers, parts):
+            yield done
+            if on_records:
+                on_records(len(done))
+
+    return Gathered.joined(told(), count)
 
 
 def _done(
@@ -218,7 +224,9 @@ def _done(
         yield done
         waiting.append(done)
         if number % KEPT_TASKS == 0 or number == len(sources):
-            parts.keep_arrays(_kept_name(purpose, number - len(waiting)), Gathered.joined(waiting).arrays())
+            parts.keep_arrays(
+                _kept_name(purpose, number - len(waiting)), Gathered.joined(waiting, sum(map(len, waiting))).arrays()
+            )
             waiting = []
 
 
@@ -303,4 +311,4 @@ def _inputs_of(names: tuple[str, ...], source: Callable[[], Iterable[Records]]) 
         given = {"carrier_hz": radar.carrier_hz, "prf_hz": radar.prf_hz, "pulses": radar.pulses}
         radars = {name: np.full(len(records), value) for name, value in given.items()}
         runs.append(Gathered(inputs, records.label_indices, records.truth | radars))
-    return Gathered.joined(runs)
+    return Gathered.joined(runs, sum(map(len, runs)))
