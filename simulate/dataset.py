@@ -29,14 +29,14 @@ KINDS: dict[str, dict[str, float]] = {
     "uav": {"fixed_wing": 0.25, "quadcopter": 0.3, "hexacopter": 0.15, "octocopter": 0.1, "helicopter": 0.2},
     "bird": {"flapping_bird": 0.6, "gliding_bird": 0.15, "flock": 0.25},
     "clutter": {
-        "noise": 0.13,
+        "noise": 0.12,
         "ground": 0.08,
         "rain": 0.08,
         "sea": 0.08,
         "person": 0.11,
-        "vehicle": 0.26,
+        "vehicle": 0.28,
         "wind_turbine": 0.12,
-        "mover": 0.14,
+        "mover": 0.13,
     },
 }
 

@@ -101,7 +101,8 @@ def _vehicle_body(draws: Draws, radar: Radar) -> tuple[NDArray[np.complex64], tu
     """
     speed = draws.value("vehicle_mps")
     pull = draws.acceleration_mps2("road_acceleration_mps2", radar.dwell_s)
-    aside, sight = draws.value("road_m"), draws.value("sight_rad")
+    far, verge = draws.value("road_m"), draws.value("verge_m")
+    aside, sight = np.where(draws.chance(0.35), verge, far), draws.value("sight_rad")
     ahead = aside * np.tan(sight)  # at the middle of the dwell
     gone = straight_path(radar.times_s - radar.times_s[radar.pulses // 2], speed, pull)
     length = draws.value("vehicle_length_m")

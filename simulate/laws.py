@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 468 of them.
-WIDTH = 472
+#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 473 of them.
+WIDTH = 474
 
 #: What a steady body's acceleration is of a manoeuvring one's. Half of all bodies are steady, whatever they are: if one
 #: class alone accelerated, a line that bends would be all there is to learn of it.
@@ -107,6 +107,7 @@ LAWS: dict[str, Law] = {
     "engine_m": Law("log", 1e-6, 3e-4, "m", "panels shaken by it, micrometres to tenths of a millimetre"),
     "road_acceleration_mps2": Law("uniform", -4.0, 4.0, "m/s^2", "pulling away and braking"),
     "road_m": Law("log", 1.5, 3000.0, "m", "from the verge to far away, where a vehicle is one line"),
+    "verge_m": Law("log", 1.5, 12.0, "m", "as a radar on the verge sees every vehicle pass"),
     "sight_rad": Law("uniform", np.deg2rad(-85.0), np.deg2rad(85.0), "rad", "line of sight off the square of the road"),
     "vehicle_length_m": Law("log", 1.5, 13.0, "m", "motorcycle to bus"),
     "company_db": Law("uniform", -25.0, -3.0, "dB", "another vehicle in the beam, under the first"),
@@ -132,7 +133,7 @@ LAWS: dict[str, Law] = {
     "high_pass_hz": Law("log", 3.0, 150.0, "Hz", "capacitor-coupled audio front ends; clutter cancellers"),
     "mains_db": Law("uniform", -25.0, 15.0, "dB", "mains lines together over noise"),
     "burst_hz": Law("log", 10.0, 1000.0, "Hz", "ignition, switched supplies, other radars; or the mains' rate"),
-    "burst_share": Law("log", 0.003, 0.3, "1", "share of its period that a burst lasts"),
+    "burst_share": Law("log", 0.0003, 0.3, "1", "share of its period that a burst lasts, from a rectifier's tick"),
     "burst_db": Law("uniform", -25.0, 5.0, "dB", "mean power of the bursts over noise; seen in a measured CW module"),
     "tilt_db": Law("uniform", -25.0, 0.0, "dB", "receiver band edges under its middle"),
     "hump_db": Law("uniform", 0.0, 5.0, "dB", "half the swing of a smooth hump in the receiver's band"),

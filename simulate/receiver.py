@@ -24,7 +24,7 @@ FAULT_CHANCE = {
     "flicker": 0.25,
     "phase_noise": 0.25,
     "mains": 0.25,
-    "bursts": 0.2,
+    "bursts": 0.25,
     "colour": 0.5,
     "image": 0.3,
     "real_only": 0.03,
@@ -79,6 +79,7 @@ class Receiver:
         self.burst_share = draws.value("burst_share")
         self.burst_db = draws.value("burst_db")
         self.burst_phase = draws.value("phase_rad")
+        self.burst_alike = draws.chance(0.5)
 
     def receive(
         self,
@@ -167,12 +168,19 @@ class Receiver:
         return PulseGrid(radar).sines(Sine(amplitude, order * self.mains_hz[rows, None], cosine))
 
     def _bursts(self, radar: Radar, rows: NDArray[np.intp], normals: Normals) -> NDArray[np.complex64]:
-        """Noise that comes and goes at a steady rate: in time like a rotor's flashes, in Doppler like nothing."""
+        """Bursts at a steady rate: in time like a rotor's flashes, in Doppler like nothing, or a comb without an end.
+
+        Some are noise; others are alike and of even strength: a rectifier's ticks. The shortest spoils one pulse.
+        """
         white = normals(2 * radar.pulses).view(np.complex64)
-        turns = self.burst_hz[rows, None] * radar.times_s + self.burst_phase[rows, None] / TWO_PI
-        share = self.burst_share[rows, None]
-        amplitude = np.sqrt(10 ** (self.burst_db[rows, None] / 10) / (2 * share))
-        return white * np.where(turns % 1 < share, amplitude, 0.0).astype(np.float32)
+        period = radar.prf_hz / self.burst_hz[rows, None]  # in pulses
+        since = (self.burst_hz[rows, None] * radar.times_s + self.burst_phase[rows, None] / TWO_PI) % 1 * period
+        lasts = np.clip(self.burst_share[rows, None] * period, 1.0, period)
+        alike = self.burst_alike[rows]
+        shape = white[alike] / np.abs(white[alike])
+        white[alike] = np.sqrt(2) * np.take_along_axis(shape, since[alike].astype(int) % radar.pulses, axis=-1)
+        amplitude = np.sqrt(10 ** (self.burst_db[rows, None] / 10) * period / (2 * lasts))
+        return white * np.where(since < lasts, amplitude, 0.0).astype(np.float32)
 
     def _filter(self, iq: NDArray[np.complex64], radar: Radar) -> None:
         """The band's shape: not flat, falling towards its edges with smooth humps anywhere, and blind at rest.

@@ -236,6 +236,13 @@ def test_the_receivers_parts_do_what_their_values_say():
     assert np.mean(bursts != 0) == pytest.approx(0.05, abs=0.002)
     for gate in bursts != 0:  # 5000 pulses hold 8 periods of 625
         np.testing.assert_array_equal(gate[625:], gate[:-625])
+    ticks = np.array(
+        [empty(effects=["bursts"], values={**values, "burst_share": 0.0003}).render(s).iq for s in range(40)]
+    )
+    assert np.all(np.sum(ticks != 0, axis=-1) == 8)  # however short, each spoils a pulse
+    alike = np.all(np.isclose(ticks[:, 625:], ticks[:, :-625]), axis=-1)
+    assert 8 <= alike.sum() <= 32  # half of 40, by four deviations
+    np.testing.assert_allclose(np.mean(abs(ticks[alike]) ** 2, axis=-1), 10**0.6, rtol=1e-5)
     noise = {"noise": True, "effects": ["converter"], "values": {"adc_bits": 6.0, "full_scale_db": 0.0}}
     coarse = empty(**noise).render(1).iq
     assert len(np.unique(coarse.real)) <= 2**6 + 1

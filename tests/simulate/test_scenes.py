@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bladewing.simulate import Radar
 from bladewing.simulate.bird import draw_bird
-from bladewing.simulate.discretes import _passing, _wheels, draw_discrete
+from bladewing.simulate.discretes import _passing, _vehicle_body, _wheels, draw_discrete
 from bladewing.simulate.laws import LAWS, STEADY, WIDTH, Draws
 from bladewing.simulate.uav import ROTORS, draw_uav
 
@@ -89,6 +89,13 @@ def test_far_vehicles_are_a_line_and_near_ones_fill_the_speeds_up_to_their_own()
     assert max(abs(mean)) < 44
 
 
+def test_half_of_the_roads_pass_within_twelve_metres():
+    count = 3000
+    _, (_, _, _, aside, _, _) = _vehicle_body(draws(count, 3), Radar(9.85e9, 40e3, 64))
+    near = 0.35 + 0.65 * np.log(12 / 1.5) / np.log(3000 / 1.5)  # on the verge, and of those anywhere
+    assert np.mean(aside < 12) == pytest.approx(near, abs=4 * np.sqrt(near * (1 - near) / count))
+
+
 def test_an_engine_shakes_the_whole_vehicle_by_its_displacement(monkeypatch):
     radar, shaken_m, engine_hz = Radar(24e9, 4e3, 4000), 2e-4, 40.0
 
@@ -140,7 +147,7 @@ def test_steady_and_manoeuvring_bodies_are_as_frequent_in_every_class():
 
 def test_even_spokes_show_only_lines_of_their_own_rate():
     radar = Radar(3e9, 4e3, 4000)
-    target = draw_discrete(draws(3000, 7), radar, "vehicle")
+    target = draw_discrete(draws(4000, 7), radar, "vehicle")
     turn, speed = target.truth["rotation_hz"], abs(target.truth["velocity_mps"])
     unfolded = 2 * speed < 0.9 * radar.unambiguous_mps
     steady = abs(target.truth["acceleration_mps2"]) < 0.2
@@ -152,7 +159,7 @@ def test_even_spokes_show_only_lines_of_their_own_rate():
         turns = (frequency_hz + 2 * target.truth["velocity_mps"][row] / radar.wavelength_m) / turn[row]
         combs = [abs(turns - n * np.rint(turns / n)) * turn[row] < 7 for n in range(2, 11)]
         shares.append(max(power[row, comb].sum() for comb in combs) / power[row].sum())
-    assert len(chosen) > 30
+    assert len(chosen) > 30, "too few to tell"
     # half of those that have two spokes or more
     assert 0.15 < np.mean(np.array(shares) > 0.98) < 0.75
 
