@@ -157,7 +157,7 @@ def _read_mat(path: Path, variable: str | None) -> dict[str, NDArray[np.generic]
     try:
         with open(path, "rb") as file:
             if file.read(len(_HDF5)) == _HDF5:  # without the head that MATLAB writes before it
-                raise NotImplementedError
+                raise _hdf5(path)
         if scipy.io.matlab.matfile_version(path)[0] == 1:
             require_sound(path)
         with warnings.catch_warnings():
@@ -171,9 +171,13 @@ def _read_mat(path: Path, variable: str | None) -> dict[str, NDArray[np.generic]
     except (BadInput, OSError):
         raise
     except NotImplementedError:
-        raise BadInput(f"{path}: a MATLAB 7.3 file (HDF5): save it with version 7: save(name, 'iq', '-v7')") from None
+        raise _hdf5(path) from None
     except Exception as error:  # a damaged file makes scipy raise nearly anything
         raise BadInput(_damaged(path, error)) from None
+
+
+def _hdf5(path: Path) -> BadInput:
+    return BadInput(f"{path}: a MATLAB 7.3 file (HDF5): save it with version 7: save(name, 'iq', '-v7')")
 
 
 def _choose(arrays: Mapping[str, NDArray[np.generic]], variable: str | None, path: Path) -> NDArray[np.generic]:

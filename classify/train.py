@@ -121,7 +121,7 @@ def run_training(
         "format": 1,
         "settings": settings.model_dump(mode="json"),
         "records": settings.sets,
-        "resumed": resumed,  # then the seconds leave out what was done before the interruption
+        "resumed": resumed,  # then these seconds leave out what was done before the interruption; the models' do not
         "seconds": {"gather": round(gathered_s, 1), "all": round(time.perf_counter() - started, 1)},
         "false_alarm": settings.false_alarm,
         "models": models,
@@ -314,6 +314,7 @@ def _network(
         "device": result.device,
         "best_epoch": result.best_epoch,
         "stopped_early": result.stopped_early,
+        "seconds": round(result.seconds, 1),  # of all its epochs, those before an interruption too
         "epochs": [
             {key: float(f"{value:.3g}") if key == "learning_rate" else round(value, 4) for key, value in epoch.items()}
             for epoch in result.epochs

@@ -172,6 +172,17 @@ def test_a_killed_and_interrupted_training_goes_on_to_the_same_files(whole, tmp_
     assert [[epoch[name] for name in figures] for epoch in first] == [[e[name] for name in figures] for e in second]
 
 
+def test_a_resumed_networks_seconds_hold_those_before_the_interruption(tmp_path):
+    with pytest.raises(KeyboardInterrupt):
+        _run(tmp_path, after=2, then=_interrupt)
+    (file,) = tmp_path.glob("train-parts/*/spectrum-cnn-epochs.npz")
+    with np.load(file) as kept:
+        arrays = dict(kept)
+    arrays["history/seconds"] += 1000
+    np.savez(file, **arrays)
+    assert _run(tmp_path)["models"]["spectrum-cnn"]["seconds"] > 1000
+
+
 def test_other_settings_do_not_take_what_was_kept(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         _run(tmp_path, after=2, then=_interrupt, seed=1)
