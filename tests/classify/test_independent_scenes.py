@@ -76,13 +76,13 @@ def test_ground_falls_as_billingsley_says():
     assert np.log(total[near].mean() / total[far].mean()) / 0.7 == pytest.approx(5.56, rel=0.1)
 
 
-@pytest.mark.parametrize(("kind", "least"), [("quadcopter", 0.8), ("hexacopter", 0.75), ("fixed_wing", 0.78)])
+@pytest.mark.parametrize(("kind", "least"), [("quadcopter", 0.8), ("hexacopter", 0.7), ("fixed_wing", 0.78)])
 def test_a_drone_is_a_uav_at_20_db(kind, least):
     assert share(kind, "uav") >= least
 
 
 def test_a_helicopter_is_a_uav_at_20_db():
-    assert share("helicopter", "uav") >= 0.75
+    assert share("helicopter", "uav") >= 0.7
 
 
 def test_a_drone_without_evidence_is_unknown_not_something_else():
@@ -92,11 +92,11 @@ def test_a_drone_without_evidence_is_unknown_not_something_else():
 
 
 def test_blades_as_strong_as_the_noise_are_seen():
-    assert share("quadcopter", "uav", 0.0, "micro") >= 0.7
+    assert share("quadcopter", "uav", 0.0, "micro") >= 0.6
 
 
 def test_a_flapping_bird_is_a_bird():
-    assert share("flapping_bird", "bird") >= 0.85
+    assert share("flapping_bird", "bird") >= 0.95
 
 
 @pytest.mark.parametrize("kind", ["flapping_bird", "gliding_bird", "flock", "ground", "rain", "sea", "person", "noise"])
@@ -105,7 +105,7 @@ def test_what_has_no_rotor_is_no_uav(kind):
     assert share(kind, "uav", 10.0) <= 0.075
 
 
-@pytest.mark.parametrize(("kind", "most"), [("vehicle", 0.125), ("wind_turbine", 0.1)])
+@pytest.mark.parametrize(("kind", "most"), [("vehicle", 0.08), ("wind_turbine", 0.1)])
 def test_what_turns_but_does_not_fly_is_no_uav(kind, most):
     assert share(kind, "uav") <= most
 
