@@ -49,7 +49,8 @@ class SteadyComb:
 def steady_comb(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float) -> SteadyComb:
     """Seek one comb in several dwells of each recording.
 
-    On simulated tracks of 2.5 s it is found in 0.56 of UAVs of every SNR and in 0.008 of birds and clutter.
+    On simulated tracks of 2.5 s at 0 dB and above it is found in 0.68 of UAVs and in 0.02 of birds and clutter, whose
+    receivers tick.
 
     Parameters
     ----------
