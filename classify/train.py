@@ -217,7 +217,7 @@ def train_one(
         "accept": [float(limit) for limit in accept],
         "export_difference": difference,
         "seconds": round(time.perf_counter() - started, 1),
-        **detail,
+        **detail,  # a network's own seconds replace these: it may have begun before an interruption
     }
     metadata = {
         "product": "bladewing",

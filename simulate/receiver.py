@@ -173,11 +173,12 @@ class Receiver:
         Some are noise; others are alike and of even strength: a rectifier's ticks. The shortest spoils one pulse.
         """
         white = normals(2 * radar.pulses).view(np.complex64)
-        period = radar.prf_hz / self.burst_hz[rows, None]  # in pulses
-        since = (self.burst_hz[rows, None] * radar.times_s + self.burst_phase[rows, None] / TWO_PI) % 1 * period
+        rate_hz = self.burst_hz[rows, None]
+        period = radar.prf_hz / rate_hz  # in pulses, as what follows
+        since = (rate_hz * radar.times_s + self.burst_phase[rows, None] / TWO_PI) % 1 * period
         lasts = np.clip(self.burst_share[rows, None] * period, 1.0, period)
         alike = self.burst_alike[rows]
-        shape = white[alike] / np.abs(white[alike])
+        shape = white[alike] / np.abs(white[alike])  # one for all bursts of a record
         white[alike] = np.sqrt(2) * np.take_along_axis(shape, since[alike].astype(int) % radar.pulses, axis=-1)
         amplitude = np.sqrt(10 ** (self.burst_db[rows, None] / 10) * period / (2 * lasts))
         return white * np.where(since < lasts, amplitude, 0.0).astype(np.float32)
