@@ -73,13 +73,14 @@ class Receiver:
         self.full_scale_db = draws.value("full_scale_db")
         self.bits = np.rint(draws.value("adc_bits"))
         self.gain_db = draws.value("gain_db")
-        # a rectifier's bursts come once or twice a period of the mains, others at any rate
         periods = np.where(draws.chance(0.7), 2.0, 1.0)
-        self.burst_hz = np.where(draws.chance(0.5), periods * self.mains_hz, draws.value("burst_hz"))
+        of_mains, any_hz = draws.chance(0.5), draws.value("burst_hz")
         self.burst_share = draws.value("burst_share")
         self.burst_db = draws.value("burst_db")
         self.burst_phase = draws.value("phase_rad")
         self.burst_alike = draws.chance(0.5)
+        # a rectifier ticks, alike once or twice a period of the mains; what bursts at any other rate is noise
+        self.burst_hz = np.where(of_mains | self.burst_alike, periods * self.mains_hz, any_hz)
 
     def receive(
         self,

@@ -89,7 +89,7 @@ class Reception:
         self.drawn.gain_db = np.zeros(1)
         if part.mains_hz is not None:
             self.drawn.mains_hz = np.array([part.mains_hz])
-        if "burst_hz" in part.values:  # in training records every other receiver's bursts come at its mains' rate
+        if "burst_hz" in part.values:  # in training records most bursts come at their receiver's mains' rate
             self.drawn.burst_hz = np.array([part.values["burst_hz"]])
         #: Names of the effects that are on; "dc" is the offset.
         self.effects = {name for name in part.effects if name not in scene.off}

@@ -6,6 +6,7 @@ from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.bird import wing_size, wingbeat_hz
 from bladewing.simulate.dataset import QUIET
 from bladewing.simulate.laws import LAWS, Draws
+from bladewing.simulate.receiver import Receiver
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -66,3 +67,18 @@ def test_box_and_muller_give_normal_numbers():
     values = np.sort(Draws(np.random.default_rng(1).random((20_000, 2))).normal())
     assert values.mean() == pytest.approx(0, abs=4.5 / np.sqrt(20_000))
     assert values.var() == pytest.approx(1, abs=4.5 * np.sqrt(2 / 20_000))
+
+
+@settings(max_examples=5)
+@given(seed=st.integers(0, 2**32))
+def test_what_ticks_keeps_the_time_of_its_mains_and_a_quarter_of_all_bursts_come_at_any_other_rate(seed):
+    drawn = Receiver(Draws(np.random.default_rng(seed).random((4000, 200))))
+    periods = drawn.burst_hz / drawn.mains_hz
+    steady = np.isin(periods.round(12), [1.0, 2.0])
+    assert steady[drawn.burst_alike].all()
+    assert abs(drawn.burst_alike.sum() - 2000) < 5 * np.sqrt(1000)
+    assert abs((~steady).sum() - 1000) < 5 * np.sqrt(750)
+    once = periods.round(12)[steady] == 1.0
+    assert abs(once.mean() - 0.3) < 5 * np.sqrt(0.21 / len(once))
+    values = np.sort(drawn.burst_hz[~steady])
+    assert distance(values, distribution(LAWS["burst_hz"], values)) < 3
