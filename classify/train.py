@@ -21,14 +21,14 @@ from .envelope import Envelope
 from .errors import BadInput
 from .files import result_folder, write_together
 from .gather import Gathered, gather, gather_from
-from .inference import COVERAGES, CURVE_KEY, SETS_KEY
+from .inference import COVERAGES, CURVE_KEY, SETS_KEY, Classifier
 from .labels import CLASSES
 from .ladder import CASCADE
 from .parts import Parts
 from .progress import Progress
 from .training_account import ACCOUNT, alarm_threshold, covered, figures, print_table
 from .training_config import TrainingConfig, training_config
-from .training_costs import add_costs
+from .training_costs import add_costs, answers
 
 #: Folder of what is trained so far, beside the models while the run is not done.
 PARTS = "train-parts"
@@ -113,9 +113,12 @@ def run_training(
         gathered_s = time.perf_counter() - started
         files: dict[str, bytes] = {}
         models: dict[str, dict[str, Any]] = {}
-        for name in settings.models:
+        teachers_first = sorted(settings.models, key=lambda name: bool(LADDER[name].teacher))
+        for name in teachers_first:
+            teacher = files.get(f"{LADDER[name].teacher}.onnx")
             with bars.phase(f"train {name}", 1) as on_fraction:
-                files[f"{name}.onnx"], models[name] = _take_or_train(name, settings, sets, on_fraction, parts)
+                files[f"{name}.onnx"], models[name] = _take_or_train(name, settings, sets, on_fraction, parts, teacher)
+        models = {name: models[name] for name in settings.models}
     cascade = add_costs(files, models, sets.test, settings.false_alarm)
     account = {
         "format": 1,
@@ -161,7 +164,7 @@ def _epochs_of(name: str) -> str:
 
 
 def _take_or_train(
-    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction, parts: Parts
+    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction, parts: Parts, teacher: bytes | None
 ) -> tuple[bytes, dict[str, Any]]:
     """Give a model as it was finished before an interruption, or train and keep it."""
     kept = parts.arrays(name)
@@ -170,16 +173,24 @@ def _take_or_train(
             return kept["model"].tobytes(), json.loads(kept["account"].tobytes())
         except (KeyError, ValueError) as error:
             raise parts.refusal(name, str(error)) from None
-    content, account = train_one(name, settings, sets, on_fraction, parts)
+    content, account = train_one(name, settings, sets, on_fraction, parts, teacher)
     text = json.dumps(account, allow_nan=False).encode()
     parts.keep_arrays(name, {"model": np.frombuffer(content, np.uint8), "account": np.frombuffer(text, np.uint8)})
     return content, account
 
 
 def train_one(
-    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction, parts: Parts | None = None
+    name: str,
+    settings: TrainingConfig,
+    sets: Sets,
+    on_fraction: OnFraction,
+    parts: Parts | None = None,
+    teacher: bytes | None = None,
 ) -> tuple[bytes, dict[str, Any]]:
-    """Train, calibrate, export and compare one model; give its sealed file and its account."""
+    """Train, calibrate, export and compare one model; give its sealed file and its account.
+
+    A network learns from the answers of its teacher too, where that one's sealed file is given.
+    """
     from bladewing.models.calibration import (
         acceptance_thresholds,
         conformal_thresholds,
@@ -192,7 +203,7 @@ def train_one(
 
     started = time.perf_counter()
     network = LADDER[name].learner == "network"
-    scores_of, export, detail = (partial(_network, parts=parts) if network else _tabular)(
+    scores_of, export, detail = (partial(_network, parts=parts, teacher=teacher) if network else _tabular)(
         name, settings, sets, on_fraction
     )
     calibration = fit_vector_scaling(scores_of(sets.calibrate), sets.calibrate.labels)
@@ -267,7 +278,12 @@ def _tabular(
 
 
 def _network(
-    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction, parts: Parts | None
+    name: str,
+    settings: TrainingConfig,
+    sets: Sets,
+    on_fraction: OnFraction,
+    parts: Parts | None,
+    teacher: bytes | None = None,
 ) -> tuple[ScoresOf, Callable[[Any], bytes], dict[str, Any]]:
     from bladewing.models.augment import VelocityMirror
     from bladewing.models.cnn import EvidenceNet, ImageNet, SpectrumNet
@@ -287,6 +303,7 @@ def _network(
     def inputs(part: Gathered) -> dict[str, NDArray]:
         return {key: part.inputs[key] for key in shapes}
 
+    taught = None if teacher is None else answers(Classifier(teacher, source=LADDER[name].teacher), sets.train)
     snapshot = parts.arrays(_epochs_of(name)) if parts else None
     try:
         result = train_network(
@@ -302,6 +319,7 @@ def _network(
             weight_decay=settings.weight_decay,
             # no measurement is signed, so only the picture is mirrored
             augment=VelocityMirror(axes={signal: -2 if image else -1}, odd={}),
+            teacher=taught,
             snapshot=snapshot,
             on_snapshot=partial(parts.keep_arrays, _epochs_of(name)) if parts else None,
             on_epoch=lambda epoch, epochs, _: on_fraction(epoch / epochs),
@@ -312,6 +330,7 @@ def _network(
     net.compact()
     detail = {
         "device": result.device,
+        "teacher": LADDER[name].teacher if teacher else "",
         "best_epoch": result.best_epoch,
         "stopped_early": result.stopped_early,
         "seconds": round(result.seconds, 1),  # of all its epochs, those before an interruption too

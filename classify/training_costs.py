@@ -49,7 +49,7 @@ def add_costs(
         return None
     first, second = ((files[f"{name}.onnx"], name) for name in stages)
     cascade = Cascade(first, second)
-    cheap, dear = (_probabilities(classifiers[name], test) for name in stages)
+    cheap, dear = (answers(classifiers[name], test) for name in stages)
     sure = cascade.sure(cheap)
     probabilities = np.where(sure[:, None], cheap, dear)
     return {
@@ -88,8 +88,8 @@ def costs_ffts(classifiers: Mapping[str, Classifier]) -> dict[str, float]:
     return {name: median / bare for name, median in medians.items()}
 
 
-def _probabilities(classifier: Classifier, records: Gathered) -> NDArray[np.float32]:
-    """Probabilities of many records, a bounded number at a time."""
+def answers(classifier: Classifier, records: Gathered) -> NDArray[np.float32]:
+    """Give the probabilities of many records, shape (n, 3), from a bounded number at a time."""
     parts = [
         classifier.from_inputs(
             {name: records.inputs[name][first : first + _ROWS].astype(np.float32) for name in classifier.inputs}

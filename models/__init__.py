@@ -35,21 +35,24 @@ class Rung:
         Names of what it reads; a network's signal first.
     widen
         Factor on the channels of a network.
+    teacher
+        Network whose answers it learns from besides the labels, where that is trained in the same run; "": none.
     """
 
     learner: Literal["linear", "boosted", "network"]
     inputs: tuple[str, ...]
     widen: float = 1.0
+    teacher: str = ""
 
 
 LADDER: dict[str, Rung] = {
     "features-linear": Rung("linear", ("features",)),
     "features-boosted": Rung("boosted", ("features",)),
-    "spectrum-cnn-fast": Rung("network", ("levels", "cadence")),
-    "spectrum-cnn": Rung("network", ("spectrum", "cadence", "features")),
+    "spectrum-cnn-fast": Rung("network", ("levels", "cadence"), teacher="spectrum-cnn-wide"),
+    "spectrum-cnn": Rung("network", ("spectrum", "cadence", "features"), teacher="spectrum-cnn-wide"),
     "spectrum-cnn-wide": Rung("network", ("spectrum", "cadence", "features"), widen=2),
     "joint-boosted": Rung("boosted", ("joint_features",)),
-    "image-cnn": Rung("network", ("image", "joint_features")),
+    "image-cnn": Rung("network", ("image", "joint_features"), teacher="spectrum-cnn-wide"),
 }
 """Name of a model (the stem of its file) to what it is."""
 

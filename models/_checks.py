@@ -98,3 +98,28 @@ def require_every_class(y: NDArray[np.integer], name: str) -> None:
     counts = np.bincount(y, minlength=CLASS_COUNT)
     if counts.min() < 2:
         raise ValueError(f"{name} has {counts.tolist()} records of uav, bird, clutter; each needs 2: give more records")
+
+
+def require_shares(values: NDArray[np.floating], count: int, name: str) -> None:
+    """Refuse probabilities that are not one of each class a record.
+
+    Parameters
+    ----------
+    values
+        Array that should have the shape (n, 3), its rows 1 in sum.
+    count
+        Number of records n.
+    name
+        What the array is called in the message.
+
+    Raises
+    ------
+    ValueError
+        Where the shape or a value is wrong.
+    """
+    if values.shape != (count, CLASS_COUNT):
+        raise ValueError(f"{name} has shape {values.shape}; it must be ({count}, {CLASS_COUNT}), one row a record")
+    require_finite(values, name)
+    off = np.flatnonzero((values.min(axis=1, initial=0) < 0) | (np.abs(values.sum(axis=1) - 1) > 1e-3))
+    if len(off):
+        raise ValueError(f"{name}[{off[0]}] is {values[off[0]].tolist()}; each row must be shares of 1")

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from ._checks import require_every_class, require_labels
+from ._checks import CLASS_COUNT, require_every_class, require_labels, require_shares
 from .cnn import EvidenceNet
 from .training_state import Snapshot, Work
 
@@ -24,6 +24,9 @@ OnEpoch = Callable[[int, int, dict[str, float]], None]
 
 OnSnapshot = Callable[[Snapshot], None]
 """Called with the state after an epoch; the arrays are copies."""
+
+TAUGHT = 0.75
+"""Share of a teacher's answer in what a network is to say, beside the label."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,7 @@ def train_network(
     label_smoothing: float = 0.02,
     device: str = "auto",
     augment: Augment | None = None,
+    teacher: NDArray[np.floating] | None = None,
     patience: int = 0,
     snapshot: Snapshot | None = None,
     on_snapshot: OnSnapshot | None = None,
@@ -103,6 +107,10 @@ def train_network(
         "auto" (a GPU where there is one), or any that torch knows: "cpu", "cuda", ...
     augment
         Changes each training batch.
+    teacher
+        Probabilities that a better network gives the training records, shape (n, 3), of which the target takes the
+        share `TAUGHT`. A label is one draw from what a record leaves open and its teacher's answer near the mean of
+        them, so that a step errs less (Hinton, Vinyals and Dean, arXiv:1503.02531).
     patience
         Epochs in a row without a lower validation loss after which the training stops; 0: never. The schedule is laid
         out for all epochs: one that stops early has not seen its end.
@@ -131,6 +139,8 @@ def train_network(
     require_labels(y, count, "y")
     require_every_class(y, "y")
     require_labels(validation[1], net.require(validation[0]), "validation labels")
+    if teacher is not None:
+        require_shares(teacher, count, "teacher")
     if epochs < 1 or batch < 2 or patience < 0:
         raise ValueError(f"epochs is {epochs}, batch {batch}, patience {patience}; they must be at least 1, 2 and 0")
     started = time.perf_counter()
@@ -142,6 +152,9 @@ def train_network(
     net.to(place, memory_format=torch.channels_last)  # type: ignore[call-overload]
     tensors = {name: _tensor(inputs[name]).to(place) for name in net.input_shapes}
     truth = torch.as_tensor(y, dtype=torch.int64).to(place)
+    if teacher is not None:
+        said = torch.as_tensor(teacher, dtype=torch.float32).to(place)
+        truth = TAUGHT * said + (1 - TAUGHT) * nn.functional.one_hot(truth, CLASS_COUNT)
     optimiser = torch.optim.AdamW(net.parameters(), lr=learning_rate, weight_decay=weight_decay)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, learning_rate, total_steps=epochs * steps, pct_start=0.2)
     criterion = nn.CrossEntropyLoss(label_smoothing=label_smoothing)

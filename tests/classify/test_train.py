@@ -172,6 +172,29 @@ def test_a_killed_and_interrupted_training_goes_on_to_the_same_files(whole, tmp_
     assert [[epoch[name] for name in figures] for epoch in first] == [[e[name] for name in figures] for e in second]
 
 
+def test_a_pupil_learns_from_its_teacher_after_it_and_an_interruption_changes_nothing(whole, tmp_path):
+    names = ("spectrum-cnn", "spectrum-cnn-wide")
+    for out in (tmp_path / "straight", tmp_path / "interrupted"):
+        out.mkdir()
+    straight = _run(tmp_path / "straight", models=names)["models"]
+    assert list(straight) == list(names)
+    assert [straight[name]["teacher"] for name in names] == ["spectrum-cnn-wide", ""]
+    taught = (tmp_path / "straight" / "spectrum-cnn.onnx").read_bytes()
+    assert taught != (whole / "spectrum-cnn.onnx").read_bytes()
+
+    def once_the_teacher_is_done():
+        if list((tmp_path / "interrupted").glob("train-parts/*/spectrum-cnn-epochs.npz")):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        _run(tmp_path / "interrupted", after=2, then=once_the_teacher_is_done, models=names)
+    assert list((tmp_path / "interrupted").glob("train-parts/*/spectrum-cnn-wide.npz"))
+    _run(tmp_path / "interrupted", models=names)
+    for name in names:
+        files = [tmp_path / kind / f"{name}.onnx" for kind in ("straight", "interrupted")]
+        assert files[0].read_bytes() == files[1].read_bytes(), name
+
+
 def test_a_resumed_networks_seconds_hold_those_before_the_interruption(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         _run(tmp_path, after=2, then=_interrupt)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 from bladewing.models.augment import VelocityMirror
+from bladewing.models.calibration import softmax
 from bladewing.models.cnn import ImageNet, SpectrumNet, Standardise
 from bladewing.models.tabular import tabular_scores, train_boosted, train_linear
 from bladewing.models.training import network_scores, train_network
@@ -89,6 +90,23 @@ def test_a_net_learns_what_its_measurements_tell():
     net = SpectrumNet(SHAPES, seed=0)
     train_network(net, inputs, y, (inputs, y), seed=0, epochs=4, batch=64)
     assert (network_scores(net, inputs).argmax(axis=1) == y).mean() > 0.9
+
+
+def test_a_teacher_that_knows_what_a_record_leaves_open_makes_up_for_labels_that_err():
+    inputs, truth = _spectra(400, 1)
+    rng = np.random.default_rng(4)
+    shares = np.full((400, 3), 0.25)
+    shares[np.arange(400), truth] = 0.5
+    drawn = (rng.random(400)[:, None] > shares.cumsum(axis=1)[:, :2]).sum(axis=1)
+    fresh, labels = _spectra(300, 3)
+    off = []
+    for teacher in (None, shares):
+        net = SpectrumNet(SHAPES, seed=0)
+        options = {"seed": 0, "epochs": 8, "batch": 64, "label_smoothing": 0.0, "teacher": teacher}
+        train_network(net, inputs, drawn, (fresh, labels), **options)
+        found = softmax(network_scores(net, fresh))
+        off.append(np.abs(found[np.arange(300), labels] - 0.5).mean())
+    assert off[1] < 0.7 * off[0]
 
 
 def test_training_is_the_same_to_the_bit_for_a_seed_and_differs_for_another():
@@ -360,6 +378,10 @@ def _refuse_network(change):
         (lambda x, y: {"y": y % 2}, "each needs 2"),
         (lambda x, y: {"validation": (x, y + 1)}, "validation labels holds the label 3"),
         (lambda x, y: {"epochs": 0}, "epochs is 0"),
+        (lambda x, y: {"teacher": np.full((59, 3), 1 / 3)}, r"teacher has shape \(59, 3\); it must be \(60, 3\)"),
+        (lambda x, y: {"teacher": np.full((60, 3), np.nan)}, r"teacher\[0, 0\] is nan"),
+        (lambda x, y: {"teacher": np.full((60, 3), 0.5)}, r"teacher\[0\] is \[0.5, 0.5, 0.5\]"),
+        (lambda x, y: {"teacher": np.tile([1.5, -0.5, 0.0], (60, 1))}, r"teacher\[0\] is \[1.5, -0.5, 0.0\]"),
     ],
 )
 def test_bad_input_of_a_network_is_named(change, message):
