@@ -52,12 +52,11 @@ class Cascade(Classifier):
         threads: int = 1,
         max_false_alarm: float | None = None,
     ) -> None:
-        half = None if max_false_alarm is None else max_false_alarm / 2
-        super().__init__(second[0], source=second[1], threads=threads, max_false_alarm=half)
-        self.first = Classifier(first[0], source=first[1], threads=threads, max_false_alarm=half)
-        if self.operating_point is not None and self.first.operating_point is not None:
-            both = self.operating_point.false_alarm + self.first.operating_point.false_alarm
-            self.operating_point = replace(self.operating_point, false_alarm=both)
+        super().__init__(second[0], source=second[1], threads=threads)
+        self.first = Classifier(first[0], source=first[1], threads=threads)
+        if max_false_alarm is not None:
+            first, own = (model._keep_to(max_false_alarm, CASCADE, models=2) for model in (self.first, self))
+            self.operating_point = replace(own, false_alarm=own.false_alarm + first.false_alarm)
 
     @classmethod
     def of_shipped(

@@ -328,8 +328,10 @@ def tables(
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Root of the scenes' noise.")] = 0,
 ) -> None:
     """Make the paper's tables again: its theory and measurements beside those of this product."""
+    from .files import result_folder
     from .tables import markdown, run_tables
 
+    result_folder(out)
     print(markdown(run_tables(out, seed)), flush=True)
 
 

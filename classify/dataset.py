@@ -9,7 +9,7 @@ import hashlib
 import json
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from functools import lru_cache, partial
 from importlib.metadata import version
@@ -174,6 +174,7 @@ def write_dataset(folder: Path, plan: Plan, bars: Progress, *, workers: int | No
         contents = _begun(folder, plan, bars)
         missing = [shard for shard in plan.shards() if shard.name not in contents]
         _require_room(folder, plan, missing)
+        _write_manifest(folder, plan, contents)
         if missing:
             total, done = sum(shard.records for shard in missing), 0
             with bars.phase(f"write {total} records", total) as on_done:
@@ -193,6 +194,7 @@ def _draw(folder: Path, seed: int, shard: Shard) -> Contents:
 @contextmanager
 def _writable(folder: Path) -> Iterator[None]:
     """Have a folder to oneself; faults of the disk become errors of one line."""
+    made = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with only_writer(folder, wait=False):
@@ -203,10 +205,14 @@ def _writable(folder: Path) -> Iterator[None]:
         raise BadInput(
             f"{folder}: cannot be written: {error.strerror or error}: what is whole stays; the same command goes on"
         ) from None
+    finally:
+        if made:
+            with suppress(OSError):  # it stays once anything is in it
+                folder.rmdir()
 
 
 def _begun(folder: Path, plan: Plan, bars: Progress) -> dict[str, Contents]:
-    """The shards that an earlier run left whole; begins the data set where there is none."""
+    """The shards that an earlier run left whole."""
     manifest = _read_manifest(folder)
     if manifest is None:
         if any(not path.name.startswith(".bladewing-") for path in folder.iterdir()):
@@ -228,7 +234,6 @@ def _begun(folder: Path, plan: Plan, bars: Progress) -> dict[str, Contents]:
                 if not intact(folder, name, listed):
                     del contents[name]
                 on_done(number + 1)
-    _write_manifest(folder, plan, contents)
     return contents
 
 

@@ -47,10 +47,10 @@ def export_raw_iq(
     Parameters
     ----------
     out
-        The file to write. Its graph reads "iq", float32 of shape (batch, pulses, 2), I and Q at any gain, and gives
-        "probabilities", float32 (batch, 3) in the order uav, bird, clutter, and "label", int64 (batch,): the place in
-        (uav, bird, clutter, unknown). A record without signal, or with a sample that is not finite, is unknown with
-        probabilities of 1/3.
+        The file to write. Its graph reads "iq", float32 of shape (batch, pulses, 2), batch 1 or more, I and Q at any
+        gain, and gives "probabilities", float32 (batch, 3) in the order uav, bird, clutter, and "label", int64
+        (batch,): the place in (uav, bird, clutter, unknown). A record without signal, or with a sample that is not
+        finite, is unknown with probabilities of 1/3.
     carrier_hz, prf_hz
         Carrier and pulse repetition frequency [Hz] that it is made for.
     pulses

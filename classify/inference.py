@@ -211,8 +211,7 @@ class Classifier:
         self.inputs = _read_inputs(self._session, source)
         self.operating_point = None
         if max_false_alarm is not None:
-            self.operating_point = _operating_point(self.metadata, max_false_alarm, source)
-            self.accept = (self.operating_point.threshold, *self.accept[1:])
+            self._keep_to(max_false_alarm, source)
         self.coverage = coverage
         if coverage is not None:
             self._sets_hold = _prediction_sets(self.metadata, coverage, source)
@@ -247,13 +246,20 @@ class Classifier:
         BadInput
             There is no such model, or it is not one that can be used (see `Classifier`).
         """
-        name = chosen_name(name_or_path, budget_us)
+        # a budget alone never leads to the cascade where it could not answer
+        name = chosen_name(name_or_path, budget_us, single=budget_us is not None and coverage is not None)
         if name == CASCADE:
             from .cascade import Cascade
 
             return Cascade.of_shipped(threads, max_false_alarm=max_false_alarm, coverage=coverage)
         content, source = read_model(name)
         return cls(content, source=source, threads=threads, max_false_alarm=max_false_alarm, coverage=coverage)
+
+    def _keep_to(self, max_false_alarm: float, source: str, models: int = 1) -> OperatingPoint:
+        """Choose the threshold on "uav" for a false-alarm rate that so many models share."""
+        self.operating_point = point = _operating_point(self.metadata, max_false_alarm, source, models)
+        self.accept = (point.threshold, *self.accept[1:])
+        return point
 
     def decide(self, probabilities: NDArray[np.floating]) -> tuple[NDArray[np.str_], list[str]]:
         """Name a class or say "unknown", and why, by the rule that this classifier was loaded with.
@@ -406,12 +412,12 @@ def _read_metadata(metadata: Mapping[str, str], source: str) -> tuple[Envelope, 
     return envelope, (uav, bird, clutter)
 
 
-def _operating_point(metadata: Mapping[str, str], max_false_alarm: float, source: str) -> OperatingPoint:
-    """The point of the model's curve that keeps to a false-alarm rate."""
+def _operating_point(metadata: Mapping[str, str], max_false_alarm: float, source: str, models: int) -> OperatingPoint:
+    """The point of the model's curve that keeps to its part of a false-alarm rate."""
     if CURVE_KEY not in metadata:
         raise BadInput(f"{source}: holds no operating curve, so no false-alarm rate can be chosen: train it again")
     try:
-        return OperatingCurve.from_json(metadata[CURVE_KEY]).at(max_false_alarm)
+        return OperatingCurve.from_json(metadata[CURVE_KEY]).at(max_false_alarm, models)
     except ValueError as error:
         raise BadInput(f"{source}: {error}") from None
 

@@ -40,8 +40,8 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
     level = spectrum.level_db
     frequency = spectrum.frequency_hz
     low, high = float(frequency[0]), float(frequency[-1])
-    top_db = 10 * np.ceil(float(level.max()) / 10 + 0.2)
     bottom_db = -10.0
+    top_db = max(10 * np.ceil(float(level.max()) / 10 + 0.2), bottom_db + 20)  # of silence too
 
     def x(hz: float) -> float:
         return _LEFT + (hz - low) / (high - low) * (_WIDTH - _LEFT - 12)

@@ -5,6 +5,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .errors import BadInput
 from .files import write_together
 
@@ -37,11 +39,13 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
     Raises
     ------
     BadInput
-        The folder is missing, or cannot be written to.
+        The folder is missing or cannot be written to, or a sample is not finite.
     """
     name = stem.name.removesuffix(".sigmf-meta").removesuffix(".sigmf-data")
-    if not name:
+    if not name or name == "..":
         raise BadInput(f"{stem}: no name for the recording: give --out NAME")
+    if not np.isfinite(rendering.iq).all():
+        raise BadInput(f"{stem}: the scene's samples exceed what complex64 holds: lower its levels")
     data = rendering.iq.astype("<c8").tobytes()
     meta = metadata(rendering, scene, seed, hashlib.sha512(data).hexdigest())
     text = json.dumps(meta, indent=2, allow_nan=False) + "\n"

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from sigmf import SigMFFile
 
 _META, _DATA = ".sigmf-meta", ".sigmf-data"
+_MOST_COUNT = 1 << 63
 _ARCHIVES = (".sigmf", ".sigmf.gz", ".sigmf.xz", ".sigmf.zip")
 _DATATYPE = re.compile(r"([cr])(?!f8|f16)([fiu])(8|16|32|64)(_le|_be)?")
 
@@ -215,8 +216,10 @@ def _check_structure(metadata: Any, path: Path) -> None:
 
 def _count(entry: dict[str, Any], field: str, where: str, absent: int = 0) -> int:
     value = entry.get(field, absent)
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise BadInput(f"{where}: {field} is {value!r}: it must be a whole number of 0 or more")
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < _MOST_COUNT:
+        large = isinstance(value, int) and abs(value) >= _MOST_COUNT
+        shown = f"of {value.bit_length()} bits" if large else repr(value)
+        raise BadInput(f"{where}: {field} is {shown}: it must be a whole number of 0 to below 2^63")
     return value
 
 

@@ -17,7 +17,7 @@ QUICK = {"records": 3000, "epochs": 3, "iterations": 20}
 class TrainingConfig(BaseModel):
     """Settings of a training; every field has a default and unknown fields are refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     records: Annotated[int, Field(ge=LEAST_RECORDS, le=10_000_000)] = 30_000
     seed: Annotated[int, Field(ge=0)] = 0
@@ -31,7 +31,7 @@ class TrainingConfig(BaseModel):
     leaves: Annotated[int, Field(ge=2, le=256)] = 15
     precision: Annotated[float, Field(gt=1 / 3, le=1)] = 0.9
     false_alarm: Annotated[float, Field(gt=0, lt=1)] = 0.01
-    models: Annotated[tuple[str, ...], Field(min_length=1)] = (
+    models: Annotated[tuple[str, ...], Field(min_length=1, strict=False)] = (
         "features-linear",
         "features-boosted",
         "spectrum-cnn-fast",
@@ -92,4 +92,6 @@ def training_config(
     for name in config.models:
         if name not in LADDER:
             raise BadInput(f"{where}: models holds {name!r}: it may hold {', '.join(LADDER)}")
+        if config.models.count(name) > 1:
+            raise BadInput(f"{where}: models holds {name!r} twice: name each once")
     return config

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .spectrum import SPEED_OF_LIGHT_MPS
+from .spectrum import LEAST_PART, SPEED_OF_LIGHT_MPS
 
 #: Accelerations that are tried [m/s^2]: five times gravity.
 MAX_MPS2 = 50.0
@@ -51,7 +51,7 @@ def body_acceleration(
     rates = np.exp(1j * _phase_rad(tried[:, None], pulses, wavelength_m, prf_hz)).astype(np.complex64)
     for index in np.ndindex(lead):
         scale = np.abs(samples[index]).max()
-        if scale == 0:
+        if scale < LEAST_PART:
             continue
         one = samples[index] / scale
         heights = np.array([_power(one * turn, size).max() for turn in rates])

@@ -52,8 +52,15 @@ class OperatingCurve:
     others: int
     points: tuple[OperatingPoint, ...]
 
-    def at(self, false_alarm: float) -> OperatingPoint:
+    def at(self, false_alarm: float, models: int = 1) -> OperatingPoint:
         """Give the point that finds most UAVs without exceeding a false-alarm rate.
+
+        Parameters
+        ----------
+        false_alarm
+            Above 0 and below 1.
+        models
+            How many share the rate evenly, this one among them.
 
         Raises
         ------
@@ -62,9 +69,10 @@ class OperatingCurve:
         """
         if not 0 < false_alarm < 1:
             raise ValueError(f"false-alarm rate {false_alarm:g}: it must be above 0 and below 1")
-        kept = [point for point in self.points if point.false_alarm <= false_alarm * (1 + 1e-9)]
+        kept = [point for point in self.points if models * point.false_alarm <= false_alarm * (1 + 1e-9)]
         if not kept:
-            least = f"{self.points[-1].false_alarm:.2g}" if self.points else "any"
+            # rounded up, or it would be refused in its turn
+            least = f"{math.ceil(self.points[-1].false_alarm * models * 1e5) / 1e5:g}" if self.points else "any"
             raise ValueError(
                 f"false-alarm rate {false_alarm:g} cannot be supported by {self.others} calibration records of birds "
                 f"and clutter: a rate must rest on {SUPPORT} false alarms or more: ask for {least} or more, or train "

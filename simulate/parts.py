@@ -13,9 +13,12 @@ from .insects import INSECT_LAWS
 from .laws import LAWS
 from .receiver import FAULT_CHANCE
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
-NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+#: Size of any number, at most: beyond every scene, and its samples are finite still.
+MOST = 1e12
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-MOST, le=MOST)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=MOST)]
+NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=MOST)]
 Level = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-200, le=200)]
 Aspect = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=90)]
 Share = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
@@ -31,7 +34,7 @@ class Part(BaseModel):
 class RadarPart(Part):
     """The radar: carrier [Hz], PRF [Hz], pulses."""
 
-    carrier_hz: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1e12)]
+    carrier_hz: Positive
     prf_hz: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1e9)]
     pulses: Annotated[int, Field(strict=True, ge=1, le=10_000_000)]
 

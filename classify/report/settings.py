@@ -30,7 +30,7 @@ Seconds = Annotated[float, Field(gt=0, le=3600)]
 class ReportConfig(BaseModel):
     """Settings of a report; every field has a default and unknown fields are refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     #: Root seed of the test records.
     seed: Annotated[int, Field(ge=0)] = 0

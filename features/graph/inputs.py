@@ -7,7 +7,7 @@ import numpy as np
 from ..axis import pooling
 from ..change import PARTS, _frame_starts, part_length
 from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
-from ..spectrum import LEAST_FLOOR, Spectrum, doppler_spectrum
+from ..spectrum import LEAST_FLOOR, LEAST_PART, Spectrum, doppler_spectrum
 from ..vector import _BANDS, _SIGNIFICANT, radar_columns
 from .cadence import cadence_db
 from .measurements import (
@@ -73,7 +73,7 @@ def input_graph(
     iq = Value(graph, IQ, np.float32)
     flat = iq.reshape(-1, 2 * pulses)
     largest = flat.apply("Abs").max()
-    live = (largest > 0.0) & (largest <= float(np.finfo(np.float32).max)) & ((flat - flat).sum() >= 0.0)
+    live = (largest >= LEAST_PART) & (largest <= float(np.finfo(np.float32).max)) & ((flat - flat).sum() >= 0.0)
     packed = iq.transpose(0, 2, 1)
     packed = graph.where(live.reshape(-1, 1, 1), packed, 0.0) * unit_scale(largest).reshape(-1, 1, 1)
 

@@ -1,6 +1,7 @@
 """A cascade answers as its models do: the first where it is sure, the second elsewhere."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -68,6 +69,21 @@ def test_each_model_gets_half_of_the_false_alarms(records):
     allowed = (first.predict(records, **RADAR).labels == "uav") | (second.predict(records, **RADAR).labels == "uav")
     assert uav.any()
     assert allowed[uav].all()
+
+
+def test_a_rate_that_a_cascade_cannot_keep_is_told_as_it_was_asked_for():
+    with pytest.raises(BadInput, match=r"cascade: false-alarm rate 1\.5: it must be above 0 and below 1"):
+        Classifier.load(CASCADE, max_false_alarm=1.5)
+    with pytest.raises(BadInput, match=r"cascade: false-alarm rate 1e-05 cannot") as caught:
+        Classifier.load(CASCADE, max_false_alarm=1e-5)
+    Classifier.load(CASCADE, max_false_alarm=float(re.search(r"ask for (\S+) or more", str(caught.value))[1]))
+
+
+def test_a_budget_leads_to_one_model_where_a_coverage_is_asked_for(monkeypatch):
+    monkeypatch.setattr(inference, "measured_fft_us", lambda: 1.0)
+    enough = shipped_account()[CASCADE]["cost_ffts"] + 0.01
+    assert isinstance(Classifier.load(budget_us=enough), Cascade)
+    assert Classifier.load(budget_us=enough, coverage=0.9).coverage == 0.9
 
 
 def test_a_record_without_signal_and_one_outside_the_envelope_get_their_reasons(cascade):

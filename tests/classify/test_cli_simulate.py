@@ -1,6 +1,7 @@
 """`bladewing simulate`: a scene in, a SigMF recording with its truth out, or one line a problem and nothing."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -79,6 +80,7 @@ def test_explain_says_what_is_left_out_and_writes_nothing(scene_file, tmp_path, 
     [
         (("pulses = 500", "pulses = 0"), "radar.pulses is 0: it should be greater than or equal to 1"),
         (("velocity_mps = -8.0", "velocity_mps = nan"), "uav[0].velocity_mps is nan: it should be a finite number"),
+        (("velocity_mps = -8.0", "velocity_mps = 1e300"), "velocity_mps is 1e+300: it should be less than or equal to"),
         (("[radar]", "[radar"), "not TOML"),
         (("level_db = 10.0", "level_db = 10.0\nlevel = 3"), "unknown field clutter[0].level: the fields are"),
     ],
@@ -91,6 +93,16 @@ def test_a_bad_scene_is_one_line_and_nothing_written(scene_file, tmp_path, capsy
     assert said in err
     assert err.count("\n") == 1
     assert err.startswith("bladewing: error: ")
+    assert list(tmp_path.iterdir()) == [scene_file]
+
+
+def test_samples_beyond_their_type_are_refused_and_nothing_written(scene_file, tmp_path, capsys, monkeypatch):
+    from bladewing.simulate import render as module
+
+    real, spoilt = module.render, np.full(500, np.inf, np.complex64)
+    monkeypatch.setattr(module, "render", lambda *given, **options: replace(real(*given, **options), iq=spoilt))
+    assert main(["simulate", str(scene_file), "--out", str(tmp_path / "rec")]) == 2
+    assert "the scene's samples exceed what complex64 holds" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [scene_file]
 
 

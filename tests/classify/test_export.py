@@ -137,6 +137,19 @@ def test_a_batch_answers_like_its_records_alone(small):
     np.testing.assert_array_equal(together[1], np.concatenate([one[1] for one in apart]))
 
 
+@pytest.mark.parametrize("exponent", [-149, -143, -141, -140, -138])
+def test_what_is_too_faint_to_judge_is_so_in_the_graph_as_in_python(small, exponent):
+    _, radar, session = small
+    iq = records(40, **radar)
+    iq = np.ldexp(iq.view(np.float32) / np.abs(iq.view(np.float32)).max(axis=1, keepdims=True), exponent)
+    probabilities, label = run(session, iq.view(np.complex64))
+    given = {"carrier_hz": radar["carrier_hz"], "prf_hz": radar["prf_hz"]}
+    expected = Classifier.load("spectrum-cnn-fast").predict(iq.view(np.complex64), **given)
+    assert (expected.labels == "unknown").all() == (exponent < -140)
+    np.testing.assert_array_equal(LABELS[label], expected.labels)
+    np.testing.assert_allclose(probabilities, expected.probabilities, atol=0.002)
+
+
 def test_records_that_cannot_be_judged_are_unknown_and_spoil_no_other(small):
     _, radar, session = small
     iq = records(5, **radar)

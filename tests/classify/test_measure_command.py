@@ -74,6 +74,14 @@ def test_the_plot_is_svg_with_the_comb_on_it(folder, tmp_path, capsys):
     assert sum(e.get("stroke") == "#c0392b" for e in root.iter()) > 20
 
 
+def test_the_plot_of_silence_is_a_line_at_the_foot(tmp_path, capsys):
+    np.save(tmp_path / "silence.npy", np.zeros(2000, np.complex64))
+    target = tmp_path / "silence.svg"
+    assert main(["measure", str(tmp_path / "silence.npy"), *RADAR, "--plot", str(target)]) == 0
+    assert "nan" not in target.read_text().replace("unambiguous", "")
+    ET.fromstring(target.read_text())
+
+
 def test_a_helicopter_shows_both_combs_in_words_json_and_plot(tmp_path, capsys):
     assert main(["simulate", "helicopter", "--out", str(tmp_path / "heli"), "--seed", "1"]) == 0
     recording, plot = str(tmp_path / "heli.sigmf-meta"), tmp_path / "heli.svg"

@@ -19,6 +19,8 @@ def test_options_come_before_the_file_and_the_file_before_quick(tmp_path: Path) 
         ("recrods = 5", "unknown field 'recrods': the fields are seed, records"),
         ("front_s = 0", "front_s is 0: it should be greater than 0"),
         ("records = 'many'", "records is 'many'"),
+        ("records = '700'", "records is '700'"),
+        ("chain_s = true", "chain_s is True"),
         ("records", "not TOML"),
     ],
 )

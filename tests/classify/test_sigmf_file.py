@@ -77,6 +77,8 @@ def test_unsigned_samples_are_centred(sigmf_pair, datatype, stored, middle):
         ({"captures": {}}, "'captures' must be a list of objects"),
         ({"captures": [3]}, "'captures' must be a list of objects"),
         ({"captures": [capture("0")]}, r"captures\[0\]: core:sample_start is '0'"),
+        ({"captures": [capture(10**400)], "offset": 10**400}, "is of 1329 bits: it must be .* below 2"),
+        ({"captures": [capture(-(10**400))]}, "core:sample_start is of 1329 bits"),
         ({"captures": [capture(5000)]}, r"cut short: captures\[0\] speaks of 5000 samples, the data hold 4000"),
         ({"captures": [capture(0)], "offset": 100}, "starts at sample 0, before core:offset 100"),
         ({"annotations": [{"core:sample_start": 1000, "core:sample_count": 3001}]},

@@ -1,5 +1,7 @@
 """The threshold on "uav" by false-alarm rate."""
 
+import re
+
 import numpy as np
 import pytest
 from bladewing.models.operating import SUPPORT, OperatingCurve, operating_curve
@@ -63,6 +65,11 @@ def test_a_rate_that_rests_on_too_few_records_is_refused_by_the_rule():
         ValueError, match=rf"0\.001 cannot be supported by {others} calibration records .* ask for 0\.00"
     ):
         curve.at(0.001)
+    for models in (1, 2):
+        with pytest.raises(ValueError, match="ask for ") as caught:
+            curve.at(1e-4, models)
+        asked = float(re.search(r"ask for (\S+) or more", str(caught.value))[1])
+        assert models * curve.at(asked, models).false_alarm <= asked < 1.01 * models * curve.points[-1].false_alarm
     for wrong in (0, 1, -0.1, float("nan")):
         with pytest.raises(ValueError, match="above 0 and below 1"):
             curve.at(wrong)
