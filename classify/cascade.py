@@ -55,8 +55,8 @@ class Cascade(Classifier):
         super().__init__(second[0], source=second[1], threads=threads)
         self.first = Classifier(first[0], source=first[1], threads=threads)
         if max_false_alarm is not None:
-            first, own = (model._keep_to(max_false_alarm, CASCADE, models=2) for model in (self.first, self))
-            self.operating_point = replace(own, false_alarm=own.false_alarm + first.false_alarm)
+            given, own = (model._keep_to(max_false_alarm, CASCADE, models=2) for model in (self.first, self))
+            self.operating_point = replace(own, false_alarm=own.false_alarm + given.false_alarm)
 
     @classmethod
     def of_shipped(

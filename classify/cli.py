@@ -28,7 +28,7 @@ app = typer.Typer(
 # The parent of all usage errors has no public name that old and new versions of typer share.
 _UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])
 
-_TRAIN_EXTRA = {"torch", "sklearn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2", "mpmath"}
+_TRAIN_EXTRA = {"torch", "sklearn", "scikit-learn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2", "mpmath"}
 # A disk that is full, read-only or out of bounds is the user's to mend.
 _DISK_ERRORS = {
     errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EFBIG, errno.ENOTDIR, errno.EISDIR,
@@ -366,7 +366,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ModuleNotFoundError as error:
         if error.name not in _TRAIN_EXTRA:
             return _unexpected(error)
-        _complain(f"{error.name} is not installed, this command needs it: pip install 'bladewing[train]'")
+        cure = "pip install -c constraints.txt '.[train]' where bladewing's source lies"
+        _complain(f"{error.name} is not installed, this command needs it: {cure}")
         return 2
     except MemoryError:
         _complain("more memory is needed than there is: give less at once (a shorter recording, fewer records)")

@@ -268,9 +268,17 @@ class Measured:
         )
 
     def clearest(self) -> int:
-        """The dwell whose comb stands highest over the noise; the first one where there is none."""
-        snr = self.values.comb_snr_db
-        return int(np.nanargmax(snr)) if np.isfinite(snr).any() else 0
+        """The dwell whose comb stands highest over the noise, of those as near to the median band as half of them are.
+
+        The first dwell where there is no comb. The highest of all may be an outlier.
+        """
+        snr, band = self.values.comb_snr_db, self.values.bandwidth_hz
+        if not np.isfinite(snr).any():
+            return 0
+        off = np.abs(band - np.nanmedian(band)) if np.isfinite(band).any() else np.zeros(len(band))
+        typical = off <= np.nanmedian(off)
+        among = np.where(typical & np.isfinite(snr), snr, -np.inf)
+        return int((among if np.isfinite(among).any() else np.nan_to_num(snr, nan=-np.inf)).argmax())
 
     def clearer(self, other: "Measured | None") -> "Measured":
         """Of two, the one whose clearest dwell is the clearer; the other where neither holds a comb."""
@@ -291,7 +299,7 @@ class Measured:
         from .measure_plot import spectrum_svg
 
         n = self.clearest()
-        drawing = spectrum_svg(self.iq[n], self.recording, self.values, n)
+        drawing = spectrum_svg(self.iq[n], self.recording, self.values, n, float(self.start_s[n]))
         try:
             write_whole(path, drawing)
         except OSError as error:

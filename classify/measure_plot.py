@@ -1,5 +1,7 @@
 """One dwell's spectrum as SVG, with the comb, the band and the notch drawn on it."""
 
+from pathlib import Path
+
 import numpy as np
 from bladewing.features.measure import Measurements
 from bladewing.features.notch import NOTCH_MPS
@@ -11,7 +13,7 @@ from .recording import Recording
 #: Colours of what is drawn behind the spectrum.
 _LEGEND = (("#dbe9f6", "band"), ("#f3d9b1", "notch"), ("#c0392b", "comb"), ("#1e8449", "2nd comb"))
 
-_WIDTH, _HEIGHT, _LEFT, _BOTTOM, _TOP = 960, 420, 56, 44, 34
+_WIDTH, _HEIGHT, _LEFT, _BOTTOM, _TOP = 960, 440, 56, 44, 54
 
 
 def _round_step(least: float) -> float:
@@ -20,7 +22,7 @@ def _round_step(least: float) -> float:
     return float(next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least))
 
 
-def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, index: int) -> str:
+def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, index: int, start_s: float) -> str:
     """Draw a spectrum and what was measured in it.
 
     Parameters
@@ -33,6 +35,8 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
         The recording's measurements, shape (dwells,).
     index
         Which dwell.
+    start_s
+        When it starts [s].
     """
     from xml.sax.saxutils import escape
 
@@ -103,7 +107,8 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
     said = str(values.reason[index]) or f"comb every {chopping_hz:.2f} Hz, band {width_hz:.0f} Hz"
     if np.isfinite(both_hz).all():
         said += f"; main {both_hz[0]:.2f} Hz, tail {both_hz[1]:.2f} Hz, ratio {values.gear_ratio[index]:.3f}"
-    title = escape(one_line(f"{recording.name}: {said}"))
+    # the folder would push the words off the picture
+    title = escape(one_line(f"{Path(recording.name).name} at {start_s:.3f} s: {said}"))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" width="{_WIDTH}" '
         f'height="{_HEIGHT}" font-family="sans-serif" font-size="11" fill="#222">\n'

@@ -2,6 +2,7 @@
 
 import sys
 import types
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import pytest
@@ -86,15 +87,23 @@ def test_help_shows_units(capsys):
     assert "[s]" in capsys.readouterr().out
 
 
-def test_a_missing_training_library_is_said_with_the_cure(monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("error", "name"),
+    [
+        (ModuleNotFoundError("No module named 'torch'", name="torch"), "torch"),
+        (PackageNotFoundError("scikit-learn"), "scikit-learn"),
+    ],
+)
+def test_a_missing_training_library_is_said_with_the_cure(monkeypatch, capsys, error, name):
     module = types.ModuleType("bladewing.classify.train")
 
-    def needs_torch(*_, **__):
-        raise ModuleNotFoundError("No module named 'torch'", name="torch")
+    def needs_more(*_, **__):
+        raise error
 
-    module.run_training = needs_torch  # type: ignore[attr-defined]
+    module.run_training = needs_more  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, module.__name__, module)
     assert main(["train"]) == 2
     assert capsys.readouterr().err == (
-        "bladewing: error: torch is not installed, this command needs it: pip install 'bladewing[train]'\n"
+        f"bladewing: error: {name} is not installed, this command needs it: "
+        "pip install -c constraints.txt '.[train]' where bladewing's source lies\n"
     )

@@ -1,10 +1,12 @@
 import json
+import re
 import xml.etree.ElementTree as ET
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from bladewing.classify.cli import main
-from bladewing.classify.measure import with_error
+from bladewing.classify.measure import Measured, with_error
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 
 CARRIER_HZ, PRF_HZ, PULSES = 9.85e9, 35e3, 3000
@@ -71,7 +73,20 @@ def test_the_plot_is_svg_with_the_comb_on_it(folder, tmp_path, capsys):
     titles = [e.text for e in root.iter() if e.tag.endswith("title")]
     assert "notch" in titles
     assert any(t.startswith("band ") for t in titles)
+    assert any(re.match(r"drone\.npy at 0\.0[08]0 s: comb every ", e.text or "") for e in root.iter())
     assert sum(e.get("stroke") == "#c0392b" for e in root.iter()) > 20
+
+
+def test_the_dwell_that_speaks_for_a_recording_is_clear_and_no_outlier():
+    values = SimpleNamespace(
+        comb_snr_db=np.array([20.0, np.nan, 40.0, 30.0, 25.0, 10.0]),
+        bandwidth_hz=np.array([3010.0, np.nan, 4000.0, 2990.0, 3300.0, 3005.0]),
+    )
+    assert Measured.clearest(SimpleNamespace(values=values)) == 3
+    values.bandwidth_hz[:] = np.nan
+    assert Measured.clearest(SimpleNamespace(values=values)) == 2
+    values.comb_snr_db[:] = np.nan
+    assert Measured.clearest(SimpleNamespace(values=values)) == 0
 
 
 def test_the_plot_of_silence_is_a_line_at_the_foot(tmp_path, capsys):
