@@ -58,6 +58,11 @@ class Cascade(Classifier):
             given, own = (model._keep_to(max_false_alarm, CASCADE, models=2) for model in (self.first, self))
             self.operating_point = replace(own, false_alarm=own.false_alarm + given.false_alarm)
 
+    @property
+    def name(self) -> str:
+        """What the two are called together."""
+        return CASCADE
+
     @classmethod
     def of_shipped(
         cls, threads: int = 1, *, max_false_alarm: float | None = None, coverage: float | None = None

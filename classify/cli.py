@@ -105,6 +105,8 @@ def predict(
 
     dwell_s = work.checked_dwell_s(dwell)
     classifier = Classifier.load(model, budget_us=budget_us, max_false_alarm=max_false_alarm, coverage=coverage)
+    if budget_us is not None:  # it follows from a timing of this moment
+        _complain(f"the budget of {budget_us:g} us buys the model {classifier.name}", kind="note")
     if classifier.operating_point is not None:
         _complain(work.terms(classifier.operating_point), kind="note")
     said: Counter[str] = Counter()

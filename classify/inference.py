@@ -125,7 +125,10 @@ def read_model(given: str) -> tuple[bytes, str]:
         return read_bounded(path, MOST_MODEL_BYTES), given
     except (FileNotFoundError, NotADirectoryError):
         shipped = ", ".join(model_names()) or "none"
-        raise BadInput(f"no model {given!r}: give the path of an .onnx file or one of the shipped: {shipped}") from None
+        raise BadInput(
+            f"no model {given!r}: give the path of an .onnx file or one of the shipped: {shipped}; "
+            f"or {', '.join((CASCADE, *PLACES))}"
+        ) from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name, no file, too large
         raise BadInput(f"{given}: the model cannot be read: {getattr(error, 'strerror', None) or error}") from None
 
@@ -254,6 +257,11 @@ class Classifier:
             return Cascade.of_shipped(threads, max_false_alarm=max_false_alarm, coverage=coverage)
         content, source = read_model(name)
         return cls(content, source=source, threads=threads, max_false_alarm=max_false_alarm, coverage=coverage)
+
+    @property
+    def name(self) -> str:
+        """Of the model, as it stands on the ladder; empty where its file does not say."""
+        return self.metadata.get("name", "")
 
     def _keep_to(self, max_false_alarm: float, source: str, models: int = 1) -> OperatingPoint:
         """Choose the threshold on "uav" for a false-alarm rate that so many models share."""

@@ -236,7 +236,9 @@ def test_two_threads_answer_as_one(mixed, mixed_model):
 
 def test_names_and_paths_that_lead_nowhere(tmp_path):
     for wrong in ("spectrum-cmm", "no/such.onnx", tmp_path / "gone.onnx"):
-        with pytest.raises(BadInput, match=f"no model '{os.fspath(wrong)}'.*shipped: {', '.join(model_names())}"):
+        with pytest.raises(
+            BadInput, match=f"no model '{os.fspath(wrong)}'.*shipped: {', '.join(model_names())}; or cascade, fast"
+        ):
             Classifier.load(wrong)
     with pytest.raises(BadInput, match=r"is a directory: name the \.onnx file in it"):
         Classifier.load(tmp_path)

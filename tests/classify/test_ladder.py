@@ -6,6 +6,7 @@ from importlib import resources
 import numpy as np
 import pytest
 from bladewing.classify import BadInput, Classifier, inference, ladder
+from bladewing.classify.cli import main
 from bladewing.classify.inference import model_names
 from bladewing.classify.ladder import by_budget, by_place, front
 
@@ -48,13 +49,21 @@ def test_the_classifier_loads_by_place_and_by_budget(monkeypatch):
     shipped = account(**{"spectrum-cnn-fast": (40, 0.5), "spectrum-cnn": (50, 0.7)})
     monkeypatch.setattr(inference, "shipped_account", lambda: shipped)
     monkeypatch.setattr(inference, "measured_fft_us", lambda: 2.0)
-    assert Classifier.load("fast").metadata["name"] == "spectrum-cnn-fast"
-    assert Classifier.load("best").metadata["name"] == "spectrum-cnn"
-    assert Classifier.load(budget_us=99).metadata["name"] == "spectrum-cnn-fast"
-    assert Classifier.load(budget_us=100).metadata["name"] == "spectrum-cnn"
+    assert Classifier.load("fast").name == "spectrum-cnn-fast"
+    assert Classifier.load("best").name == "spectrum-cnn"
+    assert Classifier.load(budget_us=99).name == "spectrum-cnn-fast"
+    assert Classifier.load(budget_us=100).name == "spectrum-cnn"
     for wrong, rule in [({"budget_us": -1}, "budget_us is -1"), ({"name_or_path": "fast", "budget_us": 9}, "one of")]:
         with pytest.raises(BadInput, match=rule):
             Classifier.load(**wrong)
+
+
+def test_predict_says_what_a_budget_buys(monkeypatch, sigmf_pair, capsys):
+    monkeypatch.setattr(inference, "measured_fft_us", lambda: 1.0)
+    for enough, name in ((15, "spectrum-cnn-fast"), (1000, "cascade")):
+        assert main(["predict", str(sigmf_pair()), "--budget-us", str(enough)]) == 0
+        said = f"bladewing: note: the budget of {enough} us buys the model {name}\n"
+        assert capsys.readouterr().err == said
 
 
 def test_the_bare_fft_has_a_time():
