@@ -127,6 +127,7 @@ import os, signal, threading
 
 from bladewing.classify import gather
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where a shell runs it behind
     # to all of its group, as a terminal sends it: while the workers import, which takes them a second
     threading.Timer(0.3, os.killpg, (0, signal.SIGINT)).start()
     try:
