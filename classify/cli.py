@@ -28,6 +28,7 @@ app = typer.Typer(
 # The parent of all usage errors has no public name that old and new versions of typer share.
 _UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])
 
+# As modules, or as the packages that hold them: an account of a training asks for their versions.
 _TRAIN_EXTRA = {"torch", "sklearn", "scikit-learn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2", "mpmath"}
 # A disk that is full, read-only or out of bounds is the user's to mend.
 _DISK_ERRORS = {
@@ -330,10 +331,8 @@ def tables(
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Root of the scenes' noise.")] = 0,
 ) -> None:
     """Make the paper's tables again: its theory and measurements beside those of this product."""
-    from .files import result_folder
     from .tables import markdown, run_tables
 
-    result_folder(out)
     print(markdown(run_tables(out, seed)), flush=True)
 
 

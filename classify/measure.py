@@ -273,12 +273,11 @@ class Measured:
         The first dwell where there is no comb. The highest of all may be an outlier.
         """
         snr, band = self.values.comb_snr_db, self.values.bandwidth_hz
-        if not np.isfinite(snr).any():
-            return 0
-        off = np.abs(band - np.nanmedian(band)) if np.isfinite(band).any() else np.zeros(len(band))
-        typical = off <= np.nanmedian(off)
-        among = np.where(typical & np.isfinite(snr), snr, -np.inf)
-        return int((among if np.isfinite(among).any() else np.nan_to_num(snr, nan=-np.inf)).argmax())
+        known = np.isfinite(band)
+        if known.any():
+            off = np.abs(band - np.median(band[known]))
+            snr = np.where(off <= np.median(off[known]), snr, np.nan)
+        return int(np.nanargmax(snr)) if np.isfinite(snr).any() else 0
 
     def clearer(self, other: "Measured | None") -> "Measured":
         """Of two, the one whose clearest dwell is the clearer; the other where neither holds a comb."""

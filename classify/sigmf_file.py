@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sigmf import SigMFFile
 
 _META, _DATA = ".sigmf-meta", ".sigmf-data"
-_MOST_COUNT = 1 << 63
+_MOST_COUNT = 1 << 63  # JSON's whole numbers have no end, and what is reckoned with them would leave every type
 _ARCHIVES = (".sigmf", ".sigmf.gz", ".sigmf.xz", ".sigmf.zip")
 _DATATYPE = re.compile(r"([cr])(?!f8|f16)([fiu])(8|16|32|64)(_le|_be)?")
 

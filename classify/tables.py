@@ -16,7 +16,7 @@ from bladewing.features.spectrum import doppler_spectrum
 from bladewing.simulate.scene import Scene
 
 from .errors import BadInput
-from .files import write_together
+from .files import result_folder, write_together
 from .measure import with_error
 from .table_measures import MEASURED_DB, SIMULATED_DB, Measured, measure, strongest_line_db, theory
 from .table_rotors import EXPLAINED, gear_rows, rotor_rows, velocity_rows
@@ -235,13 +235,13 @@ def run_tables(out: Path, seed: int = 0) -> dict[str, list[Row]]:
     Raises
     ------
     BadInput
-        The folder cannot be written to.
+        The folder cannot be made, or not be written to.
     """
+    result_folder(out)
     tables = make_tables(seed)
     notes = {title: NOTES[title] for title in tables if title in NOTES}
     text = json.dumps({"seed": seed, "notes": notes, "tables": tables}, indent=2, allow_nan=False) + "\n"
     try:
-        out.mkdir(parents=True, exist_ok=True)
         write_together(out, {"tables.md": markdown(tables), "tables.json": text})
     except OSError as error:
         raise BadInput(f"{out}: cannot be written: {error.strerror or error}: give a folder") from None

@@ -6,7 +6,7 @@ import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,9 @@ from .training_costs import add_costs, answers
 PARTS = "train-parts"
 
 OnFraction = Callable[[float], None]
+
+Taught = Callable[[], NDArray[np.floating]]
+"""Gives what a network's teacher says of the training records, shape (n, 3); asked only by one that is trained."""
 
 
 @dataclass(frozen=True)
@@ -113,11 +116,18 @@ def run_training(
         gathered_s = time.perf_counter() - started
         files: dict[str, bytes] = {}
         models: dict[str, dict[str, Any]] = {}
+
+        @cache
+        def told_by(teacher: str) -> NDArray[np.float32]:
+            """What a trained network says of the training records, once for all of its pupils."""
+            return answers(Classifier(files[f"{teacher}.onnx"], source=teacher), sets.train)
+
         teachers_first = sorted(settings.models, key=lambda name: bool(LADDER[name].teacher))
         for name in teachers_first:
-            teacher = files.get(f"{LADDER[name].teacher}.onnx")
+            teacher = LADDER[name].teacher
+            taught = partial(told_by, teacher) if teacher in models else None
             with bars.phase(f"train {name}", 1) as on_fraction:
-                files[f"{name}.onnx"], models[name] = _take_or_train(name, settings, sets, on_fraction, parts, teacher)
+                files[f"{name}.onnx"], models[name] = _take_or_train(name, settings, sets, on_fraction, parts, taught)
         models = {name: models[name] for name in settings.models}
     cascade = add_costs(files, models, sets.test, settings.false_alarm)
     account = {
@@ -164,7 +174,7 @@ def _epochs_of(name: str) -> str:
 
 
 def _take_or_train(
-    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction, parts: Parts, teacher: bytes | None
+    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction, parts: Parts, taught: Taught | None
 ) -> tuple[bytes, dict[str, Any]]:
     """Give a model as it was finished before an interruption, or train and keep it."""
     kept = parts.arrays(name)
@@ -173,7 +183,7 @@ def _take_or_train(
             return kept["model"].tobytes(), json.loads(kept["account"].tobytes())
         except (KeyError, ValueError) as error:
             raise parts.refusal(name, str(error)) from None
-    content, account = train_one(name, settings, sets, on_fraction, parts, teacher)
+    content, account = train_one(name, settings, sets, on_fraction, parts, taught)
     text = json.dumps(account, allow_nan=False).encode()
     parts.keep_arrays(name, {"model": np.frombuffer(content, np.uint8), "account": np.frombuffer(text, np.uint8)})
     return content, account
@@ -185,11 +195,11 @@ def train_one(
     sets: Sets,
     on_fraction: OnFraction,
     parts: Parts | None = None,
-    teacher: bytes | None = None,
+    taught: Taught | None = None,
 ) -> tuple[bytes, dict[str, Any]]:
     """Train, calibrate, export and compare one model; give its sealed file and its account.
 
-    A network learns from the answers of its teacher too, where that one's sealed file is given.
+    A network learns from the answers of its teacher too, where these are given.
     """
     from bladewing.models.calibration import (
         acceptance_thresholds,
@@ -203,7 +213,7 @@ def train_one(
 
     started = time.perf_counter()
     network = LADDER[name].learner == "network"
-    scores_of, export, detail = (partial(_network, parts=parts, teacher=teacher) if network else _tabular)(
+    scores_of, export, detail = (partial(_network, parts=parts, taught=taught) if network else _tabular)(
         name, settings, sets, on_fraction
     )
     calibration = fit_vector_scaling(scores_of(sets.calibrate), sets.calibrate.labels)
@@ -283,7 +293,7 @@ def _network(
     sets: Sets,
     on_fraction: OnFraction,
     parts: Parts | None,
-    teacher: bytes | None = None,
+    taught: Taught | None = None,
 ) -> tuple[ScoresOf, Callable[[Any], bytes], dict[str, Any]]:
     from bladewing.models.augment import VelocityMirror
     from bladewing.models.cnn import EvidenceNet, ImageNet, SpectrumNet
@@ -303,7 +313,6 @@ def _network(
     def inputs(part: Gathered) -> dict[str, NDArray]:
         return {key: part.inputs[key] for key in shapes}
 
-    taught = None if teacher is None else answers(Classifier(teacher, source=LADDER[name].teacher), sets.train)
     snapshot = parts.arrays(_epochs_of(name)) if parts else None
     try:
         result = train_network(
@@ -319,7 +328,7 @@ def _network(
             weight_decay=settings.weight_decay,
             # no measurement is signed, so only the picture is mirrored
             augment=VelocityMirror(axes={signal: -2 if image else -1}, odd={}),
-            teacher=taught,
+            teacher=taught() if taught else None,
             snapshot=snapshot,
             on_snapshot=partial(parts.keep_arrays, _epochs_of(name)) if parts else None,
             on_epoch=lambda epoch, epochs, _: on_fraction(epoch / epochs),
@@ -330,7 +339,7 @@ def _network(
     net.compact()
     detail = {
         "device": result.device,
-        "teacher": LADDER[name].teacher if teacher else "",
+        "teacher": LADDER[name].teacher if taught else "",
         "best_epoch": result.best_epoch,
         "stopped_early": result.stopped_early,
         "seconds": round(result.seconds, 1),  # of all its epochs, those before an interruption too

@@ -120,6 +120,6 @@ def require_shares(values: NDArray[np.floating], count: int, name: str) -> None:
     if values.shape != (count, CLASS_COUNT):
         raise ValueError(f"{name} has shape {values.shape}; it must be ({count}, {CLASS_COUNT}), one row a record")
     require_finite(values, name)
-    off = np.flatnonzero((values.min(axis=1, initial=0) < 0) | (np.abs(values.sum(axis=1) - 1) > 1e-3))
+    off = np.flatnonzero((values < 0).any(axis=1) | (np.abs(values.sum(axis=1) - 1) > 1e-3))
     if len(off):
         raise ValueError(f"{name}[{off[0]}] is {values[off[0]].tolist()}; each row must be shares of 1")

@@ -14,7 +14,8 @@ from bladewing.models.calibration import expected_calibration_error
 from numpy.typing import NDArray
 
 from ..gather import Gathered, gather
-from ..labels import UNKNOWN, decide
+from ..inference import Classifier
+from ..labels import UNKNOWN
 from ..training_config import TrainingConfig
 from .metrics import mean_of_rates, rate
 
@@ -98,20 +99,17 @@ def _part(records: Gathered, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Gath
 
 def _trained(model: str, settings: TrainingConfig, sets: Mapping[str, Gathered]) -> Answer:
     """Train, and give what answers records: their probabilities and labels."""
-    import onnxruntime
-    from bladewing.models import LADDER
-
     from ..train import Sets, train_one
+    from ..training_costs import answers
 
     # the account's own figures are not used here, so any records do
     few = _part(sets["validate"], np.arange(min(600, len(sets["validate"]))))
-    sealed, account = train_one(model, settings, Sets(**sets, test=few), lambda _: None)
-    session = onnxruntime.InferenceSession(sealed, providers=["CPUExecutionProvider"])
+    sealed, _ = train_one(model, settings, Sets(**sets, test=few), lambda _: None)
+    classifier = Classifier(sealed, source=model)
 
     def answer(test: Gathered) -> tuple[NDArray[np.floating], NDArray[np.str_]]:
-        feed = {key: test.inputs[key].astype(np.float32) for key in LADDER[model].inputs}
-        (probabilities,) = session.run(["probabilities"], feed)
-        return probabilities, decide(probabilities, account["accept"])[0]
+        probabilities = answers(classifier, test)
+        return probabilities, classifier.decide(probabilities)[0]
 
     return answer
 
