@@ -14,7 +14,7 @@ from .rotor import RotorMotion
 
 @dataclass(frozen=True)
 class Rotor:
-    """One rotor of each aircraft of a batch; every field is array_like of shape (records,) or a scalar.
+    """One rotor of each aircraft of a batch; every field but `points` is array_like, shape (records,) or a scalar.
 
     Parameters
     ----------
@@ -26,6 +26,8 @@ class Rotor:
         Amplitude of each blade.
     hub : array_like of complex
         Amplitude and phase of the whole rotor: where on the aircraft it sits.
+    points : int or None
+        As in `rotor_echo`.
     """
 
     motion: RotorMotion
@@ -35,6 +37,7 @@ class Rotor:
     blade_amplitudes: ArrayLike = (1.0, 1.0)
     edge_asymmetry: ArrayLike = 0.0
     hub: ArrayLike = 1.0
+    points: int | None = None
 
 
 def rotors_echo(
@@ -82,7 +85,7 @@ def rotors_echo(
     mixing = np.concatenate([hubs, 1j * hubs][:parts], axis=-1)[:, None]
     mixing = np.concatenate([mixing.real, mixing.imag], axis=1)  # (records, 2, parts x rotors)
     sums = np.empty((records, radar.pulses), np.complex64) if out is None else out
-    room, planes = Room(9 * TILE_SAMPLES), Room(5 * len(rotors) * TILE_SAMPLES)
+    room, planes = Room(10 * TILE_SAMPLES), Room(5 * len(rotors) * TILE_SAMPLES)
     for tile in grid.tiles(records):
         echoes = planes(parts, len(rotors), *tile.flat)
         for number, angle in enumerate(grid.phase(tile, turning, planes)):
@@ -204,6 +207,7 @@ def _blades(rotor: Rotor, radar: Radar, records: int) -> Blades:
         rotor.root_m,
         rotor.blade_amplitudes,
         rotor.edge_asymmetry,
+        rotor.points,
     )
 
 

@@ -5,7 +5,8 @@ Opposite blades, at theta and theta + pi, are conjugates: weighed by a (1 + s si
     sinc(x) [((a + b) + (a - b) s sin(theta)) cos(y) + j ((a - b) + (a + b) s sin(theta)) sin(y)]
 
 with x and y proportional to cos(theta). For a blade anywhere on the hub all four, x, y and the two weights, are linear
-in the first blade's cosine and sine and in 1: a small matrix a record gives them in one product.
+in the first blade's cosine and sine and in 1: a small matrix a record gives them in one product. Where a blade is a row
+of n points in place of a line, Dirichlet's kernel sin(n z) / (n sin z), z = x / (n - 1), stands for sinc(x).
 """
 
 import math
@@ -36,10 +37,13 @@ class Blades:
     ----------
     maps : ndarray of float32, shape (records, pairs, 4 or 3, 3)
         For each pair of opposite blades (or each blade of an odd number) the matrix from (cos, sin, 1) of the first
-        blade's angle to (x, y, real weight, imaginary weight); the last is left out where it is zero throughout.
+        blade's angle to (x or z, y, real weight, imaginary weight); the last is left out where it is zero throughout.
+    points : int or None
+        Points a blade; None for a line.
     """
 
     maps: Array32
+    points: int | None = None
 
     @classmethod
     def of(
@@ -51,6 +55,7 @@ class Blades:
         root_m: ArrayLike,
         blade_amplitudes: ArrayLike,
         edge_asymmetry: ArrayLike,
+        points: int | None = None,
     ) -> "Blades":
         """From the parameters of `rotor_echo`, for records of the leading shape `lead`."""
 
@@ -69,14 +74,16 @@ class Blades:
             even, odd = here + there, here - there
         turn = TWO_PI / max(blades, 1) * np.arange(even.shape[1])
         cosine, sine = np.cos(turn), np.sin(turn)
+        root = tip if points == 1 else root
         half, middle = np.maximum((tip - root) * k_cos_beta, _LEAST_HALF), (tip + root) * k_cos_beta
+        half = half / (points - 1) if points and points > 1 else half
         maps = np.zeros((len(half), len(turn), 4, 3), np.float32)
         for number, value in enumerate((half, middle)):
             maps[:, :, number, 0], maps[:, :, number, 1] = value * cosine, -value * sine
         for number, level, slope in ((2, even, odd * asymmetry), (3, odd, even * asymmetry)):
             maps[:, :, number, 0], maps[:, :, number, 1], maps[:, :, number, 2] = slope * sine, slope * cosine, level
         reflecting = np.any(maps[:, :, 2:], axis=(0, 2, 3))
-        return cls(maps[:, reflecting] if maps[..., 3, :].any() else maps[:, reflecting, :3])
+        return cls(maps[:, reflecting] if maps[..., 3, :].any() else maps[:, reflecting, :3], points)
 
     @property
     def real(self) -> bool:
@@ -98,7 +105,7 @@ class Blades:
             Where the echo goes; `imag` may be None if `self.real`.
         """
         shape, maps = angle.shape, self.maps[rows]
-        basis, mapped, sinc = room(3, *shape), room(maps.shape[2], *shape), room(*shape)
+        basis, mapped, share = room(3, *shape), room(maps.shape[2], *shape), room(3, *shape)
         np.cos(angle, out=basis[0])
         np.sin(angle, out=basis[1])
         basis[2] = 1
@@ -106,12 +113,10 @@ class Blades:
         for pair in range(maps.shape[1]):
             np.matmul(maps[:, pair], basis.swapaxes(0, 1), out=mapped.swapaxes(0, 1))
             x, y = mapped[0], mapped[1]
-            x += TINY
-            np.sin(x, out=sinc)
-            sinc /= x
+            left = _share(x, self.points, share)
             for function, weight, total in parts:
                 part = mapped[weight]
-                part *= sinc
+                part *= left
                 function(y, out=x)
                 if pair == 0:
                     np.multiply(part, x, out=total)
@@ -123,6 +128,29 @@ class Blades:
         if not maps.shape[1]:
             real.fill(0)
         room.clear()
+
+
+def _share(x: Array32, points: int | None, room: Array32) -> Array32:
+    """What is left of a blade's echo where its parts differ in phase, in `room` (3, *x.shape); spoils `x`.
+
+    By Chebyshev's recursion sin(n z) / sin(z) is never 0 / 0, however large z.
+    """
+    before, share, product = room
+    if not points:
+        x += TINY
+        np.sin(x, out=share)
+        share /= x
+        return share
+    share.fill(1)
+    before.fill(0)
+    np.cos(x, out=x)
+    x *= 2
+    for _ in range(points - 1):
+        np.multiply(x, share, out=product)
+        product -= before
+        before, share, product = share, product, before
+    share *= np.float32(1 / points)
+    return share
 
 
 class Room:

@@ -27,16 +27,16 @@ CLASSES = ("uav", "bird", "clutter")
 #: Kinds of each class and how often each is drawn within it.
 KINDS: dict[str, dict[str, float]] = {
     "uav": {"fixed_wing": 0.25, "quadcopter": 0.3, "hexacopter": 0.15, "octocopter": 0.1, "helicopter": 0.2},
-    "bird": {"flapping_bird": 0.6, "gliding_bird": 0.15, "flock": 0.25},
+    "bird": {"flapping_bird": 0.68, "gliding_bird": 0.15, "flock": 0.17},
     "clutter": {
-        "noise": 0.12,
+        "noise": 0.11,
         "ground": 0.08,
-        "rain": 0.08,
+        "rain": 0.12,
         "sea": 0.08,
         "person": 0.11,
-        "vehicle": 0.28,
+        "vehicle": 0.27,
         "wind_turbine": 0.12,
-        "mover": 0.13,
+        "mover": 0.11,
     },
 }
 

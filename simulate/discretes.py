@@ -162,7 +162,8 @@ def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
     """Draw a wind turbine: three long blades of which the range cell holds a part, and its tower at rest.
 
     A blade is rough on the scale of the wavelength: a row of scatterers, few or many, equal or of random strength, each
-    somewhere on the chord; it is no mirror.
+    somewhere on the chord; it is no mirror. A quarter are as published models draw them, rows of equal points at equal
+    distances: for a while their lines are as even as a rotor's.
     """
     t, records = radar.times_s, len(draws)
     length, tip = draws.value("turbine_length_m"), draws.value("turbine_tip_mps")
@@ -172,16 +173,20 @@ def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
     cos_beta = np.cos(np.deg2rad(85) * draws.uniform())
     first = draws.value("phase_rad")
     points, chord = np.floor(draws.value("turbine_points")).astype(int), draws.value("chord_m")
-    equal = draws.chance(0.5)
+    equal, even = draws.chance(0.5)[:, None], draws.chance(0.25)[:, None]
+    row = np.arange(MAX_BLADE_POINTS)
     micro = np.zeros((records, radar.pulses), np.complex64)
     for blade in range(3):
         angle = TWO_PI * (turn[:, None] * t + blade / 3) + first[:, None]
         towards, across = np.cos(angle), np.sin(angle)
         towards -= towards[:, :1].copy()
         across -= across[:, :1].copy()
-        along, aside = start[:, None] + cell[:, None] * draws.uniform(MAX_BLADE_POINTS), draws.uniform(MAX_BLADE_POINTS)
+        place, aside = draws.uniform(MAX_BLADE_POINTS), draws.uniform(MAX_BLADE_POINTS)
         strength, phase = draws.uniform(MAX_BLADE_POINTS), draws.value("phase_rad", MAX_BLADE_POINTS)
-        level = (np.where(equal[:, None], 1.0, strength**2) * np.exp(1j * phase)).astype(np.complex64)
+        place, aside = np.where(even, (row + 0.5) / points[:, None], place), np.where(even, 0.5, aside)
+        phase = np.where(even, row * phase[:, :1], phase)  # each of them so much farther than the last
+        along = start[:, None] + cell[:, None] * place
+        level = (np.where(equal | even, 1.0, strength**2) * np.exp(1j * phase)).astype(np.complex64)
         r = along * cos_beta[:, None]
         # the chord tapers to the tip
         c = chord[:, None] * (2 * aside - 1) * (1 - along / length[:, None]) * cos_beta[:, None]

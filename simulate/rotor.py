@@ -82,6 +82,7 @@ def rotor_echo(
     root_m: ArrayLike = 0.0,
     blade_amplitudes: ArrayLike = (1.0, 1.0),
     edge_asymmetry: ArrayLike = 0.0,
+    points: int | None = None,
 ) -> NDArray[np.complex64]:
     """Slow-time echo of one rotor's blades about its hub, far field.
 
@@ -102,11 +103,14 @@ def rotor_echo(
     edge_asymmetry : array_like, shape (...)
         How unlike the leading and the trailing edge reflect, -1..1: a blade's amplitude is 1 + asymmetry * sin(angle),
         and sin(angle) > 0 is where it recedes (for a positive rotation rate).
+    points : int, optional
+        Equal scatterers a blade, evenly from `root_m` to the tip, >= 1; one is at the tip, which is the paper's model.
+        None: a line that reflects evenly (Martin and Mulgrew 1990).
 
     Returns
     -------
     ndarray of complex64, shape (..., pulses)
-        Sum over the blades of the mean of exp(j 2 k r c) over the reflecting part of the blade: a blade of amplitude 1
+        Sum over the blades of the mean of exp(j 2 k r c) over what reflects of the blade: a blade of amplitude 1
         seen at rest at a right angle contributes 1.
     """
     angle = np.asarray(angle_rad, np.float64)
@@ -115,17 +119,17 @@ def rotor_echo(
         *(np.shape(value) for value in (blade_length_m, beta_rad, root_m, edge_asymmetry)),
         np.shape(blade_amplitudes)[:-1],
     )
-    blades = Blades.of(lead, wavelength_m, blade_length_m, beta_rad, root_m, blade_amplitudes, edge_asymmetry)
+    blades = Blades.of(lead, wavelength_m, blade_length_m, beta_rad, root_m, blade_amplitudes, edge_asymmetry, points)
     pulses = angle.shape[-1]
     reach_m = np.max(np.asarray(blade_length_m) * np.abs(np.cos(beta_rad)), initial=0)
     if 2 * TWO_PI / wavelength_m * reach_m > LARGEST_GAMMA:
         shapes = np.atleast_1d(blade_length_m), np.atleast_1d(beta_rad), np.atleast_1d(root_m)
-        echo = _double_echo(angle, wavelength_m, *shapes, blade_amplitudes, edge_asymmetry)
+        echo = _double_echo(angle, wavelength_m, *shapes, blade_amplitudes, edge_asymmetry, points)
         return echo.reshape(*lead, pulses)
     angle = np.broadcast_to(angle, (*lead, pulses)).reshape(-1, pulses)
     out = np.empty(angle.shape, np.complex64)
     wide = max(1, min(pulses, TILE_SAMPLES))
-    high, room = TILE_SAMPLES // wide, Room(8 * TILE_SAMPLES)
+    high, room = TILE_SAMPLES // wide, Room(10 * TILE_SAMPLES)
     for row, at in product(range(0, len(out), high), range(0, pulses, wide)):
         rows, span = slice(row, row + high), slice(at, at + wide)
         reduced = reduce_phase(angle[rows, span])
@@ -144,6 +148,7 @@ def _double_echo(
     root_m: NDArray[np.float64],
     blade_amplitudes: ArrayLike,
     edge_asymmetry: ArrayLike,
+    points: int | None,
 ) -> NDArray[np.complex64]:
     """The closed form blade by blade in float64, for blades of so many wavelengths that float32 has no digits left."""
     amplitudes = np.asarray(blade_amplitudes, np.float64)
@@ -154,7 +159,11 @@ def _double_echo(
     for number in range(blades):
         theta = angle + TWO_PI * number / blades
         along = k[..., None] * np.cos(theta)
-        share = np.sinc((tip_m - root_m)[..., None] * along / np.pi)
         weight = amplitudes[..., number, None] * (1 + asymmetry * np.sin(theta))
-        out = out + weight * share * np.exp(1j * (tip_m + root_m)[..., None] * along)
+        if points:
+            places = np.linspace(root_m if points > 1 else tip_m, tip_m, points)
+            out = out + weight / points * sum(np.exp(2j * place[..., None] * along) for place in places)
+        else:
+            share = np.sinc((tip_m - root_m)[..., None] * along / np.pi)
+            out = out + weight * share * np.exp(1j * (tip_m + root_m)[..., None] * along)
     return out.astype(np.complex64)

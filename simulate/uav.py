@@ -1,6 +1,7 @@
 """Small UAVs: fixed wing, multirotors, and the helicopter with its geared tail rotor."""
 
 from dataclasses import fields
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,10 @@ ROTORS = {"fixed_wing": 1, "quadcopter": 4, "hexacopter": 6, "octocopter": 8, "h
 
 #: Blades a rotor may have.
 BLADES = (2, 3, 4)
+
+#: What a blade reflects with, and how often: a line (Martin and Mulgrew 1990), its tip alone (P), or some points of it.
+#: A model that knows one of them takes the spectrum of another for clutter.
+POINTS = {None: 0.55, 1: 0.15, 2: 0.07, 3: 0.07, 5: 0.06, 8: 0.05, 12: 0.05}
 
 
 def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
@@ -46,6 +51,7 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
     amplitudes = _blade_amplitudes(draws)
     root = length * draws.value("root_fraction")
     asymmetry = draws.value("edge_asymmetry")
+    points = np.searchsorted(np.cumsum(list(POINTS.values()))[:-1], draws.uniform(), side="right")
 
     manoeuvre = draws.chance(0.3)
     spread = np.where(manoeuvre, draws.value("manoeuvre_spread"), draws.value("hover_spread"))
@@ -83,10 +89,10 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
         "vibration_phase_rad": phase,
     }
     micro = np.empty((len(draws), radar.pulses), np.complex64)
-    for count in BLADES:
-        rows = np.flatnonzero(blades == count)
+    for count, (number, each) in product(BLADES, enumerate(POINTS)):
+        rows = np.flatnonzero((blades == count) & (points == number))
         if len(rows):
-            some = [_of(rotor, rows, count) for rotor in lifting] + [_of(rotor, rows) for rotor in tail]
+            some = [_of(rotor, rows, each, count) for rotor in lifting] + [_of(rotor, rows, each) for rotor in tail]
             micro[rows] = rotors_echo(radar, some, len(rows), **{name: value[rows] for name, value in path.items()})
     body = body_echo(radar, len(draws), **path, phase_rad=rest)
     return Target(micro, body, draws.value("uav_body_db"), truth=truth)
@@ -128,9 +134,9 @@ def _tail_rotor(
     return Rotor(motion, length, beta, 0.2 * length, amplitudes, np.zeros(len(draws)), hub), rate
 
 
-def _of(rotor: Rotor, rows: NDArray[np.intp], blades: int | None = None) -> Rotor:
-    """Some records' rotor, with the first of its blades."""
-    taken = {f.name: getattr(rotor, f.name)[rows] for f in fields(rotor) if f.name != "motion"}
+def _of(rotor: Rotor, rows: NDArray[np.intp], points: int | None, blades: int | None = None) -> Rotor:
+    """Some records' rotor, with the first of its blades, each of so many points."""
+    taken = {f.name: getattr(rotor, f.name)[rows] for f in fields(rotor) if f.name not in ("motion", "points")}
     taken["blade_amplitudes"] = taken["blade_amplitudes"][:, :blades]
     motion = {f.name: getattr(rotor.motion, f.name)[rows] for f in fields(rotor.motion)}
-    return Rotor(RotorMotion(**motion), **taken)
+    return Rotor(RotorMotion(**motion), **taken, points=points)

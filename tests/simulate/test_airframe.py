@@ -32,8 +32,9 @@ def drawn(records: int, seed: int, blades: tuple[int, ...] = (2, 3, 4, 1)) -> li
             blade_amplitudes=rng.uniform(0, 1, (records, count)),
             edge_asymmetry=uniform(-1, 1),
             hub=uniform(0, 1) * np.exp(1j * uniform(-np.pi, np.pi)),
+            points=points,
         )
-        for count in blades
+        for count, points in zip(blades, (None, 1, 5, None), strict=False)
     ]
 
 
@@ -48,6 +49,7 @@ def slowly(radar: Radar, rotors: list[Rotor], velocity_mps: np.ndarray, accelera
             root_m=rotor.root_m,
             blade_amplitudes=rotor.blade_amplitudes,
             edge_asymmetry=rotor.edge_asymmetry,
+            points=rotor.points,
         )
         total += np.asarray(rotor.hub)[..., None] * echo
     return total * range_phasor(straight_path(radar.times_s, velocity_mps, acceleration_mps2), radar.wavelength_m)
@@ -83,7 +85,8 @@ def test_batch_equals_loop_bit_by_bit():
         alone = [
             Rotor(
                 RotorMotion(**{name: value[i : i + 1] for name, value in vars(r.motion).items()}),
-                **{name: value[i : i + 1] for name, value in vars(r).items() if name != "motion"},
+                **{name: value[i : i + 1] for name, value in vars(r).items() if name not in ("motion", "points")},
+                points=r.points,
             )
             for r in rotors
         ]

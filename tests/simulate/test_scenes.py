@@ -34,8 +34,11 @@ def test_the_body_line_is_at_the_body_velocity(kind):
 def test_no_blade_is_faster_than_its_tip(kind):
     target = draw_uav(draws(30, 2), RADAR, kind)
     power, velocity = spectrum(target.micro)
-    # wander and drift move a rate by at most some per cent; acceleration smears the body
-    limit = target.truth["tip_mps"] * np.cos(target.truth["beta_rad"]) * 1.12 + 3
+    # wander and drift move a rate by at most some per cent; acceleration smears the body; the lines of a point on a
+    # circle, Bessel functions, end within some cube roots of their highest order
+    tip = target.truth["tip_mps"] * np.cos(target.truth["beta_rad"])
+    line = target.truth["rotation_hz"] * RADAR.wavelength_m / 2
+    limit = 1.12 * tip + 3 + 2 * line * np.cbrt(tip / line)
     away = abs(velocity[None, :] - target.truth["velocity_mps"][:, None])
     folded = np.minimum(away, 2 * RADAR.unambiguous_mps - away)
     outside = np.where(folded > limit[:, None], power, 0).sum(axis=1) / power.sum(axis=1)
