@@ -46,6 +46,7 @@ FORMAT = "1"
 # One step of the work: bounded in records and in samples, so that memory stays flat however large the batch is.
 _STEP_RECORDS = 256
 _STEP_SAMPLES = 1 << 21
+_STEP_INPUTS = 4096
 
 _OUTPUTS = ["probabilities"]
 
@@ -198,10 +199,7 @@ class Classifier:
     ) -> None:
         if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
             raise BadInput(f"threads is {threads!r}: it must be a whole number of 1 or more")
-        if max_false_alarm is not None and coverage is not None:
-            raise BadInput(
-                f"a false-alarm rate of {max_false_alarm:g} and a coverage of {coverage:g}: give one of them"
-            )
+        max_false_alarm, coverage = _rule(max_false_alarm, coverage)
         try:
             verify(onnx_bytes)  # before anything of the file is opened, and so is what it says of itself
             self.metadata = MappingProxyType(read_metadata(onnx_bytes))
@@ -250,6 +248,7 @@ class Classifier:
             There is no such model, or it is not one that can be used (see `Classifier`).
         """
         # a budget alone never leads to the cascade where it could not answer
+        max_false_alarm, coverage = _rule(max_false_alarm, coverage)
         name = chosen_name(name_or_path, budget_us, single=budget_us is not None and coverage is not None)
         if name == CASCADE:
             from .cascade import Cascade
@@ -362,20 +361,38 @@ class Classifier:
         """Probabilities of a bounded number of records, in one or more pieces."""
         return [self.from_inputs(model_inputs(records, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs))]
 
-    def from_inputs(self, inputs: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+    def from_inputs(self, inputs: Mapping[str, NDArray[np.floating]]) -> NDArray[np.float32]:
         """Probabilities of records whose inputs are made; others than the model's are passed over.
 
         Parameters
         ----------
         inputs
-            Name to array (records, *shape), as `bladewing.features.model_inputs` gives them.
+            Name to array (records, *shape), as `bladewing.features.model_inputs` gives them, of any precision and any
+            number of records: a bounded number is cast and run at a time.
 
         Returns
         -------
         ndarray
             Shape (records, 3), order `classes`.
         """
-        return self._session.run(_OUTPUTS, {name: inputs[name] for name in self.inputs})[0]
+        count = len(inputs[self.inputs[0]])
+        parts = [
+            self._session.run(
+                _OUTPUTS,
+                {name: inputs[name][at : at + _STEP_INPUTS].astype(np.float32, copy=False) for name in self.inputs},
+            )[0]
+            for at in range(0, max(count, 1), _STEP_INPUTS)
+        ]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+def _rule(max_false_alarm: object, coverage: object) -> tuple[float | None, float | None]:
+    """Check the two numbers by which "unknown" may be ruled, of which one at most is given."""
+    rate = None if max_false_alarm is None else positive(max_false_alarm, "max_false_alarm")
+    share = None if coverage is None else positive(coverage, "coverage")
+    if rate is not None and share is not None:
+        raise BadInput(f"a false-alarm rate of {rate:g} and a coverage of {share:g}: give one of them")
+    return rate, share
 
 
 def _open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.InferenceSession:
@@ -454,6 +471,8 @@ def _read_inputs(session: onnxruntime.InferenceSession, source: str) -> tuple[st
                 f"{source}: input {node.name!r} of shape {tuple(node.shape)}: this version gives "
                 f"{ {name: ('records', *shape) for name, shape in INPUT_SHAPES.items()} }: train it again"
             )
+    if not session.get_inputs():
+        raise BadInput(f"{source}: no input: not a complete bladewing model, train it again")
     if "probabilities" not in [node.name for node in session.get_outputs()]:
         raise BadInput(f"{source}: no output 'probabilities': not a complete bladewing model, train it again")
     return tuple(node.name for node in session.get_inputs())

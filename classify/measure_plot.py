@@ -13,7 +13,10 @@ from .recording import Recording
 #: Colours of what is drawn behind the spectrum.
 _LEGEND = (("#dbe9f6", "band"), ("#f3d9b1", "notch"), ("#c0392b", "comb"), ("#1e8449", "2nd comb"))
 
-_WIDTH, _HEIGHT, _LEFT, _BOTTOM, _TOP = 960, 440, 56, 44, 54
+_WIDTH, _HEIGHT, _LEFT, _BOTTOM, _TOP = 960, 470, 56, 44, 80
+
+#: Width of what is shown over that of the band; all where no band is measured.
+_MARGIN = 1.6
 
 
 def _round_step(least: float) -> float:
@@ -43,7 +46,16 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
     spectrum = doppler_spectrum(iq, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
     level = spectrum.level_db
     frequency = spectrum.frequency_hz
+    per_mps = 2 / spectrum.wavelength_m
+    body_hz = -float(values.body_velocity_mps[index]) * per_mps
+    chopping_hz, width_hz = float(values.chopping_hz[index]), float(values.bandwidth_hz[index])
     low, high = float(frequency[0]), float(frequency[-1])
+    if np.isfinite(width_hz):  # and what is at rest
+        reach_hz = _MARGIN * width_hz / 2
+        low = max(low, min(body_hz - reach_hz, -2 * NOTCH_MPS * per_mps))
+        high = min(high, max(body_hz + reach_hz, 2 * NOTCH_MPS * per_mps))
+    shown = (frequency >= low) & (frequency <= high)
+    frequency, level = frequency[shown], level[shown]
     bottom_db = -10.0
     top_db = max(10 * np.ceil(float(level.max()) / 10 + 0.2), bottom_db + 20)  # of silence too
 
@@ -64,9 +76,6 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
                 f"<title>{title}</title></rect>"
             )
 
-    per_mps = 2 / spectrum.wavelength_m
-    body_hz = -float(values.body_velocity_mps[index]) * per_mps
-    chopping_hz, width_hz = float(values.chopping_hz[index]), float(values.bandwidth_hz[index])
     if np.isfinite(width_hz):
         band(body_hz - width_hz / 2, body_hz + width_hz / 2, _LEGEND[0][0], f"band {width_hz:.0f} Hz")
     for centre_hz in {0.0, body_hz} if np.isfinite(body_hz) else {0.0}:
@@ -95,15 +104,19 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
         parts.append(f'<text x="{_LEFT - 6}" y="{y(db) + 4:.1f}" text-anchor="end">{db:.0f}</text>')
     points = " ".join(f"{x(f):.1f},{y(max(db, bottom_db)):.1f}" for f, db in zip(frequency, level, strict=True))
     parts.append(f'<polyline points="{points}" fill="none" stroke="#1f4e79" stroke-width="0.9"/>')
-    step_hz = _round_step((high - low) / 10)
-    for hz in np.arange(np.ceil(low / step_hz), np.floor(high / step_hz) + 1) * step_hz:
-        parts.append(f'<path d="M{x(hz):.1f} {base:.1f}v4" stroke="#222" stroke-width="0.8"/>')
-        parts.append(f'<text x="{x(hz):.1f}" y="{base + 20:.1f}" text-anchor="middle">{hz:.0f}</text>')
+    # Doppler below, and above the velocity, which falls where it rises
+    for per_unit, edge, tick, words in ((1.0, base, 4, base + 20), (-per_mps, _TOP, -4, _TOP - 8)):
+        first, last = sorted((low / per_unit, high / per_unit))
+        step = _round_step((last - first) / 10)
+        for value in np.arange(np.ceil(first / step), np.floor(last / step) + 1) * step:
+            at = x(value * per_unit)
+            parts.append(f'<path d="M{at:.1f} {edge:.1f}v{tick}" stroke="#222" stroke-width="0.8"/>')
+            parts.append(f'<text x="{at:.1f}" y="{words:.1f}" text-anchor="middle">{value + 0.0:.6g}</text>')
     legend = _LEGEND if np.isfinite(both_hz).all() else _LEGEND[:3]
     for number, (colour, words) in enumerate(legend):
         left = _WIDTH - 12 - 76 * (len(legend) - number)
-        parts.append(f'<rect x="{left}" y="{_TOP - 24}" width="12" height="12" fill="{colour}" stroke="#888"/>')
-        parts.append(f'<text x="{left + 18}" y="{_TOP - 14}">{words}</text>')
+        parts.append(f'<rect x="{left}" y="30" width="12" height="12" fill="{colour}" stroke="#888"/>')
+        parts.append(f'<text x="{left + 18}" y="40">{words}</text>')
     said = str(values.reason[index]) or f"comb every {chopping_hz:.2f} Hz, band {width_hz:.0f} Hz"
     if np.isfinite(both_hz).all():
         said += f"; main {both_hz[0]:.2f} Hz, tail {both_hz[1]:.2f} Hz, ratio {values.gear_ratio[index]:.3f}"
@@ -116,6 +129,7 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
         f'<text x="{_LEFT}" y="20" font-size="13">{title}</text>\n'
         + "\n".join(parts)
         + f'\n<text x="{_WIDTH / 2}" y="{_HEIGHT - 6}" text-anchor="middle">Doppler frequency [Hz]</text>\n'
+        f'<text x="{_WIDTH / 2}" y="{_TOP - 24}" text-anchor="middle">radial velocity [m/s]</text>\n'
         f'<text transform="translate(14 {_HEIGHT / 2}) rotate(-90)" text-anchor="middle">level over noise [dB]</text>\n'
         "</svg>\n"
     )

@@ -28,7 +28,7 @@ from .parts import Parts
 from .progress import Progress
 from .training_account import ACCOUNT, alarm_threshold, covered, figures, print_table
 from .training_config import TrainingConfig, training_config
-from .training_costs import add_costs, answers
+from .training_costs import add_costs
 
 #: Folder of what is trained so far, beside the models while the run is not done.
 PARTS = "train-parts"
@@ -120,7 +120,7 @@ def run_training(
         @cache
         def told_by(teacher: str) -> NDArray[np.float32]:
             """What a trained network says of the training records, once for all of its pupils."""
-            return answers(Classifier(files[f"{teacher}.onnx"], source=teacher), sets.train)
+            return Classifier(files[f"{teacher}.onnx"], source=teacher).from_inputs(sets.train.inputs)
 
         teachers_first = sorted(settings.models, key=lambda name: bool(LADDER[name].teacher))
         for name in teachers_first:

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from bladewing.models.calibration import expected_calibration_error
 from bladewing.simulate import Radar, draw_records
-from numpy.typing import NDArray
 
 from .cascade import Cascade
 from .gather import Gathered
@@ -16,7 +15,6 @@ from .ladder import CASCADE, COST_KEY, PULSES, RECORDS, STAGES_KEY, by_place
 from .training_account import figures
 
 _RADAR = Radar(10e9, 25e3, PULSES)
-_ROWS = 4096
 
 
 def add_costs(
@@ -49,7 +47,7 @@ def add_costs(
         return None
     first, second = ((files[f"{name}.onnx"], name) for name in stages)
     cascade = Cascade(first, second)
-    cheap, dear = (answers(classifiers[name], test) for name in stages)
+    cheap, dear = (classifiers[name].from_inputs(test.inputs) for name in stages)
     sure = cascade.sure(cheap)
     probabilities = np.where(sure[:, None], cheap, dear)
     return {
@@ -86,14 +84,3 @@ def costs_ffts(classifiers: Mapping[str, Classifier]) -> dict[str, float]:
     medians = {name: quote(lap)["median_us"] for name, lap in laps.items()}
     bare = medians.pop("FFT")
     return {name: median / bare for name, median in medians.items()}
-
-
-def answers(classifier: Classifier, records: Gathered) -> NDArray[np.float32]:
-    """Give the probabilities of many records, shape (n, 3), from a bounded number at a time."""
-    parts = [
-        classifier.from_inputs(
-            {name: records.inputs[name][first : first + _ROWS].astype(np.float32) for name in classifier.inputs}
-        )
-        for first in range(0, len(records.labels), _ROWS)
-    ]
-    return np.concatenate(parts)

@@ -100,7 +100,6 @@ def _part(records: Gathered, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Gath
 def _trained(model: str, settings: TrainingConfig, sets: Mapping[str, Gathered]) -> Answer:
     """Train, and give what answers records: their probabilities and labels."""
     from ..train import Sets, train_one
-    from ..training_costs import answers
 
     # the account's own figures are not used here, so any records do
     few = _part(sets["validate"], np.arange(min(600, len(sets["validate"]))))
@@ -108,7 +107,7 @@ def _trained(model: str, settings: TrainingConfig, sets: Mapping[str, Gathered])
     classifier = Classifier(sealed, source=model)
 
     def answer(test: Gathered) -> tuple[NDArray[np.floating], NDArray[np.str_]]:
-        probabilities = answers(classifier, test)
+        probabilities = classifier.from_inputs(test.inputs)
         return probabilities, classifier.decide(probabilities)[0]
 
     return answer

@@ -43,6 +43,10 @@ def test_a_coverage_that_cannot_be_kept_is_refused(model, uav_model, make_model)
         Classifier.load(uav_model, coverage=0.9)
     with pytest.raises(BadInput, match=r"rate of 0\.1 and a coverage of 0\.9: give one"):
         Classifier.load(model, coverage=0.9, max_false_alarm=0.1)
+    for wrong in ("0.9", True, np.nan, -0.9):
+        for rule in ("coverage", "max_false_alarm"):
+            with pytest.raises(BadInput, match=rf"^{rule} is .*: it must be"):
+                Classifier.load(model, **{rule: wrong})
     for damaged in ("3", "[[0.9]]", '[["x", 1, 1, 1]]', "[[0.9, 1, 1, NaN]]", "{", "[[]]"):
         with pytest.raises(BadInput, match="damaged prediction sets"):
             Classifier(make_model(prediction_sets=damaged), coverage=0.9)

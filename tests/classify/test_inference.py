@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from bladewing.classify import BadInput, Classifier, inference
 from bladewing.classify.inference import model_names
+from bladewing.features import model_inputs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -42,6 +43,16 @@ def test_a_batch_gives_what_a_loop_gives(mixed, pulses, records, seed):
     iq = noise(pulses, (records,), seed)
     batch, loop = mixed.predict(iq, **RADAR), [mixed.predict(one, **RADAR) for one in iq]
     np.testing.assert_allclose(batch.probabilities, [one.probabilities for one in loop], atol=1e-5)
+
+
+def test_inputs_of_any_number_and_precision_are_run_a_bounded_number_at_a_time(mixed, monkeypatch):
+    made = model_inputs(noise(200, (7,)), **RADAR, names=mixed.inputs)
+    half = {name: values.astype(np.float16) for name, values in made.items()}
+    whole = mixed.from_inputs(half)
+    monkeypatch.setattr(inference, "_STEP_INPUTS", 3)
+    np.testing.assert_allclose(mixed.from_inputs(half), whole, atol=1e-6)
+    none = {name: values[:0] for name, values in half.items()}
+    assert mixed.from_inputs(none).shape == (0, 3)
 
 
 @pytest.mark.parametrize("limit", ["_STEP_RECORDS", "_STEP_SAMPLES"])
