@@ -105,13 +105,13 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
     points = " ".join(f"{x(f):.1f},{y(max(db, bottom_db)):.1f}" for f, db in zip(frequency, level, strict=True))
     parts.append(f'<polyline points="{points}" fill="none" stroke="#1f4e79" stroke-width="0.9"/>')
     # Doppler below, and above the velocity, which falls where it rises
-    for per_unit, edge, tick, words in ((1.0, base, 4, base + 20), (-per_mps, _TOP, -4, _TOP - 8)):
+    for per_unit, edge, tick, label_y in ((1.0, base, 4, base + 20), (-per_mps, _TOP, -4, _TOP - 8)):
         first, last = sorted((low / per_unit, high / per_unit))
         step = _round_step((last - first) / 10)
         for value in np.arange(np.ceil(first / step), np.floor(last / step) + 1) * step:
             at = x(value * per_unit)
             parts.append(f'<path d="M{at:.1f} {edge:.1f}v{tick}" stroke="#222" stroke-width="0.8"/>')
-            parts.append(f'<text x="{at:.1f}" y="{words:.1f}" text-anchor="middle">{value + 0.0:.6g}</text>')
+            parts.append(f'<text x="{at:.1f}" y="{label_y:.1f}" text-anchor="middle">{value + 0.0:.6g}</text>')
     legend = _LEGEND if np.isfinite(both_hz).all() else _LEGEND[:3]
     for number, (colour, words) in enumerate(legend):
         left = _WIDTH - 12 - 76 * (len(legend) - number)
