@@ -113,6 +113,16 @@ def quadcopter_over_ground(rng: np.random.Generator, radar: Radar) -> Scene:
     return Scene(scene.body + level(clutter.ground(rng, radar).micro, rng.uniform(0, 25)), scene.micro)
 
 
+def quadcopter_of_tips(rng: np.random.Generator, radar: Radar) -> Scene:
+    """Blades that reflect at their tips alone: no flash, and the power at the edges of the band."""
+    return multicopter(rng, radar, law="tip")
+
+
+def turbine_of_points(rng: np.random.Generator, radar: Radar) -> Scene:
+    """A wind turbine whose blades are 40 even points: for a while its lines are as even as a rotor's."""
+    return clutter.wind_turbine(rng, radar, 40, law="points")
+
+
 def hexacopter(rng: np.random.Generator, radar: Radar) -> Scene:
     return multicopter(rng, radar, 6, radius_m=(0.15, 0.30), rate_hz=(40, 75))
 
@@ -270,5 +280,7 @@ KINDS: dict[str, tuple[str, Callable[[np.random.Generator, Radar], Scene]]] = {
     "vehicle": ("clutter", clutter.vehicle),
     "wind_turbine": ("clutter", clutter.wind_turbine),
     "noise": ("clutter", clutter.noise),
+    "quad_of_tips": ("uav", quadcopter_of_tips),
+    "turbine_of_points": ("clutter", turbine_of_points),
 }
 """What a kind should be called, and what makes one of it."""

@@ -1,14 +1,15 @@
 """Physics of whole records: what the radar sees of a target is where the target's truth says."""
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from bladewing.simulate import Radar
+from bladewing.simulate import Radar, rotors_echo, uav
 from bladewing.simulate.bird import draw_bird
-from bladewing.simulate.discretes import _passing, _vehicle_body, _wheels, draw_discrete
+from bladewing.simulate.discretes import MAX_BLADE_POINTS, _passing, _vehicle_body, _wheels, draw_discrete
 from bladewing.simulate.laws import LAWS, STEADY, WIDTH, Draws
-from bladewing.simulate.uav import ROTORS, draw_uav
+from bladewing.simulate.uav import POINTS, ROTORS, draw_uav
 
 RADAR = Radar(9.85e9, 40e3, 4000)
 
@@ -174,3 +175,36 @@ def test_turbine_blades_stay_below_their_tip_and_the_tower_rests():
     outside = np.where(abs(velocity)[None, :] > limit[:, None], power, 0).sum(axis=1) / power.sum(axis=1)
     assert outside.max() < 1e-3
     np.testing.assert_array_equal(target.body, target.body[:, :1] * np.ones(RADAR.pulses, np.complex64))
+
+
+def test_a_quarter_of_turbines_are_rows_of_equal_points_at_equal_distances():
+    # of what is drawn for the points of a blade, each 30 times: place, place on the chord, strength, phase, an even row
+    # takes the first phase alone
+    first, block, even = 11, 4 * MAX_BLADE_POINTS, 10
+    uniforms = np.random.default_rng(4).random((8, WIDTH))
+    uniforms[:, even] = np.linspace(0, 0.99, 8)
+    others = uniforms.copy()
+    for blade in range(3):
+        start = first + blade * block
+        kept = start + 3 * MAX_BLADE_POINTS
+        columns = [column for column in range(start, start + block) if column != kept]
+        others[:, columns] = np.random.default_rng(5).random((8, len(columns)))
+    echoes = [draw_discrete(Draws(u.copy()), RADAR, "wind_turbine").micro for u in (uniforms, others)]
+    same = [np.array_equal(one, other) for one, other in zip(*echoes, strict=True)]
+    assert same == (uniforms[:, even] < 0.25).tolist()
+
+
+def test_blades_reflect_as_lines_tips_or_rows_as_often_as_the_table_says(monkeypatch):
+    found: Counter[int | None] = Counter()
+
+    def counting(radar, rotors, records, **path):
+        (points,) = {rotor.points for rotor in rotors}
+        found[points] += records
+        return rotors_echo(radar, rotors, records, **path)
+
+    monkeypatch.setattr(uav, "rotors_echo", counting)
+    count = 3000
+    draw_uav(draws(count, 6), Radar(9.85e9, 25e3, 8), "helicopter")
+    for points, share in POINTS.items():
+        assert abs(found[points] / count - share) < 4 * np.sqrt(share * (1 - share) / count), points
+    assert found.total() == count
