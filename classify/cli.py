@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     name="bladewing",
-    help="Tell UAV, bird and clutter apart from a radar's slow-time returns.",
     add_completion=False,
     rich_markup_mode=None,  # else the units in [brackets] are taken for markup
 )
@@ -57,6 +56,23 @@ ModelName = Annotated[
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object a line: one a dwell, a closing one a recording.")]
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        print(version("bladewing"), flush=True)
+        raise typer.Exit
+
+
+@app.callback()
+def _before_any_command(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    """Tell UAV, bird and clutter apart from a radar's slow-time returns."""
 
 
 @app.command()

@@ -2,6 +2,7 @@
 
 import sys
 import types
+from importlib import metadata
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
@@ -80,6 +81,11 @@ def test_help_goes_to_stdout(capsys, arguments):
     out, err = capsys.readouterr()
     assert out.startswith("Usage: bladewing")
     assert err == ""
+
+
+def test_the_version_is_that_of_the_package(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == metadata.version("bladewing") + "\n"
 
 
 def test_help_shows_units(capsys):
