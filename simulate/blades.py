@@ -58,6 +58,8 @@ class Blades:
         points: int | None = None,
     ) -> "Blades":
         """From the parameters of `rotor_echo`, for records of the leading shape `lead`."""
+        if points is not None and points < 1:
+            raise ValueError(f"points is {points!r}: a blade has at least 1, or None for a line")
 
         def row(value: ArrayLike) -> NDArray[np.float64]:
             return np.broadcast_to(np.asarray(value, np.float64), lead).reshape(-1, 1)

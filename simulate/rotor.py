@@ -112,6 +112,11 @@ def rotor_echo(
     ndarray of complex64, shape (..., pulses)
         Sum over the blades of the mean of exp(j 2 k r c) over what reflects of the blade: a blade of amplitude 1
         seen at rest at a right angle contributes 1.
+
+    Raises
+    ------
+    ValueError
+        If `points` is below 1.
     """
     angle = np.asarray(angle_rad, np.float64)
     lead = np.broadcast_shapes(

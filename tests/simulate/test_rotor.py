@@ -161,3 +161,8 @@ def test_a_wandering_rate_is_the_derivative_of_the_angle():
     rate_hz = np.gradient(motion.angle_rad(times_s), times_s) / (2 * np.pi)
     expected = 50 + 3 * times_s + 2 * np.cos(2 * np.pi * 4 * times_s + 0.5)
     np.testing.assert_allclose(rate_hz[1:-1], expected[1:-1], atol=1e-3)
+
+
+def test_a_blade_has_one_point_or_more():
+    with pytest.raises(ValueError, match="points is 0: a blade has at least 1"):
+        rotor_echo(np.zeros(8), wavelength_m=WAVELENGTH_M, blade_length_m=0.2, points=0)
