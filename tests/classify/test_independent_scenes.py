@@ -76,7 +76,9 @@ def test_ground_falls_as_billingsley_says():
     assert np.log(total[near].mean() / total[far].mean()) / 0.7 == pytest.approx(5.56, rel=0.1)
 
 
-@pytest.mark.parametrize(("kind", "least"), [("quadcopter", 0.88), ("hexacopter", 0.8), ("fixed_wing", 0.88), ("quad_of_tips", 0.82)])
+@pytest.mark.parametrize(
+    ("kind", "least"), [("quadcopter", 0.88), ("hexacopter", 0.8), ("fixed_wing", 0.88), ("quad_of_tips", 0.82)]
+)
 def test_a_drone_is_a_uav_at_20_db(kind, least):
     assert share(kind, "uav") >= least
 
