@@ -252,6 +252,7 @@ def rewrite(folder, name, part, change):
     """Alter a shard and its digest together, as a forger would."""
     path = folder / f"{name}.{part}.npy"
     content = change(path.read_bytes())
+    assert content != path.read_bytes()
     path.write_bytes(content)
     manifest = json.loads((folder / MANIFEST).read_text())
     manifest["shards"][name][f"{part}_sha256"] = hashlib.sha256(content).hexdigest()
@@ -263,7 +264,11 @@ FORGED = {
     "another shape": ("iq", lambda b: b.replace(b"'shape': (", b"'shape':-(", 1), "not .* values as bladewing"),
     "a sample that is no number": ("iq", lambda b: b[:-8] + b"\xff" * 8, "a sample is not finite"),
     "a label of its own": ("table", lambda b: b.replace(b"bird\0\0\0", b"wing\0\0\0", 1), "a kind or a label"),
-    "a kind of another class": ("table", lambda b: b.replace(b"noise\0", b"flock\0", 1), "a kind or a label"),
+    "a kind of another class": (
+        "table",
+        lambda b: b.replace(b"gliding_bird", b"helicopter\0\0", 1),
+        "kind or a label",
+    ),
     "pulses that do not add up": ("table", lambda b: b[:-185] + b"\x01" * 185, "pulses do not add up|kind or a label"),
 }
 

@@ -60,7 +60,8 @@ def test_the_classifier_loads_by_place_and_by_budget(monkeypatch):
 
 def test_predict_says_what_a_budget_buys(monkeypatch, sigmf_pair, capsys):
     monkeypatch.setattr(inference, "measured_fft_us", lambda: 1.0)
-    for enough, name in ((15, "spectrum-cnn-fast"), (1000, "cascade")):
+    account = ladder.shipped_account()
+    for enough, name in ((15, by_place("fast", account)), (1000, by_place("best", account))):
         assert main(["predict", str(sigmf_pair()), "--budget-us", str(enough)]) == 0
         said = f"bladewing: note: the budget of {enough} us buys the model {name}\n"
         assert capsys.readouterr().err == said

@@ -252,7 +252,7 @@ def test_the_best_state_is_kept_when_the_last_epochs_are_ruined():
     kept = torch.nn.functional.cross_entropy(
         torch.from_numpy(network_scores(net, validation[0])), torch.from_numpy(validation[1])
     )
-    assert float(kept) == min(losses)
+    assert float(kept) == pytest.approx(min(losses), rel=1e-6)  # other convolutions than in training
     assert not net.training
 
 
