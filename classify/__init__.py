@@ -1,21 +1,29 @@
 """Recordings, inference, training, report and the command line: composes simulate, features and models.
 
-Importing this package loads nothing heavy; `Classifier` is fetched when it is first asked for.
+Importing this package loads nothing heavy; what it offers is fetched when it is first asked for.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from .errors import BadInput
 
 if TYPE_CHECKING:
     from .inference import Classifier
+    from .predict import answer
+    from .recording import Recording, load_recording
 
-__all__ = ["BadInput", "Classifier"]
+__all__ = ["BadInput", "Classifier", "Recording", "answer", "load_recording"]
+
+_WHERE = {
+    "Classifier": ".inference",
+    "Recording": ".recording",
+    "answer": ".predict",
+    "load_recording": ".recording",
+}
 
 
 def __getattr__(name: str) -> object:
-    if name == "Classifier":
-        from .inference import Classifier
-
-        return Classifier
+    if name in _WHERE:
+        return getattr(import_module(_WHERE[name], __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bladewing.classify import BadInput, Classifier, answer, load_recording
 from bladewing.classify import predict as work
 from bladewing.classify.cli import main
 
@@ -340,3 +341,14 @@ def test_the_measured_recordings_are_answered(run_json):
     closing = [line for line in lines if "track" in line]
     assert len(closing) == len(names) // 2
     assert sum(line["track"]["dwells"] for line in closing) == len(lines) - len(closing)
+
+
+def test_python_gives_what_the_command_says(run_json, sigmf_pair, uav_model):
+    path = sigmf_pair()
+    *said, closing = run_json(str(path))
+    given = answer(load_recording(path), Classifier.load(uav_model))
+    assert [row["label"] for row in said] == given.dwells.labels.tolist()
+    assert closing["track"]["label"] == given.track.label
+    for wrong in (0, -1.0, np.nan, "0.08"):
+        with pytest.raises(BadInput, match="^dwell_s is .*above 0"):
+            answer(load_recording(path), Classifier.load(uav_model), dwell_s=wrong)

@@ -6,6 +6,7 @@ import sys
 from importlib.resources import files
 
 import pytest
+from bladewing import classify
 
 HEAVY = [
     "torch", "sklearn", "onnx", "skl2onnx", "onnxscript", "scipy.signal", "scipy.stats", "scipy.io", "scipy.optimize",
@@ -43,3 +44,11 @@ def test_modules_load_what_they_need_when_they_need_it(module):
     loaded = modules_after(f"import json, sys, {module}; print(json.dumps(sorted(sys.modules)))")
     needed = {"typer", "rich", "pydantic"} if module.endswith("cli") else set()
     assert loaded.isdisjoint((set(HEAVY) | {"onnxruntime"}) - needed)
+
+
+def test_the_package_gives_what_it_names_and_nothing_else():
+    assert {getattr(classify, name).__module__.rpartition(".")[2] for name in classify.__all__} == {
+        "errors", "inference", "predict", "recording",
+    }  # fmt: skip
+    with pytest.raises(AttributeError, match="has no attribute 'guess'"):
+        _ = classify.guess
