@@ -350,5 +350,5 @@ def test_python_gives_what_the_command_says(run_json, sigmf_pair, uav_model):
     assert [row["label"] for row in said] == given.dwells.labels.tolist()
     assert closing["track"]["label"] == given.track.label
     for wrong in (0, -1.0, np.nan, "0.08"):
-        with pytest.raises(BadInput, match="^dwell_s is .*above 0"):
+        with pytest.raises(BadInput, match=r"^dwell_s is .*above 0"):
             answer(load_recording(path), Classifier.load(uav_model), dwell_s=wrong)
