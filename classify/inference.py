@@ -247,8 +247,8 @@ class Classifier:
         BadInput
             There is no such model, or it is not one that can be used (see `Classifier`).
         """
-        # a budget alone never leads to the cascade where it could not answer
         max_false_alarm, coverage = _rule(max_false_alarm, coverage)
+        # a budget alone never leads to the cascade where it could not answer
         name = chosen_name(name_or_path, budget_us, single=budget_us is not None and coverage is not None)
         if name == CASCADE:
             from .cascade import Cascade

@@ -166,7 +166,7 @@ def _double_echo(
         along = k[..., None] * np.cos(theta)
         weight = amplitudes[..., number, None] * (1 + asymmetry * np.sin(theta))
         if points:
-            places = np.linspace(root_m if points > 1 else tip_m, tip_m, points)
+            places = np.linspace(tip_m, root_m, points)  # the only one is the first: at the tip
             out = out + weight / points * sum(np.exp(2j * place[..., None] * along) for place in places)
         else:
             share = np.sinc((tip_m - root_m)[..., None] * along / np.pi)

@@ -75,15 +75,15 @@ def main() -> None:
     names = [radar.name for radar in RADARS]
     for model in options.model:
         answers = " ".join(f"{answer:>7} " for answer in ANSWERS)
-        print(f"\n{model}\n{'kind':<17}{'radar':<24}{'SNR dB':>12} {answers}   seen      right")
+        print(f"\n{model}\n{'kind':<18}{'radar':<24}{'SNR dB':>12} {answers}   seen      right")
         for kind in options.kind:
             truth = KINDS[kind][0]
             for of in ("total", "micro"):
                 for snr_db in SNRS_DB:
                     cells = {name: counts[model, kind, name, of, snr_db] for name in names}
-                    print(f"{kind:<17}{'all':<24}{of:>7}{snr_db:5.0f} {line(list(cells.values()), truth)}")
+                    print(f"{kind:<18}{'all':<24}{of:>7}{snr_db:5.0f} {line(list(cells.values()), truth)}")
                     for name in names if options.radars else ():
-                        print(f"{kind:<17}{name:<24}{of:>7}{snr_db:5.0f} {line([cells[name]], truth)}")
+                        print(f"{kind:<18}{name:<24}{of:>7}{snr_db:5.0f} {line([cells[name]], truth)}")
 
 
 if __name__ == "__main__":

@@ -267,7 +267,7 @@ FORGED = {
     "a kind of another class": (
         "table",
         lambda b: b.replace(b"gliding_bird", b"helicopter\0\0", 1),
-        "kind or a label",
+        "a kind or a label",
     ),
     "pulses that do not add up": ("table", lambda b: b[:-185] + b"\x01" * 185, "pulses do not add up|kind or a label"),
 }
