@@ -5,6 +5,7 @@ Each is a handful of scatterers on known paths; they are the hard confusers, bec
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import diric
 
 from .airframe import body_echo
 from .laws import Draws
@@ -162,8 +163,8 @@ def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
     """Draw a wind turbine: three long blades of which the range cell holds a part, and its tower at rest.
 
     A blade is rough on the scale of the wavelength: a row of scatterers, few or many, equal or of random strength, each
-    somewhere on the chord; it is no mirror. A quarter are as published models draw them, rows of equal points at equal
-    distances: for a while their lines are as even as a rotor's.
+    somewhere on the chord; it is no mirror. Two fifths are as published models draw them, equal points at equal
+    distances, from a few to a smooth line: for a while their lines are as even as a rotor's.
     """
     t, records = radar.times_s, len(draws)
     length, tip = draws.value("turbine_length_m"), draws.value("turbine_tip_mps")
@@ -173,27 +174,28 @@ def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
     cos_beta = np.cos(np.deg2rad(85) * draws.uniform())
     first = draws.value("phase_rad")
     points, chord = np.floor(draws.value("turbine_points")).astype(int), draws.value("chord_m")
-    equal, even = draws.chance(0.5)[:, None], draws.chance(0.25)[:, None]
-    row = np.arange(MAX_BLADE_POINTS)
+    equal, even = draws.chance(0.5)[:, None], draws.chance(0.4)
+    in_row = np.floor(draws.value("turbine_row_points"))
+    rows = np.flatnonzero(even)
     micro = np.zeros((records, radar.pulses), np.complex64)
     for blade in range(3):
         angle = TWO_PI * (turn[:, None] * t + blade / 3) + first[:, None]
         towards, across = np.cos(angle), np.sin(angle)
+        ends = (start * cos_beta)[rows, None] * towards[rows], ((start + cell) * cos_beta)[rows, None] * towards[rows]
+        micro[rows] += _even_row(*ends, in_row[rows, None], radar.wavelength_m)
         towards -= towards[:, :1].copy()
         across -= across[:, :1].copy()
         place, aside = draws.uniform(MAX_BLADE_POINTS), draws.uniform(MAX_BLADE_POINTS)
         strength, phase = draws.uniform(MAX_BLADE_POINTS), draws.value("phase_rad", MAX_BLADE_POINTS)
-        place, aside = np.where(even, (row + 0.5) / points[:, None], place), np.where(even, 0.5, aside)
-        phase = np.where(even, row * phase[:, :1], phase)  # each of them so much farther than the last
         along = start[:, None] + cell[:, None] * place
-        level = (np.where(equal | even, 1.0, strength**2) * np.exp(1j * phase)).astype(np.complex64)
+        level = (np.where(equal, 1.0, strength**2) * np.exp(1j * phase)).astype(np.complex64)
         r = along * cos_beta[:, None]
         # the chord tapers to the tip
         c = chord[:, None] * (2 * aside - 1) * (1 - along / length[:, None]) * cos_beta[:, None]
-        for point in range(int(points.max(initial=0))):
-            rows = np.flatnonzero(points > point)
-            nearer = r[rows, point, None] * towards[rows] + c[rows, point, None] * across[rows]
-            micro[rows] += level[rows, point, None] * range_phasor(-nearer, radar.wavelength_m)
+        for point in range(int(points[~even].max(initial=0))):
+            held = np.flatnonzero(~even & (points > point))
+            nearer = r[held, point, None] * towards[held] + c[held, point, None] * across[held]
+            micro[held] += level[held, point, None] * range_phasor(-nearer, radar.wavelength_m)
     body = np.exp(1j * draws.value("phase_rad")).astype(np.complex64)[:, None] * np.ones(
         (1, radar.pulses), np.complex64
     )
@@ -205,6 +207,17 @@ def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
         "velocity_mps": np.zeros(records),
     }
     return Target(micro, body, 45 * draws.uniform() - 5, truth=truth)
+
+
+def _even_row(
+    first_m: NDArray[np.float64], last_m: NDArray[np.float64], points: NDArray[np.float64], wavelength_m: float
+) -> NDArray[np.complex64]:
+    """Mean echo of equal points that stand evenly between two places, these [m] nearer: Dirichlet's kernel, any number.
+
+    In float64: the phase over a long blade is 1e5 rad.
+    """
+    between_rad = 2 * TWO_PI / wavelength_m * (last_m - first_m) / (points - 1)
+    return diric(between_rad, points).astype(np.float32) * range_phasor(-(first_m + last_m) / 2, wavelength_m)
 
 
 def draw_mover(draws: Draws, radar: Radar) -> Target:

@@ -64,7 +64,7 @@ LAWS: dict[str, Law] = {
     "wind_mph": Law("log", 2.0, 35.0, "mph", "Billingsley"),
     # rotors
     "blade_length_m": Law("log", 0.06, 0.45, "m", "0.075-0.41 m (P) and a margin"),
-    "tip_mps": Law("log", 22.0, 190.0, "m/s", "idling 33 m/s (measured) to fast racing props, below Mach 0.6"),
+    "tip_mps": Law("log", 28.0, 190.0, "m/s", "idling 33 m/s (measured) to fast racing props, below Mach 0.6"),
     "main_length_m": Law("log", 0.25, 1.0, "m", "RC helicopters, 0.407 m (P)"),
     "gear_ratio": Law("uniform", 3.8, 6.2, "1", "tail over main, 4.73 (P), 4-6 in general"),
     "tail_ratio": Law("uniform", 0.12, 0.25, "1", "tail over main blade length"),
@@ -120,6 +120,7 @@ LAWS: dict[str, Law] = {
     "turbine_tip_mps": Law("uniform", 15.0, 90.0, "m/s", "tips 60-90 m/s at rated wind, less below"),
     "cell_m": Law("log", 3.0, 200.0, "m", "part of a blade inside the range cell, often the whole"),
     "turbine_points": Law("log", 3.0, 31.0, "1", "echoes along a blade"),
+    "turbine_row_points": Law("log", 3.0, 3e4, "1", "the same where a model draws them even, up to a smooth line"),
     "chord_m": Law("log", 0.05, 2.0, "m", "half the blade's chord: how far its echoes lie off its axis"),
     # receivers
     "gain_db": Law("uniform", -80.0, 80.0, "dB", "no gain is special"),

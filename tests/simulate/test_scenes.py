@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from bladewing.simulate import Radar, rotors_echo, uav
 from bladewing.simulate.bird import draw_bird
-from bladewing.simulate.discretes import MAX_BLADE_POINTS, _passing, _vehicle_body, _wheels, draw_discrete
+from bladewing.simulate.discretes import MAX_BLADE_POINTS, _even_row, _passing, _vehicle_body, _wheels, draw_discrete
 from bladewing.simulate.laws import LAWS, STEADY, WIDTH, Draws
 from bladewing.simulate.uav import POINTS, ROTORS, draw_uav
 
@@ -177,21 +177,27 @@ def test_turbine_blades_stay_below_their_tip_and_the_tower_rests():
     np.testing.assert_array_equal(target.body, target.body[:, :1] * np.ones(RADAR.pulses, np.complex64))
 
 
-def test_a_quarter_of_turbines_are_rows_of_equal_points_at_equal_distances():
-    # of what is drawn for the points of a blade, each 30 times: place, place on the chord, strength, phase, an even row
-    # takes the first phase alone
-    first, block, even = 11, 4 * MAX_BLADE_POINTS, 10
-    uniforms = np.random.default_rng(4).random((8, WIDTH))
-    uniforms[:, even] = np.linspace(0, 0.99, 8)
+def test_two_fifths_of_turbines_are_rows_of_equal_points_at_equal_distances():
+    # an even row takes none of what is drawn for the points of a blade: place, place on the chord, strength, phase
+    even, first = 10, 12
+    uniforms = np.random.default_rng(4).random((10, WIDTH))
+    uniforms[:, even] = np.linspace(0, 0.99, 10)
     others = uniforms.copy()
-    for blade in range(3):
-        start = first + blade * block
-        kept = start + 3 * MAX_BLADE_POINTS
-        columns = [column for column in range(start, start + block) if column != kept]
-        others[:, columns] = np.random.default_rng(5).random((8, len(columns)))
+    points = slice(first, first + 3 * 4 * MAX_BLADE_POINTS)
+    others[:, points] = np.random.default_rng(5).random(others[:, points].shape)
     echoes = [draw_discrete(Draws(u.copy()), RADAR, "wind_turbine").micro for u in (uniforms, others)]
     same = [np.array_equal(one, other) for one, other in zip(*echoes, strict=True)]
-    assert same == (uniforms[:, even] < 0.25).tolist()
+    assert same == (uniforms[:, even] < 0.4).tolist()
+
+
+@pytest.mark.parametrize("points", [3, 4, 31, 3000])
+def test_a_row_of_points_is_the_mean_of_their_echoes(points):
+    # 60 m, seen from end to end at 3 mm: the phase between the ends is 2.5e5 rad
+    wavelength_m, towards = 0.003, np.cos(np.linspace(0.2, np.pi, 200))
+    along = np.linspace(5.0, 60.0, points)
+    phase_rad = 4 * np.pi / wavelength_m * along[:, None] * towards  # nearer by so much
+    row = _even_row(5.0 * towards, 60.0 * towards, np.array(float(points)), wavelength_m)
+    np.testing.assert_allclose(row, np.exp(1j * phase_rad).mean(axis=0), rtol=0, atol=3e-6)
 
 
 def test_blades_reflect_as_lines_tips_or_rows_as_often_as_the_table_says(monkeypatch):
