@@ -88,6 +88,8 @@ class Envelope:
         wavelength_m = SPEED_OF_LIGHT_MPS / carrier_hz
         unambiguous_mps = wavelength_m * prf_hz / 4
         if not self.carrier_min_hz <= carrier_hz <= self.carrier_max_hz:
+            if self.carrier_min_hz <= carrier_hz * 1e9 <= self.carrier_max_hz:
+                return f"carrier {carrier_hz:g} Hz is no radar's: give {carrier_hz:g} GHz as {carrier_hz:g}e9"
             return (
                 f"carrier {carrier_hz / 1e9:g} GHz is outside {self.carrier_min_hz / 1e9:g} to "
                 f"{self.carrier_max_hz / 1e9:g} GHz, the bands this model was trained for: use or train another model"
