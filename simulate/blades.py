@@ -76,7 +76,7 @@ class Blades:
             even, odd = here + there, here - there
         turn = TWO_PI / max(blades, 1) * np.arange(even.shape[1])
         cosine, sine = np.cos(turn), np.sin(turn)
-        root = tip if points == 1 else root
+        root = tip if points == 1 else root  # as `row_m` has it
         half, middle = np.maximum((tip - root) * k_cos_beta, _LEAST_HALF), (tip + root) * k_cos_beta
         half = half / (points - 1) if points and points > 1 else half
         maps = np.zeros((len(half), len(turn), 4, 3), np.float32)
@@ -153,6 +153,11 @@ def _share(x: Array32, points: int | None, room: Array32) -> Array32:
         before, share, product = share, product, before
     share *= np.float32(1 / points)
     return share
+
+
+def row_m(root_m: NDArray[np.float64] | float, tip_m: NDArray[np.float64] | float, points: int) -> NDArray[np.float64]:
+    """Radii of a row of points, from the tip to the root [m], shape (points, ...); the only one is at the tip."""
+    return np.linspace(tip_m, root_m, points)
 
 
 class Room:

@@ -4,13 +4,15 @@ A blade is a mean over its radius, so all rests on moments of a phasor: |integra
 most 1 / (n + 1), and by parts at most (1 + n M(n-1)) / |z|. Errors of blades and rotors are added as amplitudes.
 """
 
-from functools import cached_property, lru_cache
+from collections.abc import Callable
+from functools import cached_property, lru_cache, partial
 from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln, spherical_jn
 
+from .blades import row_m
 from .exact import hub_range_m
 from .motion import TWO_PI
 from .parts import BirdPart, RotorPart, UavPart
@@ -31,7 +33,7 @@ Amplitude = NDArray[np.float64]
 _SPACING_CLASSES = 40  # of a blade's angles to the line of sight
 
 
-def moment_envelope(order: int, z: Amplitude, root_share: float = 0.0) -> Amplitude:
+def moment_envelope(order: int, z: Amplitude, root_share: float = 0.0, points: int | None = None) -> Amplitude:
     """Most that the mean of (r / tip)^order exp(j phase) over a blade can be, shape of `z`.
 
     Parameters
@@ -42,7 +44,14 @@ def moment_envelope(order: int, z: Amplitude, root_share: float = 0.0) -> Amplit
         Phase between root and tip [rad].
     root_share : float
         Radius of the root over that of the tip, 0..1.
+    points : int, optional
+        Points of a row, whose phases come together again and again; None for a line. By parts, as for a line: the sum
+        of rising numbers with phases d apart is at most the last of them over |sin(d / 2)|.
     """
+    if points:
+        whole = np.mean(row_m(root_share, 1.0, points) ** order)
+        apart = np.abs(np.sin(z / (2 * max(1, points - 1))))
+        return np.minimum(whole, 1 / np.maximum(points * apart, 1e-9))
     inverse = 1 / np.maximum(np.abs(z), 1e-9)
     moments = [np.minimum(1.0, 2 * inverse)]
     for n in range(1, order + 1):
@@ -99,19 +108,24 @@ class UavBounds:
         """Largest phase of the tip [rad], the paper's Gamma."""
         return self.wavenumber * rotor.blade_length_m * float(np.cos(rotor_beta_rad(self.part, rotor)))
 
+    def _moments(self, rotor: RotorPart) -> tuple[float, Callable[[int, Amplitude], Amplitude]]:
+        """The root's share of a blade, and the envelope of its moments by order and phase."""
+        share = rotor.root_m / rotor.blade_length_m
+        return share, partial(moment_envelope, root_share=share, points=rotor.points)
+
     def blade_curvature(self) -> Amplitude:
         """Eq. (4) in place of (3): the sphere's sag r^2 sin^2 / (2 R) along the blade, to the third order."""
         out = np.zeros(len(self.times_s))
         for rotor in self.part.rotors:
-            length, share = rotor.blade_length_m, rotor.root_m / rotor.blade_length_m
+            length, share, moment = rotor.blade_length_m, *self._moments(rotor)
             hub = hub_range_m(self.centre_m, rotor.offset_m, np.deg2rad(rotor.bearing_deg))
             cos_beta = np.cos(rotor_beta_rad(self.part, rotor))
             for amplitude, theta in self._blades(rotor):
                 c = cos_beta * np.cos(theta)
                 sag = self.wavenumber * length**2 * (1 - c**2) / (2 * hub)
                 z = self.wavenumber * length * (1 - share) * c
-                flat = moment_envelope(0, z, share)
-                error = sag * moment_envelope(2, z, share) + sag**2 / 2 * moment_envelope(4, z, share)
+                flat = moment(0, z)
+                error = sag * moment(2, z) + sag**2 / 2 * moment(4, z)
                 error += (sag**3 / 6 + sag * 2 * length / hub) * flat
                 edges = 1 + np.abs(rotor.edge_asymmetry * np.sin(theta))
                 out += amplitude * edges * np.minimum(error, 2.0)
@@ -121,11 +135,11 @@ class UavBounds:
         """Eq. (2) in place of (1) for hubs and for the body's scatterers."""
         out = np.zeros(len(self.times_s))
         for rotor in self.part.rotors:
-            share = rotor.root_m / rotor.blade_length_m
+            share, moment = self._moments(rotor)
             flash = np.zeros(len(self.times_s))
             for amplitude, theta in self._blades(rotor):
                 z = self._phase(rotor) * (1 - share) * np.cos(theta)
-                flash += amplitude * (1 + np.abs(rotor.edge_asymmetry * np.sin(theta))) * moment_envelope(0, z, share)
+                flash += amplitude * (1 + np.abs(rotor.edge_asymmetry * np.sin(theta))) * moment(0, z)
             out += flash * self._hub_chord(rotor.offset_m, rotor.bearing_deg)
         for point in self.part.body:
             out += 10 ** (point.level_db / 20) * self._hub_chord(point.offset_m, point.bearing_deg)
@@ -181,7 +195,7 @@ class UavBounds:
     def _turned(self, rotor: RotorPart, times_s: NDArray[np.float64], *, wanders: bool = True) -> Amplitude:
         """Blades at the angles of other instants, or of a steady rate, in place of the true ones."""
         out = np.zeros(len(self.times_s))
-        share, phase = rotor.root_m / rotor.blade_length_m, self._phase(rotor)
+        (share, moment), phase = self._moments(rotor), self._phase(rotor)
         others = rotor_angle_rad(rotor, times_s, wanders) - rotor_angle_rad(rotor, self.times_s, True)
         away = np.abs(others)
         for amplitude, true in self._blades(rotor):
@@ -189,10 +203,10 @@ class UavBounds:
             # the flash is where the cosine is smallest: at an end of the arc between both, or within it
             least = np.where((here * there <= 0) | (away > 1), 0.0, np.minimum(np.abs(here), np.abs(there)))
             z = phase * (1 - share)
-            slope = phase * np.sqrt(1 - least**2) * moment_envelope(1, z * least, share)
+            slope = phase * np.sqrt(1 - least**2) * moment(1, z * least)
             edges = 1 + np.abs(rotor.edge_asymmetry)
-            error = away * (edges * slope + np.abs(rotor.edge_asymmetry) * moment_envelope(0, z * least, share))
-            apart = edges * (moment_envelope(0, z * here, share) + moment_envelope(0, z * there, share))
+            error = away * (edges * slope + np.abs(rotor.edge_asymmetry) * moment(0, z * least))
+            apart = edges * (moment(0, z * here) + moment(0, z * there))
             out += amplitude * np.minimum(error, apart)
         return out
 
@@ -204,7 +218,7 @@ class UavBounds:
         """
         total = np.zeros(len(self.times_s))
         for rotor in self.part.rotors:
-            if rotor.root_m == rotor.blade_length_m:
+            if rotor.points or rotor.root_m == rotor.blade_length_m:
                 continue
             half = self.wavenumber * (rotor.blade_length_m - rotor.root_m) / 2
             cos_beta = np.cos(rotor_beta_rad(self.part, rotor))

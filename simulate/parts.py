@@ -16,6 +16,9 @@ from .receiver import FAULT_CHANCE
 #: Size of any number, at most: beyond every scene, and its samples are finite still.
 MOST = 1e12
 
+#: Scatterers of a blade that is a row of them, at most.
+MOST_POINTS = 1000
+
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-MOST, le=MOST)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=MOST)]
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=MOST)]
@@ -51,8 +54,10 @@ class BodyPart(Part):
 class RotorPart(Part):
     """One rotor; the sign of `rotation_hz` is its sense.
 
-    `flash_db` is one blade's level at its flash, seen at a right angle, where all of it echoes in phase. `root_m` equal
-    to `blade_length_m` leaves the tip alone: the paper's point scatterer. `beta_deg` is the UAV's unless given here.
+    `flash_db` is one blade's level at its flash, seen at a right angle, where all of it echoes in phase. A blade is a
+    line that reflects evenly from `root_m` to its tip, or a row of so many equal `points`; the only one of a row, and a
+    line whose `root_m` equals `blade_length_m`, is the tip: the paper's point scatterer. `beta_deg` is the UAV's unless
+    given here.
     """
 
     blade_length_m: Positive
@@ -60,6 +65,7 @@ class RotorPart(Part):
     flash_db: Level
     blades: Annotated[int, Field(strict=True, ge=1, le=12)] = 2
     root_m: NotNegative = 0.0
+    points: Annotated[int, Field(strict=True, ge=1, le=MOST_POINTS)] | None = None
     beta_deg: Aspect | None = None
     phase_deg: Number = 0.0
     offset_m: NotNegative = 0.0

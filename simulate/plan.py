@@ -212,14 +212,16 @@ def _points(bounds: UavBounds, uav: UavPart, radar: Radar, allowed: float) -> tu
 
 def _renderer(uav: UavPart, radar: Radar, points: int | None) -> str:
     """The renderer chosen and its cost against full fidelity."""
-    blades = sum(rotor.blades for rotor in uav.rotors)
-    full = blades * (full_fidelity(uav, radar).points or 1)
+
+    def scatterers(stand_for_a_line: int) -> int:
+        return sum(rotor.blades * (rotor.points or stand_for_a_line) for rotor in uav.rotors)
+
+    full = f"(full fidelity: {2 * scatterers(full_fidelity(uav, radar).points or 1)})"
     if points is None:
-        return f"{uav.name}: closed form, 2 sines a blade and pulse, {2 * blades} in all (full fidelity: {2 * full})"
-    return (
-        f"{uav.name}: point scatterers at exact ranges, {points} a blade, {2 * points * blades} sines a pulse "
-        f"(full fidelity: {2 * full})"
-    )
+        blades = sum(rotor.blades for rotor in uav.rotors)
+        return f"{uav.name}: closed form, 2 sines a blade and pulse, {2 * blades} in all {full}"
+    each = f", {points} a blade" if any(rotor.points is None for rotor in uav.rotors) else ""
+    return f"{uav.name}: point scatterers at exact ranges{each}, {2 * scatterers(points)} sines a pulse {full}"
 
 
 def _aliasing(uav: UavPart, radar: Radar) -> str:

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .exact import blade_points, dense_rotor_echo, hub_range_m, range_echo
+from .blades import row_m
+from .exact import BladePoints, blade_points, dense_rotor_echo, hub_range_m, range_echo
 from .motion import TWO_PI, range_phasor
 from .parts import BirdPart, RotorPart, UavPart
 from .radar import Radar
@@ -25,8 +26,8 @@ class Fidelity:
     effects : frozenset of str
         Which of its effects are kept.
     points : int or None
-        Point scatterers a blade, in float64; None for the closed form of a uniform blade, which has no range
-        curvature along it.
+        Point scatterers that stand for a line, in float64 (a row has its own); None for the closed form of a blade,
+        which has no range curvature along it.
     """
 
     effects: frozenset[str]
@@ -35,7 +36,7 @@ class Fidelity:
 
 def full_fidelity(part: UavPart, radar: Radar) -> Fidelity:
     """Every effect, and as many scatterers a blade as float64 can tell from a continuous one."""
-    longest = max((r.blade_length_m - r.root_m for r in part.rotors), default=0.0)
+    longest = max((r.blade_length_m - r.root_m for r in part.rotors if not r.points), default=0.0)
     phase = 2 * TWO_PI * longest / radar.wavelength_m
     return Fidelity(frozenset(UAV_EFFECTS), int(phase / 4 + 6 * np.cbrt(phase)) + 30)
 
@@ -101,13 +102,14 @@ def uav_echo(part: UavPart, radar: Radar, times_s: NDArray[np.float64], how: Fid
                 root_m=rotor.root_m,
                 blade_amplitudes=rotor.amplitudes,
                 edge_asymmetry=rotor.edge_asymmetry,
+                points=rotor.points,
             )
             out += level * blades * range_phasor(hub, wavelength)
         else:
             out += level * dense_rotor_echo(
                 hub,
                 angle,
-                blade_points(rotor.root_m, rotor.blade_length_m, how.points, "gauss"),
+                scatterers(rotor, how.points),
                 wavelength_m=wavelength,
                 beta_rad=beta,
                 blade_amplitudes=rotor.amplitudes,
@@ -121,6 +123,14 @@ def uav_echo(part: UavPart, radar: Radar, times_s: NDArray[np.float64], how: Fid
     if "vibration" in how.effects and part.vibration_rad:
         out *= np.exp(1j * vibration_rad(part, times_s))
     return out
+
+
+def scatterers(rotor: RotorPart, points: int) -> BladePoints:
+    """Points of one blade: its row, or as many as are to stand for a line."""
+    if rotor.points:
+        row = row_m(rotor.root_m, rotor.blade_length_m, rotor.points)
+        return BladePoints(row, np.full(len(row), 1 / len(row)))
+    return blade_points(rotor.root_m, rotor.blade_length_m, points, "gauss")
 
 
 def vibration_rad(part: UavPart, times_s: NDArray[np.float64]) -> NDArray[np.float64]:

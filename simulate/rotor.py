@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .blades import TILE_SAMPLES, Blades, Room
+from .blades import TILE_SAMPLES, Blades, Room, row_m
 from .motion import TWO_PI, reduce_phase
 
 
@@ -166,7 +166,7 @@ def _double_echo(
         along = k[..., None] * np.cos(theta)
         weight = amplitudes[..., number, None] * (1 + asymmetry * np.sin(theta))
         if points:
-            places = np.linspace(tip_m, root_m, points)  # the only one is the first: at the tip
+            places = row_m(root_m, tip_m, points)
             out = out + weight / points * sum(np.exp(2j * place[..., None] * along) for place in places)
         else:
             share = np.sinc((tip_m - root_m)[..., None] * along / np.pi)

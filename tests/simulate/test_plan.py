@@ -1,11 +1,14 @@
 """The plan: every bound holds on random scenes and is not idle, and what is left out stays within the tolerance."""
 
+import re
+
 import numpy as np
 import pytest
 from bladewing.simulate.bounds import UavBounds, bird_bound, gauss_error, moment_envelope
 from bladewing.simulate.bounds_receiver import CHAIN
 from bladewing.simulate.exact import blade_points
 from bladewing.simulate.parts import BirdPart, UavPart
+from bladewing.simulate.plan import make_plan
 from bladewing.simulate.radar import Radar
 from bladewing.simulate.render import render
 from bladewing.simulate.render_bird import BIRD_EFFECTS, bird_echo
@@ -29,6 +32,7 @@ def random_uav(rng: np.random.Generator) -> tuple[UavPart, Radar]:
             {
                 "blade_length_m": length,
                 "root_m": length if rng.random() < 0.2 else float(length * rng.uniform(0, 0.6)),
+                "points": None if rng.random() < 0.6 else int(rng.integers(1, 16)),
                 "rotation_hz": rate,
                 "blades": blades,
                 "blade_amplitudes": [float(a) for a in rng.uniform(0.5, 1.5, blades)],
@@ -140,6 +144,10 @@ def test_moments_stay_below_their_envelope(order, share):
     radius = share + (1 - share) * x
     moments = np.array([np.trapezoid(radius**order * np.exp(1j * phase * x), x) for phase in z])
     assert (abs(moments) <= moment_envelope(order, z, share) + 1e-6).all()
+    for points in (1, 2, 3, 12):
+        row = np.linspace(1, share, points)
+        moments = np.mean(row**order * np.exp(1j * z[:, None] * np.linspace(1, 0, points)), axis=1)
+        assert (abs(moments) <= moment_envelope(order, z, share, points) + 1e-6).all(), points
 
 
 @pytest.mark.parametrize("points", [1, 2, 5, 20, 60])
@@ -301,3 +309,29 @@ def test_a_plan_says_in_words_and_numbers_what_a_receiver_needs():
     assert "receiver: phase noise: kept; leaving it out changes at most +" in coarse
     assert "receiver: quantisation and clipping: left out (numbers as they are); leaving it out changes" in fine
     assert "receiver: phase noise: left out (a clean oscillator); leaving it out changes at most -" in fine
+
+
+def test_both_renderers_draw_the_same_blades():
+    for seed in range(SCENES):
+        part, radar = random_uav(np.random.default_rng(seed))
+        effects = frozenset(UAV_EFFECTS) - {"blade_curvature", "hub_curvature"}
+        dense, closed = (
+            uav_echo(part, radar, radar.times_s, Fidelity(effects, points))
+            for points in (full_fidelity(part, radar).points, None)
+        )
+        assert energy(dense - closed) < 1e-7 * energy(dense)  # float32 against float64
+
+
+def test_the_plan_counts_the_points_of_rows_and_those_that_stand_for_lines():
+    rotor = {"blade_length_m": 0.15, "rotation_hz": 60.0, "flash_db": 30.0}
+    near = {"name": "x", "range_m": 5.0}
+    radar = {"carrier_hz": 10e9, "prf_hz": 20e3, "pulses": 500}
+    for rotors, said in (
+        ([{**rotor, "points": 7}], r"exact ranges, 28 sines a pulse \(full fidelity: 28\)"),
+        ([{**rotor, "points": 7}, rotor], r"exact ranges, (\d+) a blade, (\d+) sines a pulse"),
+    ):
+        scene = Scene.model_validate({"radar": radar, "uav": [{**near, "rotors": rotors}]})
+        found = re.search(said, make_plan(scene).explain())
+        assert found is not None
+        if found.groups():
+            assert int(found[2]) == 28 + 4 * int(found[1])
