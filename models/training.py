@@ -8,9 +8,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
+from torch.optim.lr_scheduler import OneCycleLR
 
 from ._checks import CLASS_COUNT, require_every_class, require_labels, require_shares
 from .cnn import EvidenceNet
+from .muon import Muon
 from .training_state import Snapshot, Work
 
 Inputs = Mapping[str, NDArray[np.floating]]
@@ -24,6 +26,9 @@ OnEpoch = Callable[[int, int, dict[str, float]], None]
 
 OnSnapshot = Callable[[Snapshot], None]
 """Called with the state after an epoch; the arrays are copies."""
+
+ADAM = 0.3
+"""Adam's learning rate over Muon's."""
 
 TAUGHT = 0.75
 """Share of a teacher's answer in what a network is to say, beside the label."""
@@ -64,7 +69,7 @@ def train_network(
     seed: int,
     epochs: int,
     batch: int = 256,
-    learning_rate: float = 6e-3,
+    learning_rate: float = 0.02,
     weight_decay: float = 0.1,
     label_smoothing: float = 0.02,
     device: str = "auto",
@@ -77,9 +82,9 @@ def train_network(
 ) -> TrainingResult:
     """Train in place, and leave the network in its best state, on the CPU, ready for inference.
 
-    Measures the standardisation of the inputs, then runs AdamW on a one-cycle schedule. The best state is that of the
-    least validation loss. On a CPU the outcome is a function of the seed, bit by bit, for a given number of threads,
-    also where the training was interrupted and goes on from a snapshot.
+    Measures the standardisation of the inputs, then runs Muon (matrices, kernels) and Adam (all else) on a one-cycle
+    schedule. The best state is that of the least validation loss. On a CPU the outcome is a function of the seed, bit
+    by bit, for a given number of threads, also where the training was interrupted and goes on from a snapshot.
 
     Parameters
     ----------
@@ -98,9 +103,9 @@ def train_network(
     batch
         Records a step, at least 2. The rest of an epoch that fills no batch is left out of it.
     learning_rate
-        Peak of the schedule.
+        Peak of the schedule, of Muon; Adam's is `ADAM` times as high.
     weight_decay
-        Of AdamW.
+        Of Muon.
     label_smoothing
         Share of the target that is spread over the classes, 0 to below 1.
     device
@@ -155,11 +160,20 @@ def train_network(
     if teacher is not None:
         said = torch.as_tensor(teacher, dtype=torch.float32).to(place)
         truth = TAUGHT * said + (1 - TAUGHT) * nn.functional.one_hot(truth, CLASS_COUNT)
-    optimiser = torch.optim.AdamW(net.parameters(), lr=learning_rate, weight_decay=weight_decay)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, learning_rate, total_steps=epochs * steps, pct_start=0.2)
+    matrices, others = (
+        [weights for weights in net.parameters() if (weights.ndim > 1) is wanted] for wanted in (True, False)
+    )
+    optimisers = (
+        Muon(matrices, lr=learning_rate, weight_decay=weight_decay),
+        torch.optim.Adam(others, lr=ADAM * learning_rate),
+    )
+    schedules = tuple(
+        OneCycleLR(optimiser, optimiser.defaults["lr"], epochs * steps, pct_start=0.2, cycle_momentum=False)
+        for optimiser in optimisers
+    )
     criterion = nn.CrossEntropyLoss(label_smoothing=label_smoothing)
     rng = torch.Generator().manual_seed(seed)
-    work = Work(net, optimiser, schedule, rng)
+    work = Work(net, optimisers, schedules, rng)
     if snapshot is not None:
         work.restore(snapshot, epochs=epochs, steps=steps)
         started -= work.history[-1]["seconds"]
@@ -172,11 +186,12 @@ def train_network(
             if augment:
                 part = augment(part, rng)
             loss = criterion(net(*(part[name] for name in net.input_shapes)), truth[rows])
-            optimiser.zero_grad(set_to_none=True)
+            net.zero_grad(set_to_none=True)
             loss.backward()
-            optimiser.step()
-            rate = optimiser.param_groups[0]["lr"]
-            schedule.step()
+            rate = optimisers[0].param_groups[0]["lr"]
+            for optimiser, schedule in zip(optimisers, schedules, strict=True):
+                optimiser.step()
+                schedule.step()
             total += loss.detach()
         scores = torch.from_numpy(network_scores(net, validation[0]))
         labels = torch.as_tensor(validation[1], dtype=torch.int64)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
@@ -29,10 +29,10 @@ class Work:
     ----------
     net
         The network, on its device, standardisation measured.
-    optimiser
-        AdamW over its parameters; no step taken yet.
-    schedule
-        One-cycle schedule over the optimiser.
+    optimisers
+        They share its parameters; no step taken yet.
+    schedules
+        One-cycle schedules over the optimisers.
     rng
         Generator of the order and the augmentation.
 
@@ -49,11 +49,11 @@ class Work:
     def __init__(
         self,
         net: nn.Module,
-        optimiser: torch.optim.Optimizer,
-        schedule: torch.optim.lr_scheduler.OneCycleLR,
+        optimisers: Sequence[torch.optim.Optimizer],
+        schedules: Sequence[torch.optim.lr_scheduler.OneCycleLR],
         rng: torch.Generator,
     ) -> None:
-        self._net, self._optimiser, self._schedule, self._rng = net, optimiser, schedule, rng
+        self._net, self._optimisers, self._schedules, self._rng = net, optimisers, schedules, rng
         self.history: list[dict[str, float]] = []
         self.best_epoch, self.best = 0, dict[str, Tensor]()
 
@@ -94,9 +94,11 @@ class Work:
         best_epoch = snapshot.get(_BEST_EPOCH, np.array(-1))
         if not (told and 1 <= count <= epochs and best_epoch.shape == () and 0 <= best_epoch <= count):
             raise ForeignSnapshot(f"the snapshot holds no history of 1 to {epochs} epochs")
-        for parameter in self._net.parameters():  # as AdamW starts them itself at its first step
-            averages = {name: torch.zeros_like(parameter) for name in ("exp_avg", "exp_avg_sq")}
-            self._optimiser.state[parameter] = {"step": torch.tensor(0.0), **averages}
+        for optimiser in self._optimisers:
+            for parameter in (parameter for group in optimiser.param_groups for parameter in group["params"]):
+                if not optimiser.state[parameter]:  # as Adam starts them itself at its first step
+                    averages = {name: torch.zeros_like(parameter) for name in ("exp_avg", "exp_avg_sq")}
+                    optimiser.state[parameter] = {"step": torch.tensor(0.0), **averages}
         state = self._net.state_dict()
         expected = self._moving() | ({f"best/{name}": value for name, value in state.items()} if best_epoch else {})
         found = {name: values for name, values in snapshot.items() if name not in columns and name != _BEST_EPOCH}
@@ -116,8 +118,9 @@ class Work:
                     value.copy_(tensors[name])
         self._rng.set_state(tensors["generator/batches"])
         at = {"last_epoch": count * steps - 1, "_step_count": count * steps + 1}
-        self._schedule.load_state_dict(self._schedule.state_dict() | at)
-        self._schedule.step()  # a rate of this schedule follows from the number of steps alone
+        for schedule in self._schedules:
+            schedule.load_state_dict(schedule.state_dict() | at)
+            schedule.step()  # a rate of this schedule follows from the number of steps alone
         self.history = [
             {name.removeprefix(_HISTORY): float(values[epoch]) for name, values in columns.items()}
             for epoch in range(count)
@@ -128,8 +131,9 @@ class Work:
     def _moving(self) -> dict[str, Tensor]:
         """The tensors that the next epochs depend on, themselves where they are not a generator's."""
         moving = {f"network/{name}": value for name, value in self._net.state_dict().items()}
+        states = [optimiser.state for optimiser in self._optimisers]
         for place, parameter in enumerate(self._net.parameters()):
-            for name, value in self._optimiser.state[parameter].items():
-                moving[f"optimiser/{place}/{name}"] = value
+            held = next(state[parameter] for state in states if parameter in state)
+            moving |= {f"optimiser/{place}/{name}": value for name, value in held.items()}
         moving["generator/batches"] = self._rng.get_state()
         return moving
