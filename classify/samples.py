@@ -26,6 +26,8 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
     BadInput
         The samples are not complex numbers, or one is not finite as complex64.
     """
+    if hidden := np.ma.count_masked(values) if isinstance(values, np.ma.MaskedArray) else 0:
+        raise BadInput(f"{name}: {hidden} samples are masked: every sample counts: cut them out or replace them by 0")
     given = np.asarray(values)
     if given.dtype.names is not None:
         raise BadInput(f"{name}: a structured array with fields {list(given.dtype.names)}: store complex samples")

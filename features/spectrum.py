@@ -309,13 +309,15 @@ def _quartile_of_noise(size: int) -> NDArray[np.float32]:
 
 
 def as_complex(iq: ArrayLike) -> NDArray[np.complex64]:
-    """Samples as complex64; real ones would pass for a spectrum with two like sides.
+    """Samples as complex64; real ones would pass for a spectrum with two like sides, and a mask would be forgotten.
 
     Raises
     ------
     ValueError
-        If they are not complex.
+        If they are not complex, or some are masked.
     """
+    if isinstance(iq, np.ma.MaskedArray) and np.ma.is_masked(iq):
+        raise ValueError("iq holds masked samples: cut them out or replace them by 0")
     samples = np.asarray(iq)
     if samples.dtype.kind != "c":
         raise ValueError(f"iq holds {samples.dtype}: its samples must be complex, I + jQ")

@@ -156,6 +156,7 @@ def test_a_record_of_zeros_is_unknown_and_leaves_the_others_alone(always_uav):
         (noise(0, (3,)), r"iq has shape \(3, 0\)"),
         (np.array([1j] * 100, dtype=object), "iq: an array of Python objects"),
         ("drone.npy", "iq: samples of type <U9"),
+        (np.ma.masked_less(noise(200).real, 0) + 0j, r"iq: \d+ samples are masked: .*cut them out"),
     ],
 )
 def test_bad_samples_are_refused(always_uav, iq, said):
@@ -172,7 +173,7 @@ def test_bad_frequencies_are_refused(always_uav, name, value):
 
 def test_samples_may_be_lists_and_complex128(always_uav):
     iq = noise(200)
-    for given_iq in (iq.tolist(), iq.astype(complex), np.asfortranarray(noise(200, (2,))), iq[::-1]):
+    for given_iq in (iq.tolist(), np.ma.array(iq), iq.astype(complex), np.asfortranarray(noise(200, (2,))), iq[::-1]):
         assert np.all(always_uav.predict(given_iq, **RADAR).labels == "uav")
 
 

@@ -110,6 +110,7 @@ def test_batch_equals_loop():
         (np.ones(9, complex), RADAR | {"prf_hz": 0}, "prf_hz"),
         (np.ones(9, complex), RADAR | {"carrier_hz": np.nan}, "carrier_hz"),
         (np.ones(9), RADAR, "samples must be complex"),
+        (np.ma.array(np.ones(9, complex), mask=np.arange(9) == 3), RADAR, "masked samples"),
     ],
 )
 def test_impossible_input_is_refused(iq, radar, match):
