@@ -25,7 +25,7 @@ class TrainingConfig(BaseModel):
     #: Epochs in a row without a lower validation loss after which a network stops; 0: never.
     patience: Annotated[int, Field(ge=0, le=1000)] = 20
     batch: Annotated[int, Field(ge=2, le=8192)] = 256
-    learning_rate: Annotated[float, Field(gt=0, le=1)] = 6e-3
+    learning_rate: Annotated[float, Field(gt=0, le=1)] = 0.02
     weight_decay: Annotated[float, Field(ge=0, le=10)] = 0.1
     iterations: Annotated[int, Field(ge=1, le=1000)] = 80
     leaves: Annotated[int, Field(ge=2, le=256)] = 15
