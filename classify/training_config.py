@@ -21,12 +21,12 @@ class TrainingConfig(BaseModel):
 
     records: Annotated[int, Field(ge=LEAST_RECORDS, le=10_000_000)] = 30_000
     seed: Annotated[int, Field(ge=0)] = 0
-    epochs: Annotated[int, Field(ge=1, le=1000)] = 15
+    epochs: Annotated[int, Field(ge=1, le=1000)] = 8
     #: Epochs in a row without a lower validation loss after which a network stops; 0: never.
     patience: Annotated[int, Field(ge=0, le=1000)] = 20
     batch: Annotated[int, Field(ge=2, le=8192)] = 256
     learning_rate: Annotated[float, Field(gt=0, le=1)] = 0.02
-    weight_decay: Annotated[float, Field(ge=0, le=10)] = 0.1
+    weight_decay: Annotated[float, Field(ge=0, le=10)] = 0.3
     iterations: Annotated[int, Field(ge=1, le=1000)] = 80
     leaves: Annotated[int, Field(ge=2, le=256)] = 15
     precision: Annotated[float, Field(gt=1 / 3, le=1)] = 0.9
