@@ -26,7 +26,8 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
     BadInput
         The samples are not complex numbers, or one is not finite as complex64.
     """
-    if hidden := np.ma.count_masked(values) if isinstance(values, np.ma.MaskedArray) else 0:
+    if np.ma.is_masked(values):
+        hidden = np.ma.count_masked(values)
         raise BadInput(f"{name}: {hidden} samples are masked: every sample counts: cut them out or replace them by 0")
     given = np.asarray(values)
     if given.dtype.names is not None:

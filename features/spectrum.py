@@ -316,7 +316,7 @@ def as_complex(iq: ArrayLike) -> NDArray[np.complex64]:
     ValueError
         If they are not complex, or some are masked.
     """
-    if isinstance(iq, np.ma.MaskedArray) and np.ma.is_masked(iq):
+    if np.ma.is_masked(iq):
         raise ValueError("iq holds masked samples: cut them out or replace them by 0")
     samples = np.asarray(iq)
     if samples.dtype.kind != "c":

@@ -160,9 +160,8 @@ def train_network(
     if teacher is not None:
         said = torch.as_tensor(teacher, dtype=torch.float32).to(place)
         truth = TAUGHT * said + (1 - TAUGHT) * nn.functional.one_hot(truth, CLASS_COUNT)
-    matrices, others = (
-        [weights for weights in net.parameters() if (weights.ndim > 1) is wanted] for wanted in (True, False)
-    )
+    matrices = [weights for weights in net.parameters() if weights.ndim > 1]
+    others = [weights for weights in net.parameters() if weights.ndim <= 1]
     optimisers = (
         Muon(matrices, lr=learning_rate, weight_decay=weight_decay),
         torch.optim.Adam(others, lr=ADAM * learning_rate),

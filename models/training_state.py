@@ -131,9 +131,8 @@ class Work:
     def _moving(self) -> dict[str, Tensor]:
         """The tensors that the next epochs depend on, themselves where they are not a generator's."""
         moving = {f"network/{name}": value for name, value in self._net.state_dict().items()}
-        states = [optimiser.state for optimiser in self._optimisers]
+        held = {parameter: state for optimiser in self._optimisers for parameter, state in optimiser.state.items()}
         for place, parameter in enumerate(self._net.parameters()):
-            held = next(state[parameter] for state in states if parameter in state)
-            moving |= {f"optimiser/{place}/{name}": value for name, value in held.items()}
+            moving |= {f"optimiser/{place}/{name}": value for name, value in held[parameter].items()}
         moving["generator/batches"] = self._rng.get_state()
         return moving

@@ -76,7 +76,7 @@ class Blades:
             even, odd = here + there, here - there
         turn = TWO_PI / max(blades, 1) * np.arange(even.shape[1])
         cosine, sine = np.cos(turn), np.sin(turn)
-        root = tip if points == 1 else root  # as `row_m` has it
+        root = row_m(root, tip, points)[-1] if points else root
         half, middle = np.maximum((tip - root) * k_cos_beta, _LEAST_HALF), (tip + root) * k_cos_beta
         half = half / (points - 1) if points and points > 1 else half
         maps = np.zeros((len(half), len(turn), 4, 3), np.float32)

@@ -173,16 +173,17 @@ def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
     start = (length - cell) * draws.uniform()
     cos_beta = np.cos(np.deg2rad(85) * draws.uniform())
     first = draws.value("phase_rad")
-    points, chord = np.floor(draws.value("turbine_points")).astype(int), draws.value("chord_m")
+    points, chord = np.floor(draws.value("turbine_points")), draws.value("chord_m")
     equal, even = draws.chance(0.5)[:, None], draws.chance(0.4)
     in_row = np.floor(draws.value("turbine_row_points"))
-    rows = np.flatnonzero(even)
+    evenly, points = np.flatnonzero(even), np.where(even, 0, points).astype(int)
+    reach_m = np.stack([start, start + cell]) * cos_beta
     micro = np.zeros((records, radar.pulses), np.complex64)
     for blade in range(3):
         angle = TWO_PI * (turn[:, None] * t + blade / 3) + first[:, None]
         towards, across = np.cos(angle), np.sin(angle)
-        ends = (start * cos_beta)[rows, None] * towards[rows], ((start + cell) * cos_beta)[rows, None] * towards[rows]
-        micro[rows] += _even_row(*ends, in_row[rows, None], radar.wavelength_m)
+        inner_m, outer_m = reach_m[:, evenly, None] * towards[evenly]
+        micro[evenly] += _even_row(inner_m, outer_m, in_row[evenly, None], radar.wavelength_m)
         towards -= towards[:, :1].copy()
         across -= across[:, :1].copy()
         place, aside = draws.uniform(MAX_BLADE_POINTS), draws.uniform(MAX_BLADE_POINTS)
@@ -192,10 +193,10 @@ def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
         r = along * cos_beta[:, None]
         # the chord tapers to the tip
         c = chord[:, None] * (2 * aside - 1) * (1 - along / length[:, None]) * cos_beta[:, None]
-        for point in range(int(points[~even].max(initial=0))):
-            held = np.flatnonzero(~even & (points > point))
-            nearer = r[held, point, None] * towards[held] + c[held, point, None] * across[held]
-            micro[held] += level[held, point, None] * range_phasor(-nearer, radar.wavelength_m)
+        for point in range(int(points.max(initial=0))):
+            rows = np.flatnonzero(points > point)
+            nearer = r[rows, point, None] * towards[rows] + c[rows, point, None] * across[rows]
+            micro[rows] += level[rows, point, None] * range_phasor(-nearer, radar.wavelength_m)
     body = np.exp(1j * draws.value("phase_rad")).astype(np.complex64)[:, None] * np.ones(
         (1, radar.pulses), np.complex64
     )

@@ -13,6 +13,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import diric
 
 from .blades import TILE_SAMPLES, Blades, Room, row_m
 from .motion import TWO_PI, reduce_phase
@@ -159,16 +160,14 @@ def _double_echo(
     amplitudes = np.asarray(blade_amplitudes, np.float64)
     blades = amplitudes.shape[-1]
     asymmetry = np.asarray(edge_asymmetry, np.float64)[..., None]
+    inner_m = row_m(root_m, tip_m, points)[-1] if points else root_m
     k = TWO_PI / wavelength_m * np.cos(beta_rad)
     out: NDArray = np.zeros(1, np.complex128)
     for number in range(blades):
         theta = angle + TWO_PI * number / blades
         along = k[..., None] * np.cos(theta)
         weight = amplitudes[..., number, None] * (1 + asymmetry * np.sin(theta))
-        if points:
-            places = row_m(root_m, tip_m, points)
-            out = out + weight / points * sum(np.exp(2j * place[..., None] * along) for place in places)
-        else:
-            share = np.sinc((tip_m - root_m)[..., None] * along / np.pi)
-            out = out + weight * share * np.exp(1j * (tip_m + root_m)[..., None] * along)
+        half = (tip_m - inner_m)[..., None] * along
+        share = diric(2 * half / max(points - 1, 1), points) if points else np.sinc(half / np.pi)
+        out = out + weight * share * np.exp(1j * (tip_m + inner_m)[..., None] * along)
     return out.astype(np.complex64)
