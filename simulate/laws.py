@@ -39,11 +39,12 @@ class Law:
     unit: str
     source: str
 
-    def __call__(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Map uniform numbers in [0, 1) to values."""
+    def __call__(self, u: NDArray[np.float64], least: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Map uniform numbers in [0, 1) to values; where `least` is above `low` the range begins there."""
+        low = self.low if least is None else np.maximum(self.low, least)
         if self.kind == "log":
-            return self.low * (self.high / self.low) ** u
-        return self.low + (self.high - self.low) * (u**0.7 if self.kind == "rising" else u)
+            return low * (self.high / low) ** u
+        return low + (self.high - low) * (u**0.7 if self.kind == "rising" else u)
 
 
 LAWS: dict[str, Law] = {
@@ -115,7 +116,7 @@ LAWS: dict[str, Law] = {
     "wheel_radius_m": Law("log", 0.2, 0.55, "m", "motorcycle to lorry"),
     "wheel_db": Law("uniform", -35.0, -5.0, "dB", "wheels under the body"),
     "wheels": Law("uniform", 1.0, 5.0, "1", "wheels that the radar sees"),
-    "spokes": Law("log", 1.0, 11.0, "1", "echoes on each: a valve to ten spokes"),
+    "spokes": Law("uniform", 1.0, 11.0, "1", "echoes on each: a valve to ten spokes"),
     "turbine_length_m": Law("log", 15.0, 60.0, "m", "small to large wind turbines"),
     "turbine_tip_mps": Law("uniform", 15.0, 90.0, "m/s", "tips 60-90 m/s at rated wind, less below"),
     "cell_m": Law("log", 3.0, 200.0, "m", "part of a blade inside the range cell, often the whole"),
@@ -175,9 +176,11 @@ class Draws:
         self._at += width
         return taken[:, 0] if columns is None else taken
 
-    def value(self, law: str, columns: int | None = None) -> NDArray[np.float64]:
-        """Draw by the law of that name: shape (records,), or (records, columns)."""
-        return LAWS[law](self.uniform(columns))
+    def value(
+        self, law: str, columns: int | None = None, *, least: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
+        """Draw by the law of that name, from `least` on if given: shape (records,), or (records, columns)."""
+        return LAWS[law](self.uniform(columns), least)
 
     def change(self, law: str, dwell_s: float) -> NDArray[np.float64]:
         """Draw a rate of change that adds up to no more over a dwell above 1 s than the law's end does in 1 s."""

@@ -19,6 +19,9 @@ ROTORS = {"fixed_wing": 1, "quadcopter": 4, "hexacopter": 6, "octocopter": 8, "h
 #: Blades a rotor may have.
 BLADES = (2, 3, 4)
 
+#: No rotor turns slower [Hz], however long its blades (24-100 Hz in P, and a margin): what does has wheels or wings.
+LEAST_ROTATION_HZ = 20.0
+
 #: What a blade reflects with, and how often: a line (Martin and Mulgrew 1990), its tip alone (P), or some points of it.
 #: A model that knows one of them takes the spectrum of another for clutter.
 POINTS = {None: 0.55, 1: 0.15, 2: 0.07, 3: 0.07, 5: 0.06, 8: 0.05, 12: 0.05}
@@ -46,7 +49,7 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
     velocity = np.where(draws.chance(0.3), 0.0, draws.value("uav_velocity_mps"))
     acceleration = draws.acceleration_mps2("uav_acceleration_mps2")
     length = draws.value("main_length_m" if kind == "helicopter" else "blade_length_m")
-    rotation = draws.value("tip_mps") / (TWO_PI * length)
+    rotation = draws.value("tip_mps", least=TWO_PI * length * LEAST_ROTATION_HZ) / (TWO_PI * length)
     blades = np.where(draws.chance(0.65), 2, np.where(draws.chance(0.75), 3, 4))
     amplitudes = _blade_amplitudes(draws)
     root = length * draws.value("root_fraction")

@@ -1,5 +1,7 @@
 """What records are drawn from follows the table of laws, for any seed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bladewing.simulate import Radar, draw_records
@@ -7,6 +9,7 @@ from bladewing.simulate.bird import wing_size, wingbeat_hz
 from bladewing.simulate.dataset import QUIET
 from bladewing.simulate.laws import LAWS, Draws
 from bladewing.simulate.receiver import Receiver
+from bladewing.simulate.uav import LEAST_ROTATION_HZ
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -33,6 +36,24 @@ def test_every_law_is_drawn_as_it_stands(seed):
     for name, law in LAWS.items():
         values = np.sort(Draws(uniforms).value(name))
         assert distance(values, distribution(law, values)) < 3, name
+
+
+@given(seed=st.integers(0, 2**32), least=st.floats(0.0, 1.0))
+def test_a_raised_low_end_leaves_the_law_from_there_on(seed, least):
+    law = LAWS["tip_mps"]
+    lows = law.low * (law.high / law.low) ** (1.9 * least - 0.95)  # below the law's own and above it
+    values = Draws(np.random.default_rng(seed).random((3000, 1))).value("tip_mps", least=np.full(3000, lows))
+    assert distance(np.sort(values), distribution(replace(law, low=max(law.low, lows)), np.sort(values))) < 3
+
+
+def test_no_rotor_turns_as_slowly_as_a_wheel():
+    radar = Radar(9.85e9, 5e3, 16)
+    for kind in ("fixed_wing", "helicopter"):
+        truth = draw_records(radar, 2000, 3, kind=kind).truth
+        turns_hz = truth["rotation_hz"]
+        assert turns_hz.min() >= LEAST_ROTATION_HZ * (1 - 1e-12)
+        longest = truth["blade_length_m"] > np.quantile(truth["blade_length_m"], 0.9)
+        assert turns_hz[longest].min() < 1.1 * LEAST_ROTATION_HZ  # the law begins there, not beyond
 
 
 @settings(max_examples=4)
