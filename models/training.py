@@ -70,7 +70,7 @@ def train_network(
     epochs: int,
     batch: int = 256,
     learning_rate: float = 0.02,
-    weight_decay: float = 0.1,
+    weight_decay: float = 0.3,
     label_smoothing: float = 0.02,
     device: str = "auto",
     augment: Augment | None = None,
