@@ -139,9 +139,13 @@ class Measured:
                 "rotor_rates_hz": [float(rate) for rate in rates[np.isfinite(rates)]],
                 "rotors_resolved": bool(self.values.rotors_resolved[n]),
                 "length_is_lower_bound": self.values.length_is_lower_bound,
-                "alternatives": self.values.alternatives((n,)),
+                "alternatives": [
+                    {name: _number(value) for name, value in choice.items()}
+                    for choice in self.values.alternatives((n,))
+                ],
                 "reason": str(self.values.reason[n]) or None,
                 "gear_reason": str(self.values.gear_reason[n]) or None,
+                "band_reason": str(self.values.band_reason[n]) or None,
             }
         yield {"file": self.recording.name, "recording": self.together()}
 
@@ -149,10 +153,10 @@ class Measured:
         """Medians over the dwells that hold a comb, or both of a helicopter's, and how many those are."""
         held = np.isfinite(self.values.chopping_hz)
         names = ("body_velocity_mps", "chopping_hz", "bandwidth_hz", "tip_speed_mps", "rotation_hz", "blade_length_m")
-        medians = {name: _number(np.median(getattr(self.values, name)[held])) if held.any() else None for name in names}
+        medians = {name: _median(getattr(self.values, name)[held]) for name in names}
         geared = np.isfinite(self.values.gear_ratio)
         pair = ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
-        gear = {name: _number(np.median(getattr(self.values, name)[geared])) if geared.any() else None for name in pair}
+        gear = {name: _median(getattr(self.values, name)[geared]) for name in pair}
         counts = {"dwells": len(self.iq), "with_comb": int(held.sum()), "with_second_comb": int(geared.sum())}
         return {**counts, **medians, **gear, **self.over_all()}
 
@@ -231,16 +235,18 @@ class Measured:
         if np.isfinite(turns):
             rpm = ", ".join(f"{60 * rate / turns:.0f}" for rate in rates)
             error_cm = 100 * v.blade_length_m_std[clear]
-            blade = f"blade {bound}{with_error(100 * v.blade_length_m[clear], error_cm)} cm"
-            rotor = f"{turns:.0f}-blade rotors at {rpm} rpm, {blade}"
+            blade = f", blade {bound}{with_error(100 * v.blade_length_m[clear], error_cm)} cm"
+            rotor = f"{turns:.0f}-blade rotors at {rpm} rpm{'' if np.isnan(error_cm) else blade}"
         else:
             options = (
-                f"{c['blades']} x {c['rpm']:.0f} rpm ({bound}{100 * c['blade_length_m']:.1f} cm)"
+                f"{c['blades']} x {c['rpm']:.0f} rpm"
+                + ("" if np.isnan(c["blade_length_m"]) else f" ({bound}{100 * c['blade_length_m']:.1f} cm)")
                 for c in v.alternatives((clear,))[:4]
             )
             rotor = "blades x rate: " + " or ".join(options)
         where = f"comb in {all_together['with_comb']} of {counted(all_together['dwells'])}"
-        return f"{where}; {rotor}; {body}{self.gear()}{self.wheel()}"
+        folded = str(v.band_reason[clear])
+        return f"{where}; {rotor}; {body}{self.gear()}{self.wheel()}{folded and '; ' + folded}"
 
     def wheel(self) -> str:
         """Words of caution where the lines of most combs reach no further from the body than that moves; or ""."""
@@ -411,3 +417,9 @@ def measured(
 
 def _number(value: Any) -> float | None:
     return float(value) if math.isfinite(value) else None
+
+
+def _median(values: np.ndarray) -> float | None:
+    """Median of those that have a value."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else None

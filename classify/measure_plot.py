@@ -117,7 +117,8 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
         left = _WIDTH - 12 - 76 * (len(legend) - number)
         parts.append(f'<rect x="{left}" y="30" width="12" height="12" fill="{colour}" stroke="#888"/>')
         parts.append(f'<text x="{left + 18}" y="40">{words}</text>')
-    said = str(values.reason[index]) or f"comb every {chopping_hz:.2f} Hz, band {width_hz:.0f} Hz"
+    wide = "no band" if np.isnan(width_hz) else f"band {width_hz:.0f} Hz"
+    said = str(values.reason[index]) or f"comb every {chopping_hz:.2f} Hz, {wide}"
     if np.isfinite(both_hz).all():
         said += f"; main {both_hz[0]:.2f} Hz, tail {both_hz[1]:.2f} Hz, ratio {values.gear_ratio[index]:.3f}"
     # the folder would push the words off the picture

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .spectrum import LEAST_PART, SPEED_OF_LIGHT_MPS
+from .spectrum import LEAST_PART, SPEED_OF_LIGHT_MPS, as_complex
 
 #: Accelerations that are tried [m/s^2]: five times gravity.
 MAX_MPS2 = 50.0
@@ -14,6 +14,12 @@ LEAST_LINE_DB = 20.0
 
 #: The smear is taken out where it is over a bin, sure by so many standard deviations, and the line rises so much [dB].
 SURE_DEVIATIONS, LEAST_RISE_DB = 5.0, 2.0
+
+#: Pulses that a line's smear can be told from, at least.
+LEAST_PULSES = 32
+
+#: Samples of dwells that are worked on at a time.
+BLOCK_SAMPLES = 1 << 17
 
 
 def body_acceleration(
@@ -35,45 +41,53 @@ def body_acceleration(
         rate, 90 / (SNR pulses^5) rad^2 (Peleg and Porat 1991).
     smeared : ndarray of bool, shape (...)
         Whether the line is smeared for sure, so that `without_acceleration` is of use.
+
+    Raises
+    ------
+    ValueError
+        If `iq` is not complex.
     """
-    samples = np.asarray(iq, np.complex64)
+    samples = as_complex(iq)
     pulses = samples.shape[-1]
-    lead = samples.shape[:-1]
-    value, std, smeared = np.full(lead, np.nan), np.full(lead, np.nan), np.zeros(lead, bool)
+    flat = samples.reshape(-1, pulses)
+    value, std, smeared = np.full(len(flat), np.nan), np.full(len(flat), np.nan), np.zeros(len(flat), bool)
     wavelength_m = SPEED_OF_LIGHT_MPS / carrier_hz
     # one step smears a line over one bin of the dwell
     step = wavelength_m / 2 * (prf_hz / pulses) ** 2
     reach = int(min(MAX_MPS2 / step, pulses / 8)) + 1
-    if pulses < 32:
-        return value, std, smeared
     tried = np.arange(-reach, reach + 1) * step
     size = fft.next_fast_len(2 * pulses)
-    rates = np.exp(1j * _phase_rad(tried[:, None], pulses, wavelength_m, prf_hz)).astype(np.complex64)
-    for index in np.ndindex(lead):
-        scale = np.abs(samples[index]).max()
-        if scale < LEAST_PART:
-            continue
-        one = samples[index] / scale
-        heights = np.array([_power(one * turn, size).max() for turn in rates])
-        best = int(heights.argmax())
-        sharp = _power(one * rates[best], size)
-        noise = float(np.median(sharp)) / np.log(2)
-        if best in (0, 2 * reach) or heights[best] < noise * 10 ** (LEAST_LINE_DB / 10):
-            continue
-        at = tried[best]
-        for finer in (0.5, 0.1):
-            near = at + finer * step * np.array([-1, 0, 1])
-            turns = np.exp(1j * _phase_rad(near[:, None], pulses, wavelength_m, prf_hz)).astype(np.complex64)
-            left, middle, right = np.log([_power(one * turn, 4 * size).max() for turn in turns])
-            curve = 2 * middle - left - right
-            at += finer * step * (np.clip((right - left) / (2 * curve), -1, 1) if curve > 0 else 0.0)
-        value[index] = at
-        # the line's height is pulses^2 A^2, the noise's pulses sigma^2
-        snr = heights[best] / noise / pulses
-        std[index] = np.sqrt(90 / (snr * float(pulses) ** 5)) * prf_hz**2 * wavelength_m / (2 * np.pi)
-        rise = heights[best] / heights[reach]
-        smeared[index] = abs(at) > max(step, SURE_DEVIATIONS * std[index]) and rise > 10 ** (LEAST_RISE_DB / 10)
-    return value, std, smeared
+
+    def heights_at(values: NDArray[np.float64], dwells: NDArray[np.complex64], size: int) -> NDArray[np.float32]:
+        # value by value: a long dwell has thousands of steps, and together they would fill the memory
+        return np.stack([_sharpened(dwells, one, wavelength_m, prf_hz, size).max(axis=-1) for one in values], axis=-1)
+
+    some = max(1, BLOCK_SAMPLES // pulses)
+    for start in range(0, len(flat) if pulses >= LEAST_PULSES else 0, some):
+        block = flat[start : start + some]
+        scale = np.abs(block).max(axis=-1)
+        block = np.asarray(block / np.where(scale < LEAST_PART, np.float32(1), scale)[:, None], np.complex64)
+        every = heights_at(tried, block, size)
+        for row in np.flatnonzero(scale >= LEAST_PART):
+            index, one, heights = start + row, block[row], every[row]
+            best = int(heights.argmax())
+            sharp = _sharpened(one, tried[best], wavelength_m, prf_hz, size)
+            noise = float(np.median(sharp)) / np.log(2)
+            if best in (0, 2 * reach) or heights[best] < noise * 10 ** (LEAST_LINE_DB / 10):
+                continue
+            at = tried[best]
+            for finer in (0.5, 0.1):
+                left, middle, right = np.log(heights_at(at + finer * step * np.array([-1, 0, 1]), one, 4 * size))
+                curve = 2 * middle - left - right
+                at += finer * step * (np.clip((right - left) / (2 * curve), -1, 1) if curve > 0 else 0.0)
+            value[index] = at
+            # the line's height is pulses^2 A^2, the noise's pulses sigma^2
+            snr = heights[best] / noise / pulses
+            std[index] = np.sqrt(90 / (snr * float(pulses) ** 5)) * prf_hz**2 * wavelength_m / (2 * np.pi)
+            rise = heights[best] / heights[reach]
+            smeared[index] = abs(at) > max(step, SURE_DEVIATIONS * std[index]) and rise > 10 ** (LEAST_RISE_DB / 10)
+    lead = samples.shape[:-1]
+    return value.reshape(lead), std.reshape(lead), smeared.reshape(lead)
 
 
 def without_acceleration(
@@ -105,6 +119,10 @@ def _phase_rad(acceleration: NDArray[np.float64], pulses: int, wavelength_m: flo
     return np.asarray(2 * np.pi / wavelength_m * acceleration * time_s**2)
 
 
-def _power(samples: NDArray[np.complex64], size: int) -> NDArray[np.float32]:
-    spectrum = fft.fft(samples, n=size)
+def _sharpened(
+    samples: NDArray[np.complex64], acceleration_mps2: float, wavelength_m: float, prf_hz: float, size: int
+) -> NDArray[np.float32]:
+    """Power spectra of dwells (..., pulses) with an acceleration taken out."""
+    phase = _phase_rad(np.asarray(acceleration_mps2), samples.shape[-1], wavelength_m, prf_hz)
+    spectrum = fft.fft(samples * np.exp(1j * phase).astype(np.complex64), n=size)
     return np.asarray(spectrum.real**2 + spectrum.imag**2)

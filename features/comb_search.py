@@ -35,8 +35,9 @@ FLASH_SHARE, REST_FLASH_SHARE = 2.0, 1.0
 #: What a comb whose sides reach unequally far must have more [nats].
 UNEVEN_COST = 4.0
 
-#: What speaks for the comb's centre where a strong line is [nats], and more for each dB.
-STRONG_LINE = 10.0
+#: What speaks for the comb's centre where a line stands so far over all others of it [nats, dB], and more for each dB
+#: beyond. Blades may be the stronger: then their outermost lines are, and say nothing of the body.
+STRONG_LINE, STRONG_OVER_DB = 10.0, 6.0
 STRONG_LINE_DB = 1.0
 
 #: What is at rest may be the background: its level counts up to so much over that of the strongest line that moves.
@@ -348,6 +349,10 @@ def _centred(data: Periodogram, evidence: NDArray[np.float32], found: Candidate)
     pulses = data.pulses
     middle = found.centre + found.spacing * round((found.high + found.low) / 2)
     options = [(found.centre, 0.0), (middle, 0.0)]
+    every = found.centre + found.spacing * np.arange(found.low, found.high + 1)
+    every = every[data.usable(every)]
+    power = data.at(every) * data.level_at(every)
+    others_db = max(10 * float(np.log10(power.max(initial=1.0))), LINE_DB - STRONG_OVER_DB)
     moving = max(
         (db for c, db in zip(data.centres, data.centres_db, strict=True) if abs(c) > data.rest_half), default=99.0
     )
@@ -357,7 +362,10 @@ def _centred(data: Periodogram, evidence: NDArray[np.float32], found: Candidate)
         # several rotors' spacings differ: the further off, the less one comb for them all tells where a line must be
         off = (orders - round(orders)) * found.spacing * pulses / (1 + 0.2 * abs(orders))
         if abs(off) < 1.5 and level_db > LINE_DB:
-            options.append((centre, STRONG_LINE + STRONG_LINE_DB * (shown_db - LINE_DB) - 16 * off**2))
+            over_db = max(shown_db - others_db, 0.0)
+            strong = STRONG_LINE * min(over_db / STRONG_OVER_DB, 1.0)
+            more = STRONG_LINE_DB * max(over_db - STRONG_OVER_DB, 0.0)
+            options.append((centre, strong + more - 16 * off**2))
     best, most = found, -np.inf
     steps = found.spacing * (1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * pulses))
     for centre, bonus in dict(options).items():

@@ -15,6 +15,9 @@ from .spectrum import SPEED_OF_LIGHT_MPS, as_complex, doppler_spectrum
 #: Dwells by which the body is followed [s].
 BODY_DWELL_S = 0.1
 
+#: The course is a line through so many dwells at most, spread over all: slopes between all pairs are that many squared.
+MOST_DWELLS = 400
+
 #: What stands at rest in this sense is taken for the background [m/s, m/s^2], and taken out so far about velocity zero.
 REST_MPS, REST_MPS2, REST_NOTCH_MPS = 0.4, 0.15, 0.5
 
@@ -85,7 +88,8 @@ def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> Cours
     velocity = np.unwrap(velocity, period=ambiguous)
     when = ((np.arange(count) + 0.5) * length - (len(iq) - 1) / 2) / prf_hz
     # a dwell whose strongest line is a wing's must not turn the line: medians of slopes (Theil and Sen)
-    first, second = np.triu_indices(count, 1)
+    some = np.unique(np.linspace(0, count - 1, min(count, MOST_DWELLS)).astype(np.intp))
+    first, second = some[np.stack(np.triu_indices(len(some), 1))]
     slope = float(np.median((velocity[second] - velocity[first]) / (when[second] - when[first])))
     rest = velocity - slope * when
     middle = float(np.median(rest))

@@ -15,7 +15,7 @@ from .helicopter import find_gear
 from .lines import LineSpace
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .one_thread import one_thread
-from .periodogram import Periodogram, prepared
+from .periodogram import LINE_DB, Periodogram, prepared
 from .rotor_band import LEAK_SHARE, fit_edge
 from .rotors import MAX_ROTORS, Rotors
 from .smearing import smearing_index
@@ -40,6 +40,14 @@ SEVERAL_LEAK = 0.005
 #: Of the sums of all about an order: variance over the square where the rotors' lines lie in one another (four of equal
 #: power, both sides), and what an edge is off by at least [lines].
 AROUND_SCATTER, AROUND_LINES = 0.4, 0.035
+
+#: Lines are looked for so far from the body [cycles a sample]. A family that still stands there at this share of its
+#: mean power, by so many deviations of the noise, or whose fitted edge may be so far by so many of its own, has no edge
+#: to be seen: it fills the span, and what lies beyond has been folded back between its lines.
+SPAN, SPAN_SHARE, SPAN_DEVIATIONS, SPAN_EDGE, SPAN_EDGE_DEVIATIONS = 0.49, 0.05, 4.0, 0.48, 3.0
+
+#: The orders beyond this share of the span are those asked whether it ends there.
+SPAN_OUTER = 0.9
 
 #: Rotors that are not told apart differ by about so much in their rates, relative.
 LEAST_SPREAD = 0.02
@@ -91,6 +99,8 @@ class Measurements:
         Tail over main chopping frequency [1]: the gear's ratio where both rotors have as many blades.
     gear_reason : ndarray of str
         Why there is no second comb; empty where there is one.
+    band_reason : ndarray of str
+        Why there is a comb but no band, tip speed and blade length: its lines fill the unambiguous span; else empty.
     """
 
     body_velocity_mps: NDArray[np.float64]
@@ -124,6 +134,7 @@ class Measurements:
     gear_ratio: NDArray[np.float64]
     gear_ratio_std: NDArray[np.float64]
     gear_reason: NDArray[np.str_]
+    band_reason: NDArray[np.str_]
 
     def alternatives(self, index: tuple[int, ...] = ()) -> list[dict[str, float]]:
         """The {blades, rpm, blade_length_m} that a record's chopping frequency and band allow.
@@ -225,7 +236,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     out: dict = {field.name: np.nan for field in fields(Measurements)}
     out["rotor_rates_hz"] = out["rotor_rates_hz_std"] = np.full(MAX_ROTORS, np.nan)
     out["rotors_resolved"] = False
-    out["gear_reason"] = "no comb"
+    out["gear_reason"], out["band_reason"] = "no comb", ""
     if 0 < largest_part(iq) < LEAST_PART:
         return out | {"reason": "no digits left in samples this small: raise the gain"}
     data = prepared(iq, spectrum)
@@ -252,7 +263,8 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     out["comb_order"] = float(comb.last // comb.per_turn)
     out["comb_snr_db"] = float(10 * np.log10(max(comb.fit.snr.sum() / data.pulses, 1e-9)))
 
-    gear, rotors, out["gear_reason"] = find_gear(data, comb, edge)
+    fills = np.isinf(edge)
+    gear, rotors, out["gear_reason"] = find_gear(data, comb, min(edge, SPAN))
     if gear is not None:
         data, comb = gear.alone, gear.first
         out["chopping_hz"], out["chopping_hz_std"] = comb.chopping * prf_hz, comb.chopping_std * prf_hz
@@ -278,6 +290,12 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     # unequal blades tell their number; between the lines of several rotors the weak ones may be something else
     seen = comb.per_turn if comb.per_turn > 1 and count == 1 else None
     known = blades if blades is not None else seen
+    if fills or not edge + SPAN_EDGE_DEVIATIONS * edge_std < SPAN_EDGE:
+        least_mps = SPAN_EDGE * prf_hz * wavelength_m / 2
+        out["band_reason"] = (
+            f"no band: lines may fill the unambiguous span, tips of {least_mps:.1f} m/s and more: raise the PRF"
+        )
+        edge = edge_std = np.nan
     out["bandwidth_hz"], out["bandwidth_hz_std"] = 2 * edge * prf_hz, 2 * edge_std * prf_hz
     cosine = 1.0 if beta_rad is None else float(np.cos(beta_rad))
     tip, tip_std = (value * prf_hz * wavelength_m / 2 / cosine for value in (edge, edge_std))
@@ -304,7 +322,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
 
 
 def _body(data: Periodogram, fit: CombFit | None, *, steady: bool = True) -> dict[str, float]:
-    """The body's velocity: from its own line, or from the comb's centre where background may hide that line.
+    """The body's velocity: from its own line, or from the comb's centre where background may hide that line; or NaN.
 
     Of unresolved rotors, or a rate that is not steady, the centre has no true deviation.
     """
@@ -313,6 +331,8 @@ def _body(data: Periodogram, fit: CombFit | None, *, steady: bool = True) -> dic
     snr = 10 ** (level_db / 10)
     own_std = float(np.hypot(np.sqrt(1.5 / snr) / np.pi, 0.01)) / data.pulses
     turns, std = own, own_std
+    if fit is None and level_db < LINE_DB:
+        return {"body_velocity_mps": np.nan, "body_velocity_mps_std": np.nan}
     if fit is not None:
         offset = (own - fit.centre) * data.pulses
         if abs(offset) > 1.0 or (steady and fit.centre_std < own_std):
@@ -331,7 +351,7 @@ def _edge(
     """
     spacings = np.array([fit.spacing * per_turn for fit in fits])
     fastest = float(spacings.max())
-    order = np.arange(1, int(0.49 / fastest) + 1)
+    order = np.arange(1, int(SPAN / fastest) + 1)
     sides = np.array([[-1], [1]]) * order
     centres = np.array([fit.centre for fit in fits])
     frequency = np.asarray(centres[:, None, None] + spacings[:, None, None] * sides, np.float64)
@@ -347,9 +367,31 @@ def _edge(
     if not seen.any():
         return 0.0, np.inf
     count = number[seen]
+    if _fills_span(order[seen] * fastest, total[seen], noise[seen], count):
+        return np.inf, np.inf
     leak = SEVERAL_LEAK if len(fits) > 1 else LEAK_SHARE
     edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades, leak=leak)
     return edge * fastest, std * fastest
+
+
+def _fills_span(
+    away: NDArray[np.float64], total: NDArray[np.float64], noise: NDArray[np.float64], bins: NDArray[np.float64]
+) -> bool:
+    """True where a line family still stands at the end of the span.
+
+    Parameters
+    ----------
+    away : ndarray, shape (orders,)
+        Distance of each order from the body, rising [cycles a sample].
+    total, noise : ndarray, shape (orders,)
+        Power of its lines with their noise, and of that alone, summed over so many `bins`.
+    """
+    outer = (away > SPAN_OUTER * SPAN) | (away == away[-1])
+    excess, number = total - noise, bins[outer].sum()
+    deviation = float(np.sqrt((noise[outer] ** 2 / bins[outer]).sum()))
+    stands = float(excess[outer].sum()) > SPAN_DEVIATIONS * deviation
+    mean = float(excess.sum() / bins.sum())
+    return bool(away[-1] > SPAN / 2 and stands and excess[outer].sum() / number > SPAN_SHARE * mean)
 
 
 def _amplitudes_at(fit: CombFit, orders: NDArray[np.intp]) -> NDArray[np.complex128]:
@@ -365,6 +407,8 @@ def _surer(lines: tuple[float, float], around: tuple[float, float]) -> tuple[flo
 
     Rotors that were not told apart show in the second alone. It is known to its own deviation, whatever the first says.
     """
+    if not np.isfinite(lines[0] + around[0]):
+        return np.inf, np.inf
     agreed = abs(around[0] - lines[0]) < AGREED_DEVIATIONS * around[1]
     return lines if agreed and lines[1] < around[1] else around
 
@@ -373,7 +417,7 @@ def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | No
     """Edge and its standard deviation by all that lies about each order: rotors that are not told apart count too."""
     nominal, centre = float(np.mean([rotors.rates.min(), rotors.rates.max()])), rotors.fits[0].centre
     size, pulses = len(data.power), data.pulses
-    order = np.arange(1, int(0.49 / nominal) + 1)
+    order = np.arange(1, int(SPAN / nominal) + 1)
     spread = max(rotors.spread, LEAST_SPREAD * nominal)
     half_bins = min(nominal * pulses / 2, 1 + comb.last / comb.per_turn * spread * pulses)
     half = int(half_bins * size / pulses)
@@ -391,6 +435,8 @@ def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | No
     seen = number > 2
     count = number[seen]
     noise = np.full(len(count), floor)
+    if _fills_span(np.asarray(order[seen] * nominal, np.float64), total[seen], noise * count, count):
+        return np.inf, np.inf
     # once the lines part, what they have of one another falls with the square of their distance
     scatter = np.asarray(AROUND_SCATTER / (1 + (2 * order[seen] * rotors.spread * pulses) ** 2), np.float64)
     edge, std = fit_edge(order[seen], total[seen] / count, noise, count, blades, scatter=scatter, leak=SEVERAL_LEAK)

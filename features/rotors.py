@@ -98,8 +98,38 @@ def _strongest(
     return float(rates[best]), int(reach[best]), float(sums[best])
 
 
-def _flashes_twice(fit: CombFit, per_turn: int) -> bool:
-    """True where a comb's phases show the flashes of two rotors in each period."""
+def _flashes_twice(fit: CombFit, per_turn: int, tip: float) -> bool:
+    """True where a comb's phases show the flashes of two rotors in each period.
+
+    A blade that reflects along its length flashes once on each side. One that reflects at its tip alone is seen twice
+    at every speed below the tip's, before and after that comes straight on: its lines are J_n(Gamma) (the paper's eq.
+    24), and flash once when these are taken for what they are; `tip` is the order its edge has.
+    """
+    shares = [_second_flash(fit, per_turn, None)]
+    for blades in (1, 2, 3):
+        if not _two(shares[-1]):
+            return False
+        shares.append(_second_flash(fit, per_turn, (blades, tip)))
+    return _two(shares[-1])
+
+
+def _two(shares: list[float]) -> bool:
+    """True where second flashes on both sides are as strong as another rotor's."""
+    return len(shares) == 2 and min(shares) > SECOND_FLASH_SHARE / 2 and sum(shares) > 2 * SECOND_FLASH_SHARE
+
+
+def _second_flash(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) -> list[float]:
+    """Power of the second flash over the first, of each side with lines enough.
+
+    Parameters
+    ----------
+    fit, per_turn
+        The comb, and the strong lines' spacing in lines of it.
+    tip : (int, float), optional
+        Blades that reflect at their tips, and the tip's order; else they reflect along their length.
+    """
+    from scipy.special import jv  # here, because predicting needs no such import
+
     shares = []
     for sign in (-1, 1):
         side = np.flatnonzero((sign * fit.orders > 0) & (fit.orders % per_turn == 0))
@@ -108,6 +138,8 @@ def _flashes_twice(fit: CombFit, per_turn: int) -> bool:
             continue
         lines = np.zeros(order.max() + 1, np.complex128)
         lines[order] = fit.amplitudes[side]
+        if tip is not None:
+            lines *= jv(tip[0] * np.arange(len(lines)), tip[0] * tip[1])
         size = FLASH_PADDING * len(lines)
         power = np.abs(fft.fft(lines, size)) ** 2
         first = int(power.argmax())
@@ -115,8 +147,8 @@ def _flashes_twice(fit: CombFit, per_turn: int) -> bool:
         other = lines_away > FLASH_WIDTH
         for part in (2, 3):  # unequal blades of one rotor flash at fractions of the turn
             other &= np.abs(lines_away - len(lines) / part) > 1
-        shares.append(power[other].max(initial=0) / power[first])
-    return len(shares) == 2 and min(shares) > SECOND_FLASH_SHARE / 2 and sum(shares) > 2 * SECOND_FLASH_SHARE
+        shares.append(float(power[other].max(initial=0) / power[first]))
+    return shares
 
 
 def _left_over(rest: Periodogram, fits: list[CombFit], edge: float) -> tuple[bool, bool]:
@@ -237,7 +269,9 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float) -> Rotors
     if not rotors.resolved:
         return rotors
     several = len(rotors.fits) > 1
-    twice = any(_flashes_twice(fit, 1 if several else comb.per_turn) for fit in rotors.fits)
+    per_turn = 1 if several else comb.per_turn
+    tip = edge / (per_turn * max(fit.spacing for fit in rotors.fits))  # an order is the same for all: blades are alike
+    twice = any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
     clear, hidden = _left_over(data.left(rotors.rest), rotors.fits, edge)
     # a little that a single rotor leaves may be a change of its rate
     if not (twice or hidden or (several and clear)):

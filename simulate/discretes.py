@@ -102,9 +102,8 @@ def _vehicle_body(draws: Draws, radar: Radar) -> tuple[NDArray[np.complex64], tu
     """
     speed = draws.value("vehicle_mps")
     pull = draws.acceleration_mps2("road_acceleration_mps2", radar.dwell_s)
-    far, verge = draws.value("road_m"), draws.value("verge_m")
     # by the logarithm alone, slow cars within a few metres, which roadside radars see all day, were one record in 1000
-    aside, sight = np.where(draws.chance(0.35), verge, far), draws.value("sight_rad")
+    aside, sight = draws.either("road_m", "verge_m", 0.35), draws.value("sight_rad")
     ahead = aside * np.tan(sight)  # at the middle of the dwell
     gone = straight_path(radar.times_s - radar.times_s[radar.pulses // 2], speed, pull)
     length = draws.value("vehicle_length_m")

@@ -182,6 +182,11 @@ class Draws:
         """Draw by the law of that name, from `least` on if given: shape (records,), or (records, columns)."""
         return LAWS[law](self.uniform(columns), least)
 
+    def either(self, usual: str, other: str, share: float) -> NDArray[np.float64]:
+        """Draw by the law `usual`, or for that share of the records by the law `other`: shape (records,)."""
+        one, two = self.value(usual), self.value(other)
+        return np.where(self.chance(share), two, one)
+
     def change(self, law: str, dwell_s: float) -> NDArray[np.float64]:
         """Draw a rate of change that adds up to no more over a dwell above 1 s than the law's end does in 1 s."""
         most = max(abs(LAWS[law].low), abs(LAWS[law].high)) / max(1.0, dwell_s)

@@ -3,6 +3,7 @@
 Levels are powers over the receiver's noise, a sample [dB]; angles are in degrees here, because people write them.
 """
 
+import math
 from difflib import get_close_matches
 from typing import Annotated, Any, Literal
 
@@ -18,6 +19,18 @@ MOST = 1e12
 
 #: Scatterers of a blade that is a row of them, at most.
 MOST_POINTS = 1000
+
+#: What a parameter of clutter can be where its law does not tell: how many of a thing are rendered, and what still
+#: has a spectrum (Billingsley's has none in still air) or a gait.
+BOUNDS = {
+    "wheels": (1, 4),
+    "spokes": (1, 10),
+    "turbine_points": (3, 30),
+    "turbine_row_points": (2, 1e6),
+    "insect_count": (1, 20),
+    "wind_mph": (0.5, 200),
+    "gait_hz": (0.05, 20),
+}
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-MOST, le=MOST)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=MOST)]
@@ -252,6 +265,10 @@ def _known_laws(values: dict[str, float]) -> dict[str, float]:
             raise ValueError(
                 f"{name!r} is unknown: of the {len(laws)} parameters (simulate/laws.py) near it are {near}"
             )
-        if laws[name].kind == "log" and value <= 0:
-            raise ValueError(f"{name} is {value}: it must be above 0 [{laws[name].unit}]")
+        law = laws[name]
+        if law.kind == "log" and value <= 0:
+            raise ValueError(f"{name} is {value}: it must be above 0 [{law.unit}]")
+        low, high = BOUNDS.get(name, (-math.inf, math.inf))
+        if not low <= value <= high:
+            raise ValueError(f"{name} is {value}: it must be {low:g} to {high:g} [{law.unit}]")
     return values

@@ -31,14 +31,27 @@ class Chosen(Draws):
         super().__init__(uniforms)
         self._values = values
 
-    def value(self, law: str, columns: int | None = None) -> NDArray[np.float64]:
+    def value(
+        self, law: str, columns: int | None = None, *, least: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
         """Draw by the law of that name, insects' among them, or give the value that is fixed."""
-        drawn = (LAWS | INSECT_LAWS)[law](self.uniform(columns))
+        drawn = (LAWS | INSECT_LAWS)[law](self.uniform(columns), least)
         return np.full_like(drawn, self._values[law]) if law in self._values else drawn
 
     def change(self, law: str, dwell_s: float) -> NDArray[np.float64]:
         """Draw a rate of change, or give the value that is fixed."""
         return self.value(law) if law in self._values else super().change(law, dwell_s)
+
+    def acceleration_mps2(self, law: str, dwell_s: float = 0.0) -> NDArray[np.float64]:
+        """Draw an acceleration, or give the value that is fixed: whether the body is steady was settled with it."""
+        drawn = super().acceleration_mps2(law, dwell_s)
+        return np.full_like(drawn, self._values[law]) if law in self._values else drawn
+
+    def either(self, usual: str, other: str, share: float) -> NDArray[np.float64]:
+        """Draw by one of two laws, or give the value that is fixed of either."""
+        drawn = super().either(usual, other, share)
+        fixed = [self._values[law] for law in (usual, other) if law in self._values]
+        return np.full_like(drawn, fixed[0]) if fixed else drawn
 
 
 def pulse_times_s(scene: Setting, seed: int) -> NDArray[np.float64]:

@@ -75,9 +75,9 @@ def bird_echo(part: BirdPart, radar: Radar, times_s: NDArray[np.float64], how: F
 
 
 def heave_range_m(part: BirdPart, times_s: NDArray[np.float64], bird: Member) -> NDArray[np.float64]:
-    """Range by which the body rises and sinks against the wings [m]."""
+    """Range by which the body rises and sinks against the wings [m]: it is lowest where they are highest."""
     cycle, _ = _cycle_rad(part, times_s, bird)
-    return part.heave_m * np.sin(np.deg2rad(part.elevation_deg)) * np.cos(cycle)
+    return -part.heave_m * np.sin(np.deg2rad(part.elevation_deg)) * np.cos(cycle)
 
 
 def bird_parts_echo(part: BirdPart, radar: Radar, times_s: NDArray[np.float64], bird: Member) -> NDArray[np.complex128]:

@@ -9,7 +9,7 @@ from bladewing.features.one_thread import one_thread
 from bladewing.features.periodogram import prepare, without_clicks
 from bladewing.features.rotors import MAX_ROTORS
 from bladewing.features.slow_lines import notched_products, remove_bands, slepian
-from bladewing.simulate import RotorMotion, rotor_echo
+from bladewing.simulate import RotorMotion, Scene, rotor_echo
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
@@ -450,3 +450,51 @@ def shifted(rate_hz, angle_rad):
     motion = RotorMotion(rate_hz, angle_rad)
     times_s = np.arange(PULSES) / PRF_HZ
     return 1.5 * rotor_echo(motion.angle_rad(times_s), wavelength_m=WAVELENGTH_M, blade_length_m=0.15)
+
+
+@pytest.mark.parametrize("airframe", ["fixed_wing_15cm", "quadcopter_12cm", "hexacopter_30cm"])
+def test_a_folded_band_has_no_edge_and_a_radar_fast_enough_sees_it(airframe):
+    uav = {"name": "u", "airframe": airframe, "velocity_mps": 5.0}
+    for fold in (1.4, 0.7):
+        radar = {"carrier_hz": 24.1e9, "prf_hz": 10e3}
+        part = Scene.build({"radar": {**radar, "pulses": 800}, "uav": [uav]}).uav[0]
+        tip_mps = max(2 * np.pi * abs(rotor.rotation_hz) * rotor.blade_length_m for rotor in part.rotors)
+        radar["prf_hz"] = 4 * tip_mps / fold * radar["carrier_hz"] / 299792458.0
+        scene = Scene.build({"radar": {**radar, "pulses": int(0.08 * radar["prf_hz"])}, "uav": [uav]})
+        found = measure(scene.render(0).iq, **radar, blades=2, beta_rad=0.0)
+        assert np.isfinite(found.chopping_hz)
+        if fold > 1:
+            assert np.isnan([found.bandwidth_hz, found.tip_speed_mps, found.blade_length_m]).all()
+            assert "raise the PRF" in str(found.band_reason)
+            assert np.isnan(found.alternatives()[0]["blade_length_m"])
+        else:
+            assert found.tip_speed_mps == pytest.approx(tip_mps, rel=0.03)
+            assert found.band_reason == ""
+
+
+@pytest.mark.parametrize("name", ["type1", "type2", "type3", "type6"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_blades_that_reflect_at_their_tips_are_not_taken_for_twice_as_many_rotors(name, seed):
+    # a tip is seen twice at every speed below its own: before and after the blade comes straight on
+    scene = Scene.load(name)
+    seen = scene.render(seed)
+    found = measure(seen.iq, carrier_hz=seen.radar.carrier_hz, prf_hz=seen.radar.prf_hz, blades=2, beta_rad=0.0)
+    assert found.rotors_resolved
+    assert found.rotor_count == len(scene.uav[0].rotors)
+
+
+@pytest.mark.parametrize("body_db", [-15, -10, -5, 0, 10])
+def test_blades_stronger_than_the_body_do_not_move_its_velocity_by_many_orders(body_db):
+    wrong = 0
+    for seed in range(8):
+        velocity_mps = np.random.default_rng(seed).uniform(-20, 20)
+        options = {"length_m": 0.0635, "velocity_mps": velocity_mps, "body": 10 ** (body_db / 20)}
+        found = measure(drone([202.3], snr_db=20, seed=seed, **options), **RADAR)
+        wrong += abs(found.body_velocity_mps - velocity_mps) > 1
+    assert wrong <= 2
+
+
+def test_noise_has_no_body():
+    found = measure(white(np.random.default_rng(1), 8, 1000), carrier_hz=9.85e9, prf_hz=20e3)
+    assert np.isnan(found.body_velocity_mps).all()
+    assert np.isnan(found.body_velocity_mps_std).all()

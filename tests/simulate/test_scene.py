@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from bladewing.simulate.bird import wingbeat_hz
 from bladewing.simulate.catalogue import AIRFRAMES, BIRDS
+from bladewing.simulate.parts import BOUNDS
+from bladewing.simulate.render_bird import _cycle_rad, heave_range_m, members
 from bladewing.simulate.scene import Scene, SceneError, shipped
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -314,3 +316,54 @@ def test_an_insects_echo_swells_at_its_wingbeat():
     assert swell.max() == pytest.approx(1.4, abs=0.02)
     lines = abs(np.fft.rfft(swell - swell.mean()))
     assert 89 < lines.argmax() < 111  # a second: bins are Hz
+
+
+def clutter_of(kind: str, seed: int = 0, **values: float):
+    part = {"name": "c", "kind": kind, "level_db": 10.0, "values": values}
+    return Scene.build({"radar": {**RADAR, "pulses": 300}, "clutter": [part]}).render(seed)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        ("vehicle", "wheels"),
+        ("vehicle", "spokes"),
+        ("wind_turbine", "turbine_points"),
+        ("wind_turbine", "turbine_row_points"),
+        ("insects", "insect_count"),
+        ("ground", "wind_mph"),
+        ("person", "gait_hz"),
+    ],
+)
+def test_values_that_cannot_be_rendered_are_refused_and_those_at_the_bounds_are_finite(kind, name):
+    low, high = BOUNDS[name]
+    most = min(high, 3e4)
+    for value in (low, most):
+        assert all(np.isfinite(clutter_of(kind, seed, **{name: value}).iq).all() for seed in range(6))
+    for value in (low * 0.9, high * 1.1):
+        with pytest.raises(SceneError, match=rf"{name} is .*must be"):
+            clutter_of(kind, **{name: value})
+
+
+def test_wheels_and_spokes_may_both_be_the_most():
+    assert np.isfinite(clutter_of("vehicle", wheels=4, spokes=10).iq).all()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_value_that_is_fixed_is_fixed_whatever_is_drawn_beside_it(seed):
+    # on a straight road far away nothing but the pull itself accelerates the vehicle
+    fixed = {"vehicle_mps": 1.5, "road_m": 1e6, "sight_rad": 1.4}
+    pulled = clutter_of("vehicle", seed, road_acceleration_mps2=3.0, **fixed).truth[0]
+    assert pulled["acceleration_mps2"] == pytest.approx(3.0 * np.sin(1.4), rel=1e-3)
+    near = clutter_of("vehicle", seed, road_acceleration_mps2=0.0, vehicle_mps=1.0, verge_m=2.0, sight_rad=0.0).truth[0]
+    assert near["acceleration_mps2"] == pytest.approx(1.0 / 2.0, rel=1e-3)
+
+
+def test_a_bird_is_lowest_where_its_wings_are_highest():
+    bird = {"name": "b", "species": "starling", "range_m": 100.0, "heave_m": 0.02, "elevation_deg": 90.0}
+    (part,) = Scene.build({"radar": RADAR, "bird": [bird]}).bird
+    (one,) = members(part)
+    times = np.linspace(0, 1, 1000)
+    cycle, _ = _cycle_rad(part, times, one)
+    # straight above the radar, range is height; the wings are highest at phase 0
+    np.testing.assert_allclose(heave_range_m(part, times, one), -0.02 * np.cos(cycle), atol=1e-12)
