@@ -151,12 +151,17 @@ def uav_truth(part: UavPart) -> dict[str, Any]:
         "rotation_hz": [rotor.rotation_hz for rotor in part.rotors],
         "blades": [rotor.blades for rotor in part.rotors],
         "blade_length_m": [rotor.blade_length_m for rotor in part.rotors],
-        "chopping_hz": [abs(rotor.rotation_hz) * (rotor.blades if _equal(rotor) else 1) for rotor in part.rotors],
+        "chopping_hz": [abs(rotor.rotation_hz) * _repeats(rotor) for rotor in part.rotors],
         "flash_db": [rotor.flash_db for rotor in part.rotors],
         "body_db": [point.level_db for point in part.body],
     }
 
 
-def _equal(rotor: RotorPart) -> bool:
-    """Whether all blades echo alike: only then is the rotation rate's own comb missing."""
-    return len(set(rotor.amplitudes)) == 1
+def _repeats(rotor: RotorPart) -> int:
+    """How often a turn looks the same: as often as it has blades where all echo alike, twice for strong, weak, strong, weak.
+
+    Lines stand that many rotation rates apart.
+    """
+    every, count = list(rotor.amplitudes), rotor.blades
+    turned = (step for step in range(1, count + 1) if count % step == 0 and every[step:] + every[:step] == every)
+    return count // next(turned)

@@ -367,3 +367,20 @@ def test_a_bird_is_lowest_where_its_wings_are_highest():
     cycle, _ = _cycle_rad(part, times, one)
     # straight above the radar, range is height; the wings are highest at phase 0
     np.testing.assert_allclose(heave_range_m(part, times, one), -0.02 * np.cos(cycle), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "repeats"),
+    [([1.0] * 4, 4), ([1.0, 0.5, 1.0, 0.5], 2), ([1.0, 0.5, 0.5, 0.5], 1), ([1.0, 1.0, 0.5], 1), ([1.0], 1)],
+)
+def test_the_chopping_frequency_counts_how_often_a_turn_looks_the_same(amplitudes, repeats):
+    rotor = {**ROTOR, "blades": len(amplitudes), "blade_amplitudes": amplitudes}
+    radar = {"carrier_hz": 9.85e9, "prf_hz": 20e3, "pulses": 2000}
+    part = uav(body=[], rotors=[rotor])
+    rendered = Scene.build({"radar": radar, "uav": [part], "receiver": {"noise": False}}).render()
+    assert rendered.truth[0]["chopping_hz"] == [pytest.approx(ROTOR["rotation_hz"] * repeats)]
+    # one bin in five is a multiple of the rotation rate: lines stand on those of the chopping frequency alone
+    power = power_spectrum(rendered.iq)[:500:5]
+    lines = power > 1e-6 * power.max()
+    assert set(np.flatnonzero(lines) % repeats) == {0}
+    assert lines[repeats]
