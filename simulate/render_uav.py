@@ -158,7 +158,7 @@ def uav_truth(part: UavPart) -> dict[str, Any]:
 
 
 def _repeats(rotor: RotorPart) -> int:
-    """How often a turn looks the same: as often as it has blades where all echo alike, twice for strong, weak, strong, weak.
+    """How often a turn looks the same: once a blade where all echo alike, twice for strong, weak, strong, weak.
 
     Lines stand that many rotation rates apart.
     """
