@@ -40,6 +40,10 @@ UNEVEN_COST = 4.0
 STRONG_LINE, STRONG_OVER_DB = 10.0, 6.0
 STRONG_LINE_DB = 1.0
 
+#: What speaks for the middle of all lines within so much of the strongest, where that stands so high over the noise that
+#: both ends show [nats, dB, dB].
+EVEN_ENDS, ENDS_DB, CLEAR_DB = 8.0, 20.0, 30.0
+
 #: What is at rest may be the background: its level counts up to so much over that of the strongest line that moves.
 REST_DB = 15.0
 
@@ -349,10 +353,14 @@ def _centred(data: Periodogram, evidence: NDArray[np.float32], found: Candidate)
     pulses = data.pulses
     middle = found.centre + found.spacing * round((found.high + found.low) / 2)
     options = [(found.centre, 0.0), (middle, 0.0)]
-    every = found.centre + found.spacing * np.arange(found.low, found.high + 1)
-    every = every[data.usable(every)]
-    power = data.at(every) * data.level_at(every)
-    others_db = max(10 * float(np.log10(power.max(initial=1.0))), LINE_DB - STRONG_OVER_DB)
+    orders_seen = np.arange(found.low, found.high + 1)
+    places = found.centre + found.spacing * orders_seen
+    power = data.at(places) * data.level_at(places) * data.usable(places)
+    highest_db = 10 * float(np.log10(power.max(initial=1.0)))
+    if highest_db > CLEAR_DB:
+        ends = orders_seen[power > 10 ** ((highest_db - ENDS_DB) / 10)]
+        options.append((found.centre + found.spacing * round((ends[0] + ends[-1]) / 2), EVEN_ENDS))
+    others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
     moving = max(
         (db for c, db in zip(data.centres, data.centres_db, strict=True) if abs(c) > data.rest_half), default=99.0
     )
