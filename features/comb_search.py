@@ -40,8 +40,8 @@ UNEVEN_COST = 4.0
 STRONG_LINE, STRONG_OVER_DB = 10.0, 6.0
 STRONG_LINE_DB = 1.0
 
-#: What speaks for the middle of all lines within so much of the strongest, where that stands so high over the noise that
-#: both ends show [nats, dB, dB].
+#: What speaks for the middle of all lines within so much of the strongest, where that stands so high over the noise
+#: that both ends show [nats, dB, dB].
 EVEN_ENDS, ENDS_DB, CLEAR_DB = 8.0, 20.0, 30.0
 
 #: What is at rest may be the background: its level counts up to so much over that of the strongest line that moves.
