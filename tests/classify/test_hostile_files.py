@@ -143,7 +143,7 @@ def test_a_packed_bomb_is_unpacked_no_further_than_it_may(tmp_path, suffix, pack
 
 
 def test_a_bomb_within_a_bomb_is_no_archive(tmp_path):
-    (tmp_path / "x.sigmf.gz").write_bytes(gzip.compress(gzip.compress(bytes(200 << 20))))
+    (tmp_path / "x.sigmf.gz").write_bytes(gzip.compress(gzip.compress(bytes(200 << 20), mtime=0), mtime=0))
     refused(tmp_path / "x.sigmf.gz", "not a readable SigMF recording")
 
 

@@ -146,7 +146,7 @@ def test_a_full_ensemble_stays_under_300_kb_and_a_network_under_200():
         ImageNet({"image": (1, 64, 32), "joint_features": (60,)}, seed=0),
     )
     for net in nets:
-        assert sum(p.numel() for p in net.parameters()) * 2 < 130_000  # stored in half precision
+        assert sum(p.numel() for p in net.parameters()) * 2 < 200_000  # stored in half precision
 
 
 def test_wrong_shapes_are_refused():
