@@ -194,7 +194,7 @@ def draw_clutter(draws: Draws, radar: Radar, kind: str, normals: Normals) -> Tar
     mean, width = draws.value("sea_velocity_mps"), draws.value("sea_width_mps")
     psd = _gaussian(v, mean, width, radar)
     # The Bragg lines of receding and advancing ripples, and a burst of fast scatterers from a breaking wave.
-    bragg = math.sqrt(_BRAGG_M_PER_S2 * radar.wavelength_m)
+    bragg = bragg_mps(radar.wavelength_m)
     for speed in (bragg, -bragg):
         psd = psd + 0.3 * draws.uniform()[:, None] * _gaussian(v, np.full(len(draws), speed), 0.1 + 0 * width, radar)
     breaking = np.where(draws.chance(0.35), draws.uniform(), 0.0)
@@ -206,8 +206,23 @@ def draw_clutter(draws: Draws, radar: Radar, kind: str, normals: Normals) -> Tar
     )
 
 
-#: Phase speed of the Bragg-resonant ripple, sqrt(g wavelength / (4 pi)) for deep water.
-_BRAGG_M_PER_S2 = 9.81 / (4 * np.pi)
+def bragg_mps(wavelength_m: float) -> float:
+    """Phase speed of the ripple of half the wavelength, which scatters back in phase, on deep water [m/s].
+
+    Its squared frequency is g k + (surface tension over density) k^3 (Lamb, Hydrodynamics, art. 267): above 10 GHz the
+    tension drives it, and the speed rises again.
+
+    Parameters
+    ----------
+    wavelength_m : float
+        Wavelength of the radar [m], > 0.
+    """
+    k = 4 * np.pi / wavelength_m
+    return math.sqrt(_GRAVITY_MPS2 / k + _TENSION_M3_PER_S2 * k)
+
+
+#: Gravity, and the surface tension of sea water over its density (0.0728 N/m over 1000 kg/m^3 within 3 %).
+_GRAVITY_MPS2, _TENSION_M3_PER_S2 = 9.81, 7.3e-5
 
 
 def _gaussian(

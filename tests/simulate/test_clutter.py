@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from bladewing.simulate import Radar
-from bladewing.simulate.clutter import _texture, billingsley, draw_ground, process_velocities, shaped_noise
+from bladewing.simulate.clutter import _texture, billingsley, bragg_mps, draw_ground, process_velocities, shaped_noise
 from bladewing.simulate.laws import WIDTH, Draws
 from bladewing.simulate.receiver import NormalsOf
 
@@ -96,3 +96,12 @@ def test_the_ends_of_a_process_do_not_meet():
     ends = np.mean(iq[:, 0] * iq[:, -1].conj()).real
     assert near > 0.8
     assert abs(ends) < 0.3
+
+
+def test_ripples_are_driven_by_gravity_at_long_waves_and_by_tension_at_short_ones():
+    assert bragg_mps(1.0) == pytest.approx(np.sqrt(9.81 / (4 * np.pi)), rel=1e-3)
+    # the slowest of all ripples, 23 cm/s at 1.7 cm (Lamb, art. 267), is what a radar of 3.4 cm sees
+    speeds = [bragg_mps(wavelength_m) for wavelength_m in np.linspace(0.003, 0.3, 3000)]
+    assert min(speeds) == pytest.approx(0.231, abs=0.002)
+    assert np.linspace(0.003, 0.3, 3000)[int(np.argmin(speeds))] == pytest.approx(0.0342, rel=0.03)
+    assert bragg_mps(299792458 / 94e9) == pytest.approx(0.54, abs=0.01)
