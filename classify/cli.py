@@ -365,6 +365,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 done, 1 unexpected, 2 bad input, 130 interrupted.
     """
+    for name in ("stdout", "stderr"):  # closed by whoever calls: nobody reads them
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
     if arguments is None and not sys.warnoptions:
         warnings.simplefilter("ignore")  # a library's warning is for developers, unless one asks for it with -W
     try:

@@ -5,7 +5,7 @@ import json
 import os
 import secrets
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from .errors import BadInput
@@ -193,11 +193,9 @@ def write_together(folder: str | os.PathLike[str], files: Mapping[str, bytes | s
             _sync_folder(place)
             write_whole(place / _JOURNAL, json.dumps(waiting))
         except BaseException:
-            for name in (_JOURNAL, *waiting):  # the decision first, else half of what it names would be gone
-                with contextlib.suppress(OSError):
-                    (place / name).unlink()
+            _remove(place, [_JOURNAL, *waiting])  # the decision first, else half of what it names would be gone
             raise
-        _settle(place)
+        _settle(place, fresh=True)
 
 
 def settle(folder: str | os.PathLike[str]) -> None:
@@ -213,7 +211,8 @@ def settle(folder: str | os.PathLike[str]) -> None:
             _settle(Path(folder))
 
 
-def _settle(place: Path) -> None:
+def _settle(place: Path, *, fresh: bool = False) -> None:
+    """Do the renames that a journal names; one decided just now is taken back where none can be done."""
     journal = place / _JOURNAL
     try:
         waiting = json.loads(read_bounded(journal, _JOURNAL_BYTES))
@@ -224,10 +223,28 @@ def _settle(place: Path) -> None:
         # written whole by whoever writes it: this one is not ours, and it must not stand in the way for ever
         journal.unlink()
         return
+    done = False
     for beside, name in renames:
         # a name is taken for what it says only within the folder: a journal must not move files elsewhere
         if Path(beside).match(".bladewing-*.new") and all(Path(one).name == one for one in (beside, name)):
-            with contextlib.suppress(FileNotFoundError):
+            try:
                 os.replace(place / beside, place / name)
+                done = True
+            except FileNotFoundError:
+                done = True  # by whoever was interrupted
+            except OSError:
+                if fresh and not done:
+                    _remove(place, [_JOURNAL, *waiting])
+                if fresh:
+                    raise
+                # of an earlier writer: what cannot be finished must not stand in the way for ever
+                _remove(place, [beside])
     _sync_folder(place)
-    journal.unlink(missing_ok=True)
+    _remove(place, [_JOURNAL])
+
+
+def _remove(place: Path, names: Iterable[str]) -> None:
+    """Remove files of a folder where that can be done, in this order."""
+    for name in names:
+        with contextlib.suppress(OSError):
+            (place / name).unlink()

@@ -5,6 +5,7 @@ import json
 import re
 import tarfile
 import warnings
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
     from sigmf import SigMFFile
 
 _META, _DATA = ".sigmf-meta", ".sigmf-data"
+
+#: Where a capture begins in what the receiver gave, whole.
+_INDEX = "core:global_index"
 _MOST_COUNT = 1 << 63  # JSON's whole numbers have no end, and what is reckoned with them would leave every type
 _ARCHIVES = (".sigmf", ".sigmf.gz", ".sigmf.xz", ".sigmf.zip")
 _DATATYPE = re.compile(r"([cr])(?!f8|f16)([fiu])(8|16|32|64)(_le|_be)?")
@@ -196,6 +200,7 @@ def _check_structure(metadata: Any, path: Path) -> None:
             entry["core:sample_start"] = _count(entry, "core:sample_start", f"{path}: {section}[{index}]")
             if "core:sample_count" in entry:
                 _count(entry, "core:sample_count", f"{path}: {section}[{index}]")
+    _check_captures(metadata["captures"], path)
     general = metadata["global"]
     datatype = general.get("core:datatype")
     match = _DATATYPE.fullmatch(datatype) if isinstance(datatype, str) else None
@@ -212,6 +217,24 @@ def _check_structure(metadata: Any, path: Path) -> None:
     headers = any(_count(capture, "core:header_bytes", str(path)) for capture in metadata["captures"])
     if headers or _count(general, "core:trailing_bytes", str(path)):
         raise BadInput(f"{path}: core:header_bytes or core:trailing_bytes above 0: store the samples alone")
+
+
+def _check_captures(captures: list[dict[str, Any]], path: Path) -> None:
+    """Captures must follow one another, and nothing may be missing between them: a dwell would lie over the hole."""
+    for index, (one, two) in enumerate(pairwise(captures)):
+        start, following = one["core:sample_start"], two["core:sample_start"]
+        if following < start:
+            raise BadInput(
+                f"{path}: captures[{index + 1}] starts at sample {following}, captures[{index}] at {start}: "
+                "they must follow one another: put them in order"
+            )
+        places = [_count(entry, _INDEX, f"{path}: captures") for entry in (one, two) if _INDEX in entry]
+        if len(places) == 2 and places[1] - places[0] != following - start:
+            missing = places[1] - places[0] - (following - start)
+            raise BadInput(
+                f"{path}: {missing} samples are missing between captures[{index}] and captures[{index + 1}] "
+                f"({_INDEX}): store each run in a recording of its own"
+            )
 
 
 def _count(entry: dict[str, Any], field: str, where: str, absent: int = 0) -> int:
@@ -269,4 +292,5 @@ def _samples(recording: "SigMFFile", path: Path) -> SigmfSamples:
             f"captures[{index}] {carrier:.12g} Hz" for carrier, index in sorted(carriers.items(), key=lambda c: c[1])
         )
         raise BadInput(f"{path}: {len(carriers)} carriers ({said}): store each one in a recording of its own")
-    return SigmfSamples(iq, next(iter(carriers), None), prf_hz, start)
+    first = _count(captures[0], _INDEX, str(path), absent=start) if captures else start
+    return SigmfSamples(iq, next(iter(carriers), None), prf_hz, first)

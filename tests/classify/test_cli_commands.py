@@ -1,5 +1,6 @@
 """`bladewing train` and `bladewing report` hand their options on; help and usage errors of the whole command line."""
 
+import subprocess
 import sys
 import types
 from importlib import metadata
@@ -113,3 +114,14 @@ def test_a_missing_training_library_is_said_with_the_cure(monkeypatch, capsys, e
         f"bladewing: error: {name} is not installed, this command needs it: "
         "pip install -c constraints.txt '.[train]' where bladewing's source lies\n"
     )
+
+
+@pytest.mark.parametrize("closed", ["1", "2"])
+def test_a_closed_output_is_read_by_nobody_and_nothing_goes_to_the_other(tmp_path, closed):
+    # what is said of a bad file must not end up among the answers, nor the answers fail where none can be written
+    python = "import sys; from bladewing.classify.cli import main; sys.exit(main())"
+    command = f'exec {closed}>&-; exec "{sys.executable}" -c "{python}" predict "{tmp_path / "none.npy"}"'
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert "AttributeError" not in done.stderr

@@ -101,3 +101,38 @@ def test_a_missing_folder_and_a_directory_are_refused(tmp_path):
     with pytest.raises(IsADirectoryError, match="is a directory"):
         write_whole(tmp_path, "x")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("fails_at", [1, 2])
+def test_a_rename_that_fails_does_not_close_the_folder_to_later_writers(tmp_path, monkeypatch, fails_at):
+    names = {"a": "new a", "b": "new b"}
+    for name in names:
+        (tmp_path / name).write_text("old")
+    real, calls = os.replace, []
+
+    def refuse(source, target):
+        if not str(target).endswith(".json"):
+            calls.append(target)
+            if len(calls) == fails_at:
+                raise PermissionError(1, "Operation not permitted")
+        real(source, target)
+
+    monkeypatch.setattr(os, "replace", refuse)
+    with pytest.raises(PermissionError):
+        files.write_together(tmp_path, names)
+    monkeypatch.setattr(os, "replace", real)
+    if fails_at == 1:  # nothing was changed, and nothing is left
+        assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "old", "b": "old"}
+    files.write_together(tmp_path, {"c": "new c"})
+    assert (tmp_path / "c").read_text() == "new c"
+    if fails_at == 2:  # decided, and finished by the next writer
+        assert [(tmp_path / name).read_text() for name in names] == ["new a", "new b"]
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".bladewing")]
+
+
+def test_what_an_earlier_writer_left_and_nobody_can_finish_is_given_up(tmp_path, monkeypatch):
+    (tmp_path / "a").mkdir()  # a file cannot take its place
+    (tmp_path / ".bladewing-0.new").write_text("new a")
+    (tmp_path / ".bladewing-pending.json").write_text('{".bladewing-0.new": "a"}')
+    files.write_together(tmp_path, {"b": "new b"})
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]

@@ -277,3 +277,15 @@ def test_the_measured_recordings_read_as_described():
         assert recording.iq.size == said["annotations"][0]["core:sample_count"]
         assert recording.prf_hz == said["global"]["core:sample_rate"]
         assert recording.carrier_hz == said["captures"][0]["core:frequency"]
+
+
+def test_a_hole_between_captures_is_refused_and_the_first_index_is_the_start(sigmf_pair):
+    index = "core:global_index"
+    whole = [capture(0, **{index: 500}), capture(3, **{index: 503})]
+    assert load_recording(sigmf_pair(captures=whole)).start_s == pytest.approx(500 / PRF_HZ)
+    with pytest.raises(BadInput, match="997 samples are missing between captures"):
+        load_recording(sigmf_pair(captures=[whole[0], capture(3, **{index: 1500})]))
+    with pytest.raises(BadInput, match="they must follow one another"):
+        load_recording(sigmf_pair(captures=[capture(3), capture(0)]))
+    with pytest.raises(BadInput, match="must be a whole number"):
+        load_recording(sigmf_pair(captures=[capture(0, **{index: "1"})]))
