@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .inputs import in_blocks
 from .spectrum import LEAST_PART, SPEED_OF_LIGHT_MPS, as_complex
 
 #: Accelerations that are tried [m/s^2]: five times gravity.
@@ -17,9 +18,6 @@ SURE_DEVIATIONS, LEAST_RISE_DB = 5.0, 2.0
 
 #: Pulses that a line's smear can be told from, at least.
 LEAST_PULSES = 32
-
-#: Samples of dwells that are worked on at a time.
-BLOCK_SAMPLES = 1 << 17
 
 
 def body_acceleration(
@@ -62,30 +60,27 @@ def body_acceleration(
         # value by value: a long dwell has thousands of steps, and together they would fill the memory
         return np.stack([_sharpened(dwells, one, wavelength_m, prf_hz, size).max(axis=-1) for one in values], axis=-1)
 
-    some = max(1, BLOCK_SAMPLES // pulses)
-    for start in range(0, len(flat) if pulses >= LEAST_PULSES else 0, some):
-        block = flat[start : start + some]
-        scale = np.abs(block).max(axis=-1)
-        block = np.asarray(block / np.where(scale < LEAST_PART, np.float32(1), scale)[:, None], np.complex64)
-        every = heights_at(tried, block, size)
-        for row in np.flatnonzero(scale >= LEAST_PART):
-            index, one, heights = start + row, block[row], every[row]
-            best = int(heights.argmax())
-            sharp = _sharpened(one, tried[best], wavelength_m, prf_hz, size)
-            noise = float(np.median(sharp)) / np.log(2)
-            if best in (0, 2 * reach) or heights[best] < noise * 10 ** (LEAST_LINE_DB / 10):
-                continue
-            at = tried[best]
-            for finer in (0.5, 0.1):
-                left, middle, right = np.log(heights_at(at + finer * step * np.array([-1, 0, 1]), one, 4 * size))
-                curve = 2 * middle - left - right
-                at += finer * step * (np.clip((right - left) / (2 * curve), -1, 1) if curve > 0 else 0.0)
-            value[index] = at
-            # the line's height is pulses^2 A^2, the noise's pulses sigma^2
-            snr = heights[best] / noise / pulses
-            std[index] = np.sqrt(90 / (snr * float(pulses) ** 5)) * prf_hz**2 * wavelength_m / (2 * np.pi)
-            rise = heights[best] / heights[reach]
-            smeared[index] = abs(at) > max(step, SURE_DEVIATIONS * std[index]) and rise > 10 ** (LEAST_RISE_DB / 10)
+    scale = np.abs(flat).max(axis=-1)
+    held = np.flatnonzero(scale >= LEAST_PART) if pulses >= LEAST_PULSES else np.zeros(0, np.intp)
+    loud = in_blocks(flat[held] / scale[held, None])
+    each = (pair for block in loud for pair in zip(block, heights_at(tried, block, size), strict=True))
+    for index, (one, heights) in zip(held, each, strict=True):
+        best = int(heights.argmax())
+        sharp = _sharpened(one, tried[best], wavelength_m, prf_hz, size)
+        noise = float(np.median(sharp)) / np.log(2)
+        if best in (0, 2 * reach) or heights[best] < noise * 10 ** (LEAST_LINE_DB / 10):
+            continue
+        at = tried[best]
+        for finer in (0.5, 0.1):
+            left, middle, right = np.log(heights_at(at + finer * step * np.array([-1, 0, 1]), one, 4 * size))
+            curve = 2 * middle - left - right
+            at += finer * step * (np.clip((right - left) / (2 * curve), -1, 1) if curve > 0 else 0.0)
+        value[index] = at
+        # the line's height is pulses^2 A^2, the noise's pulses sigma^2
+        snr = heights[best] / noise / pulses
+        std[index] = np.sqrt(90 / (snr * float(pulses) ** 5)) * prf_hz**2 * wavelength_m / (2 * np.pi)
+        rise = heights[best] / heights[reach]
+        smeared[index] = abs(at) > max(step, SURE_DEVIATIONS * std[index]) and rise > 10 ** (LEAST_RISE_DB / 10)
     lead = samples.shape[:-1]
     return value.reshape(lead), std.reshape(lead), smeared.reshape(lead)
 

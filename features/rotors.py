@@ -105,21 +105,11 @@ def _flashes_twice(fit: CombFit, per_turn: int, tip: float) -> bool:
     at every speed below the tip's, before and after that comes straight on: its lines are J_n(Gamma) (the paper's eq.
     24), and flash once when these are taken for what they are; `tip` is the order its edge has.
     """
-    shares = [_second_flash(fit, per_turn, None)]
-    for blades in (1, 2, 3):
-        if not _two(shares[-1]):
-            return False
-        shares.append(_second_flash(fit, per_turn, (blades, tip)))
-    return _two(shares[-1])
+    return all(_second_flashes(fit, per_turn, blade) for blade in (None, (1, tip), (2, tip), (3, tip)))
 
 
-def _two(shares: list[float]) -> bool:
-    """True where second flashes on both sides are as strong as another rotor's."""
-    return len(shares) == 2 and min(shares) > SECOND_FLASH_SHARE / 2 and sum(shares) > 2 * SECOND_FLASH_SHARE
-
-
-def _second_flash(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) -> list[float]:
-    """Power of the second flash over the first, of each side with lines enough.
+def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) -> bool:
+    """True where the second flashes on both sides are as strong as another rotor's, for blades of one kind.
 
     Parameters
     ----------
@@ -147,8 +137,8 @@ def _second_flash(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) ->
         other = lines_away > FLASH_WIDTH
         for part in (2, 3):  # unequal blades of one rotor flash at fractions of the turn
             other &= np.abs(lines_away - len(lines) / part) > 1
-        shares.append(float(power[other].max(initial=0) / power[first]))
-    return shares
+        shares.append(power[other].max(initial=0) / power[first])
+    return len(shares) == 2 and min(shares) > SECOND_FLASH_SHARE / 2 and sum(shares) > 2 * SECOND_FLASH_SHARE
 
 
 def _left_over(rest: Periodogram, fits: list[CombFit], edge: float) -> tuple[bool, bool]:

@@ -18,7 +18,7 @@ from ._checks import CLASS_COUNT, require_finite
 
 _BRANCH = 64
 _RATES = (16, 24, 32)  # channels of the convolutions over a spectrum of rates
-_HEAD = 128  # with half as many it was the narrowest place: 0.01 nats more, for a hundredth of the time
+_HEAD = 128  # 48 were the narrowest place of all (docs/ablation.md)
 _CLIP = 8.0  # standard deviations; beyond them an input says no more than "very much"
 _CHUNK = 1024
 

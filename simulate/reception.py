@@ -35,8 +35,7 @@ class Chosen(Draws):
         self, law: str, columns: int | None = None, *, least: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]:
         """Draw by the law of that name, insects' among them, or give the value that is fixed."""
-        drawn = (LAWS | INSECT_LAWS)[law](self.uniform(columns), least)
-        return np.full_like(drawn, self._values[law]) if law in self._values else drawn
+        return self._fixed((LAWS | INSECT_LAWS)[law](self.uniform(columns), least), law)
 
     def change(self, law: str, dwell_s: float) -> NDArray[np.float64]:
         """Draw a rate of change, or give the value that is fixed."""
@@ -44,14 +43,16 @@ class Chosen(Draws):
 
     def acceleration_mps2(self, law: str, dwell_s: float = 0.0) -> NDArray[np.float64]:
         """Draw an acceleration, or give the value that is fixed: whether the body is steady was settled with it."""
-        drawn = super().acceleration_mps2(law, dwell_s)
-        return np.full_like(drawn, self._values[law]) if law in self._values else drawn
+        return self._fixed(super().acceleration_mps2(law, dwell_s), law)
 
     def either(self, usual: str, other: str, share: float) -> NDArray[np.float64]:
         """Draw by one of two laws, or give the value that is fixed of either."""
-        drawn = super().either(usual, other, share)
-        fixed = [self._values[law] for law in (usual, other) if law in self._values]
-        return np.full_like(drawn, fixed[0]) if fixed else drawn
+        return self._fixed(super().either(usual, other, share), usual, other)
+
+    def _fixed(self, drawn: NDArray[np.float64], *laws: str) -> NDArray[np.float64]:
+        """What was drawn, or the value that the first of these laws is fixed to, of the same shape."""
+        fixed = next((self._values[law] for law in laws if law in self._values), drawn)
+        return np.broadcast_to(fixed, drawn.shape).copy()
 
 
 def pulse_times_s(scene: Setting, seed: int) -> NDArray[np.float64]:

@@ -130,7 +130,7 @@ def test_a_rename_that_fails_does_not_close_the_folder_to_later_writers(tmp_path
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".bladewing")]
 
 
-def test_what_an_earlier_writer_left_and_nobody_can_finish_is_given_up(tmp_path, monkeypatch):
+def test_what_an_earlier_writer_left_and_nobody_can_finish_is_given_up(tmp_path):
     (tmp_path / "a").mkdir()  # a file cannot take its place
     (tmp_path / ".bladewing-0.new").write_text("new a")
     (tmp_path / ".bladewing-pending.json").write_text('{".bladewing-0.new": "a"}')
