@@ -17,7 +17,7 @@ from .ladder import CASCADE, STAGES_KEY, shipped_account
 SURE = (0.95, 0.85, 0.85)
 """Probability of each class (uav, bird, clutter) from which on the fast model's answer stands. On records of the whole
 envelope the cascade is then as accurate as the better model, finds as many UAVs and names as few others so, and asks it
-about 70 % of them; with 0.9 for all it names a tenth more birds and clutter UAV, since a false drone of either counts
+about three of five; with 0.9 for all it names a tenth more birds and clutter UAV, since a false drone of either counts
 (the table "cascade" of tests/benchmarks/classification_tables.py)."""
 
 

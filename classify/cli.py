@@ -1,6 +1,7 @@
 """The command line. Exit codes: 0 done, 1 unexpected, 2 bad input, 130 interrupted; errors are one line on stderr."""
 
 import errno
+import io
 import json
 import os
 import sys
@@ -365,9 +366,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 done, 1 unexpected, 2 bad input, 130 interrupted.
     """
-    for name in ("stdout", "stderr"):  # closed by whoever calls: nobody reads them
-        if getattr(sys, name) is None:
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by whoever calls: nobody reads them
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
+        elif isinstance(getattr(sys, name), io.TextIOWrapper):  # a name its encoding cannot hold is shown escaped
+            getattr(sys, name).reconfigure(errors="backslashreplace")
     if arguments is None and not sys.warnoptions:
         warnings.simplefilter("ignore")  # a library's warning is for developers, unless one asks for it with -W
     try:

@@ -194,7 +194,7 @@ def _draw(folder: Path, seed: int, shard: Shard) -> Contents:
 @contextmanager
 def _writable(folder: Path) -> Iterator[None]:
     """Have a folder to oneself; faults of the disk become errors of one line."""
-    made = not folder.exists()
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with only_writer(folder, wait=False):
@@ -206,9 +206,9 @@ def _writable(folder: Path) -> Iterator[None]:
             f"{folder}: cannot be written: {error.strerror or error}: what is whole stays; the same command goes on"
         ) from None
     finally:
-        if made:
-            with suppress(OSError):  # it stays once anything is in it
-                folder.rmdir()
+        with suppress(OSError):  # they stay once anything is in them
+            for place in made:
+                place.rmdir()
 
 
 def _begun(folder: Path, plan: Plan, bars: Progress) -> dict[str, Contents]:

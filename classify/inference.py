@@ -248,12 +248,17 @@ class Classifier:
             There is no such model, or it is not one that can be used (see `Classifier`).
         """
         max_false_alarm, coverage = _rule(max_false_alarm, coverage)
-        # a budget alone never leads to the cascade where it could not answer
-        name = chosen_name(name_or_path, budget_us, single=budget_us is not None and coverage is not None)
+        name = chosen_name(name_or_path, budget_us)
         if name == CASCADE:
             from .cascade import Cascade
 
-            return Cascade.of_shipped(threads, max_false_alarm=max_false_alarm, coverage=coverage)
+            try:
+                return Cascade.of_shipped(threads, max_false_alarm=max_false_alarm, coverage=coverage)
+            except BadInput:
+                if budget_us is None:
+                    raise
+            # a budget alone never leads to a refusal that another model within it would not give
+            name = chosen_name(budget_us=budget_us, single=True)
         content, source = read_model(name)
         return cls(content, source=source, threads=threads, max_false_alarm=max_false_alarm, coverage=coverage)
 

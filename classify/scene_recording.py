@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,7 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
     Parameters
     ----------
     stem
-        Path without the suffix; a .sigmf-meta or .sigmf-data at its end is taken off.
+        Path without the suffix; a .sigmf, .sigmf-meta or .sigmf-data at its end is taken off.
     rendering, scene, seed
         What was rendered, from what.
 
@@ -41,7 +42,7 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
     BadInput
         The folder is missing or cannot be written to, or a sample is not finite.
     """
-    name = stem.name.removesuffix(".sigmf-meta").removesuffix(".sigmf-data")
+    name = re.sub(r"\.sigmf(-meta|-data)?$", "", stem.name)
     if not name or name == "..":
         raise BadInput(f"{stem}: no name for the recording: give --out NAME")
     if not np.isfinite(rendering.iq).all():

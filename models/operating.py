@@ -1,5 +1,6 @@
 """The threshold on "uav" for a false-alarm rate that a user chooses, and the detection probability that remains."""
 
+import itertools
 import json
 import math
 from dataclasses import asdict, dataclass
@@ -12,8 +13,8 @@ from ._checks import CLASS_COUNT, require_finite, require_labels
 #: False alarms that a threshold must rest on: with fewer its rate is wrong by more than a third (1 / sqrt(10)).
 SUPPORT = 10
 
-_RATES_A_DECADE = 10  # 0.1, 0.01 and 0.001 are among them
-_HIGHEST_RATE = 0.5
+# Renard's series R10 (ISO 3), falling: with each rate its half is there too, which a cascade gives each of its models.
+_RATES = (5.0, 4.0, 3.15, 2.5, 2.0, 1.6, 1.25, 1.0, 0.8, 0.63)
 _EVERY_WIN = 0.3333333  # the most probable of three reaches it
 
 
@@ -135,10 +136,8 @@ def operating_curve(probabilities: ArrayLike, labels: NDArray[np.integer]) -> Op
     if not len(true) or not len(false):
         raise ValueError(f"{len(true)} UAVs and {len(false)} others; an operating curve needs both")
     points = []
-    steps = math.ceil(-_RATES_A_DECADE * math.log10(_HIGHEST_RATE))
-    while True:
-        rate = round(10 ** (-steps / _RATES_A_DECADE), 7)
-        steps += 1
+    for step in itertools.count():
+        rate = round(_RATES[step % len(_RATES)] * 10.0 ** (-1 - step // len(_RATES)), 7)
         rank = math.floor(rate * (len(false) + 1) * (1 + 1e-9))  # the threshold stands just above this one, from 1
         if rank < SUPPORT:
             break

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from bladewing.classify import BadInput, Classifier, inference
 from bladewing.classify.cascade import SURE, Cascade
-from bladewing.classify.inference import model_names
+from bladewing.classify.inference import CURVE_KEY, model_names
 from bladewing.classify.ladder import CASCADE, STAGES_KEY, shipped_account
+from bladewing.models.operating import OperatingCurve
 from bladewing.simulate import Radar, draw_records
 
 RADAR = {"carrier_hz": 10e9, "prf_hz": 20e3}
@@ -84,6 +85,19 @@ def test_a_budget_leads_to_one_model_where_a_coverage_is_asked_for(monkeypatch):
     enough = shipped_account()[CASCADE]["cost_ffts"] + 0.01
     assert isinstance(Classifier.load(budget_us=enough), Cascade)
     assert Classifier.load(budget_us=enough, coverage=0.9).coverage == 0.9
+
+
+def test_a_budget_leads_to_one_model_where_two_cannot_share_the_rate(monkeypatch):
+    monkeypatch.setattr(inference, "measured_fft_us", lambda: 1.0)
+    enough = 1000.0
+    rate = 1.5 * OperatingCurve.from_json(Classifier.load().metadata[CURVE_KEY]).points[-1].false_alarm
+    with pytest.raises(BadInput, match=r"cascade: false-alarm rate .* cannot be supported"):
+        Classifier.load(CASCADE, max_false_alarm=rate)
+    found = Classifier.load(budget_us=enough, max_false_alarm=rate)
+    assert not isinstance(found, Cascade)
+    assert found.operating_point.false_alarm <= rate
+    with pytest.raises(BadInput, match="cannot be supported"):
+        Classifier.load(budget_us=enough, max_false_alarm=rate / 10)
 
 
 def test_a_record_without_signal_and_one_outside_the_envelope_get_their_reasons(cascade):

@@ -4,7 +4,9 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -287,13 +289,15 @@ ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.sta
 BLADEWING = [sys.executable, "-c", "import sys; from bladewing.classify.cli import main; sys.exit(main())"]
 
 
-def as_a_user(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+def as_a_user(
+    *arguments: object, cwd: Path, environment: Mapping[str, str] = MappingProxyType({})
+) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [*BLADEWING, *map(str, arguments)],
         cwd=cwd,
         capture_output=True,
         text=True,
-        env=ENVIRONMENT,
+        env=ENVIRONMENT | environment,
     )
 
 
@@ -315,6 +319,18 @@ def test_warnings_of_libraries_do_not_reach_the_user(tmp_path, sigmf_pair, uav_m
     done = as_a_user("predict", "--json", meta, "--model", uav_model, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert len(done.stdout.splitlines()) == 3
+
+
+@pytest.mark.parametrize("options", [(), ("--json",)])
+def test_a_name_that_the_output_cannot_hold_is_shown_escaped(tmp_path, uav_model, options):
+    np.save(tmp_path / "h\u00e9ron.npy", noise(2000))
+    names = "h\u00e9ron.npy", "\u2603.npy"
+    radar = "--carrier-hz", 10e9, "--prf-hz", 10e3
+    ascii_only = {"PYTHONIOENCODING": "ascii"}
+    done = as_a_user("predict", *names, "--model", uav_model, *radar, *options, cwd=tmp_path, environment=ascii_only)
+    assert done.returncode == 2  # of the second, which is not there
+    assert done.stderr.startswith("bladewing: error: \\u2603.npy: no such file")
+    assert r"h\xe9ron.npy" in done.stdout or r"h\u00e9ron.npy" in done.stdout
 
 
 def test_a_closed_pipe_ends_quietly(tmp_path, sigmf_pair, uav_model):

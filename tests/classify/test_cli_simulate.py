@@ -57,6 +57,13 @@ def test_a_scene_becomes_a_recording_that_sigmf_validates_and_predict_can_read(s
     assert all(entry["core:sample_count"] == 500 for entry in truth.values())
 
 
+@pytest.mark.parametrize("suffix", [".sigmf", ".sigmf-meta", ".sigmf-data"])
+def test_the_name_of_a_recording_may_carry_a_suffix_of_sigmf(scene_file, tmp_path, suffix, capsys):
+    assert main(["simulate", str(scene_file), "--out", str(tmp_path / f"rec.v1{suffix}")]) == 0
+    written = {str(tmp_path / f"rec.v1.sigmf-{kind}") for kind in ("data", "meta")}
+    assert set(capsys.readouterr().out.split()) == written == {str(path) for path in tmp_path.glob("rec*")}
+
+
 def test_the_recording_holds_the_scene_it_was_made_from(scene_file, tmp_path):
     assert main(["simulate", str(scene_file), "--out", str(tmp_path / "rec.sigmf-meta"), "--seed", "3", "--full"]) == 0
     info = json.loads((tmp_path / "rec.sigmf-meta").read_text())["global"]

@@ -173,8 +173,8 @@ def test_a_full_disk_is_one_line_and_the_same_command_goes_on(whole, tmp_path, m
 def test_a_disk_that_is_too_small_is_refused_before_anything_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setattr(module.shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(10, 10, 1_000_000))
     with pytest.raises(BadInput, match=r"GB are needed, 0\.001 GB are free"):
-        write(tmp_path / "data")
-    assert not (tmp_path / "data").exists()
+        write(tmp_path / "deep" / "data")
+    assert not list(tmp_path.iterdir())
 
 
 def test_one_writer_at_a_time(whole, tmp_path):

@@ -29,6 +29,7 @@ def test_the_curve_of_a_known_law_is_its_closed_form():
         assert point.detection == pytest.approx(1 - point.threshold**2, abs=2e-4)
     for rate in (0.1, 0.01, 0.001):
         assert curve.at(rate).false_alarm == rate  # as asked, not the next lower step
+        assert curve.at(rate, models=2).false_alarm == rate / 2  # what a cascade gives each of its models
 
 
 def test_new_records_keep_to_the_rate_and_to_the_detection_told():
