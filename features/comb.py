@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .comb_centre import centred
 from .comb_fit import CombFit, fit_combs
 from .comb_search import best_candidate
 from .lines import LineSpace
@@ -144,6 +145,7 @@ def find_comb(data: Periodogram) -> tuple[Comb | None, str]:
         return None, "dwell too short: no chopping frequency could be told from its neighbours"
     if start.score < threshold(data):
         return None, f"no comb: evidence {start.score:.1f} below {threshold(data):.0f} nats"
+    start = centred(data, start)
     fitted = fit_combs(data, start.centre, [start.spacing], [(start.low, start.high)])
     if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
         return None, f"no comb: fewer than {LEAST_LINES} lines"

@@ -12,7 +12,7 @@ from .chopping import CHOPPING_RANGE_HZ
 from .comb_sums import MOST_SNRS, running_sums
 from .flashes import flash_evidence
 from .octaves import MULTIPLE_SHARE, coarsest
-from .periodogram import LINE_DB, Periodogram
+from .periodogram import Periodogram
 
 #: Lines nearer than this are not told apart [bins].
 MIN_SPACING_BINS = 3.0
@@ -34,18 +34,6 @@ FLASH_SHARE, REST_FLASH_SHARE = 2.0, 1.0
 
 #: What a comb whose sides reach unequally far must have more [nats].
 UNEVEN_COST = 4.0
-
-#: What speaks for the comb's centre where a line stands so far over all others of it [nats, dB], and more for each dB
-#: beyond. Blades may be the stronger: then their outermost lines are, and say nothing of the body.
-STRONG_LINE, STRONG_OVER_DB = 10.0, 6.0
-STRONG_LINE_DB = 1.0
-
-#: What speaks for the middle of all lines within so much of the strongest, where that stands so high over the noise
-#: that both ends show [nats, dB, dB].
-EVEN_ENDS, ENDS_DB, CLEAR_DB = 8.0, 20.0, 30.0
-
-#: What is at rest may be the background: its level counts up to so much over that of the strongest line that moves.
-REST_DB = 15.0
 
 #: Steps to each side of a coarse spacing, of one bin at the PRF; then finer ones about the best families.
 COARSE_STEPS = 4
@@ -301,7 +289,10 @@ def _families(
 
 
 def best_candidate(data: Periodogram) -> Candidate | None:
-    """The spacing whose lines speak loudest; None where the dwell is too short to search."""
+    """The spacing whose lines speak loudest; None where the dwell is too short to search.
+
+    Any line of the comb may pass for its centre: see `comb_centre`.
+    """
     low, high = spacing_limits(data.pulses, data.prf_hz)
     if low * 1.5 >= high:
         return None
@@ -341,57 +332,4 @@ def best_candidate(data: Periodogram) -> Candidate | None:
         place = (float(spacings[finest[index]]), float(centres[finest[index]]), int(lows[index]), int(highs[index]))
         flash = flash_evidence(data, *place)
         found.append(Candidate(*place, float(scores[index]) + min(flash, share * float(scores[index]))))
-    return _centred(data, evidence, found[coarsest([c.spacing for c in found], [c.score for c in found])])
-
-
-def _centred(data: Periodogram, evidence: NDArray[np.float32], found: Candidate) -> Candidate:
-    """The same comb, counted from the line that is most likely the body's.
-
-    Any line of a comb may pass for its centre. A rotor's lines reach equally far to both sides of the body, and the
-    body's own line is strong.
-    """
-    pulses = data.pulses
-    middle = found.centre + found.spacing * round((found.high + found.low) / 2)
-    options = [(found.centre, 0.0), (middle, 0.0)]
-    orders_seen = np.arange(found.low, found.high + 1)
-    places = found.centre + found.spacing * orders_seen
-    power = data.at(places) * data.level_at(places) * data.usable(places)
-    highest_db = 10 * float(np.log10(power.max(initial=1.0)))
-    if highest_db > CLEAR_DB:
-        ends = orders_seen[power > 10 ** ((highest_db - ENDS_DB) / 10)]
-        options.append((found.centre + found.spacing * round((ends[0] + ends[-1]) / 2), EVEN_ENDS))
-    others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
-    moving = max(
-        (db for c, db in zip(data.centres, data.centres_db, strict=True) if abs(c) > data.rest_half), default=99.0
-    )
-    for centre, level_db in zip(data.centres, data.centres_db, strict=True):
-        shown_db = level_db if abs(centre) > data.rest_half else min(level_db, moving + REST_DB)
-        orders = (centre - found.centre) / found.spacing
-        # several rotors' spacings differ: the further off, the less one comb for them all tells where a line must be
-        off = (orders - round(orders)) * found.spacing * pulses / (1 + 0.2 * abs(orders))
-        if abs(off) < 1.5 and level_db > LINE_DB:
-            over_db = max(shown_db - others_db, 0.0)
-            strong = STRONG_LINE * min(over_db / STRONG_OVER_DB, 1.0)
-            more = STRONG_LINE_DB * max(over_db - STRONG_OVER_DB, 0.0)
-            options.append((centre, strong + more - 16 * off**2))
-    best, most = found, -np.inf
-    steps = found.spacing * (1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * pulses))
-    for centre, bonus in dict(options).items():
-        # one comb for several rotors may pass a little beside the body's line: either place will do
-        beside = found.centre + found.spacing * round((centre - found.centre) / found.spacing)
-        scores, _ = even_scores(evidence, np.repeat(steps, 2), np.tile([centre, beside], len(steps)))
-        index = int(scores.argmax())
-        if scores[index] + bonus > most:
-            most = scores[index] + bonus
-            if centre == found.centre:
-                best = found
-            else:
-                shift = round((centre - found.centre) / found.spacing)
-                best = Candidate(
-                    float(steps[index // 2]),
-                    centre,
-                    min(found.low - shift, 0),
-                    max(found.high - shift, 0),
-                    found.score,
-                )
-    return best
+    return found[coarsest([c.spacing for c in found], [c.score for c in found])]

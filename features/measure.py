@@ -9,48 +9,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from .bandwidth import threshold_band_hz
 from .chopping import Chopping
-from .comb import LEAST_REACH_MPS, Comb, find_comb
+from .comb import LEAST_REACH_MPS, find_comb
 from .comb_fit import CombFit
+from .family_edge import SPAN, edge_around, edge_of_lines, surer_edge
 from .helicopter import find_gear
-from .lines import LineSpace
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .one_thread import one_thread
 from .periodogram import LINE_DB, Periodogram, prepared
-from .rotor_band import LEAK_SHARE, fit_edge
-from .rotors import MAX_ROTORS, Rotors
+from .rotors import MAX_ROTORS
 from .smearing import smearing_index
 from .spectrum import LEAST_PART, Spectrum, as_complex, doppler_spectrum, largest_part
 
 #: Threshold of the paper's bandwidth rule over the noise [dB]: it took 20 on measured data, 30 on simulated.
 PAPER_THRESHOLD_DB = 20.0
 
+#: A fitted edge that may be so far out [cycles a sample] by so many of its deviations may be none.
+FURTHEST_EDGE, EDGE_DEVIATIONS = 0.48, 3.0
+
 #: Blade counts listed where none is given.
 BLADE_CHOICES = (1, 2, 3, 4, 5)
-
-#: Rates nearer than this at an order [bins] have one line there.
-MERGED_BINS = 1.0
-
-#: The edge of several rotors' fitted lines holds if that of all about them agrees within so many of its deviations.
-AGREED_DEVIATIONS = 2.0
-
-#: Share of the power of several rotors' family that does not count past its edge: what their inner lines leave between
-#: them lifts the level that the outer ones are read against.
-SEVERAL_LEAK = 0.005
-
-#: Of the sums of all about an order: variance over the square where the rotors' lines lie in one another (four of equal
-#: power, both sides), and what an edge is off by at least [lines].
-AROUND_SCATTER, AROUND_LINES = 0.4, 0.035
-
-#: Lines are looked for so far from the body [cycles a sample]. A family that still stands there at this share of its
-#: mean power, by so many deviations of the noise, or whose fitted edge may be so far by so many of its own, has no edge
-#: to be seen: it fills the span, and what lies beyond has been folded back between its lines.
-SPAN, SPAN_SHARE, SPAN_DEVIATIONS, SPAN_EDGE, SPAN_EDGE_DEVIATIONS = 0.49, 0.05, 4.0, 0.48, 3.0
-
-#: The orders beyond this share of the span are those asked whether it ends there.
-SPAN_OUTER = 0.9
-
-#: Rotors that are not told apart differ by about so much in their rates, relative.
-LEAST_SPREAD = 0.02
 
 
 @dataclass(frozen=True)
@@ -250,7 +227,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     comb, out["reason"] = find_comb(data)
     prf_hz, wavelength_m = data.prf_hz, data.wavelength_m
     if comb is not None:
-        edge, edge_std = _edge(data, [comb.fit], comb.rest, comb.per_turn, blades)
+        edge, edge_std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades)
         edge_mps, edge_std_mps = (value * prf_hz * wavelength_m / 2 for value in (edge, edge_std))
         if edge_mps + edge_std_mps < LEAST_REACH_MPS:
             comb, out["reason"] = (
@@ -277,10 +254,10 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
         out["chopping_hz"] = float(rotors.rates.mean()) * prf_hz
         out["chopping_hz_std"] = float(np.sqrt((rotors.stds**2).sum())) / count * prf_hz
-        edge, edge_std = _edge(data, rotors.fits, rotors.rest, 1, blades)
+        edge, edge_std = edge_of_lines(data, rotors.fits, rotors.rest, 1, blades)
     if not rotors.resolved:  # the mean lies anywhere within what the unresolved rates span
         out["chopping_hz_std"] = float(np.hypot(out["chopping_hz_std"], rotors.spread * prf_hz / np.sqrt(12)))
-        edge, edge_std = _surer((edge, edge_std), _edge_around(data, comb, rotors, blades))
+        edge, edge_std = surer_edge((edge, edge_std), edge_around(data, comb, rotors, blades))
     for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):
         padded = np.full(MAX_ROTORS, np.nan)
         padded[:count] = values * prf_hz
@@ -290,8 +267,8 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     # unequal blades tell their number; between the lines of several rotors the weak ones may be something else
     seen = comb.per_turn if comb.per_turn > 1 and count == 1 else None
     known = blades if blades is not None else seen
-    if fills or not edge + SPAN_EDGE_DEVIATIONS * edge_std < SPAN_EDGE:
-        least_mps = SPAN_EDGE * prf_hz * wavelength_m / 2
+    if fills or not edge + EDGE_DEVIATIONS * edge_std < FURTHEST_EDGE:
+        least_mps = FURTHEST_EDGE * prf_hz * wavelength_m / 2
         out["band_reason"] = (
             f"no band: lines may fill the unambiguous span, tips of {least_mps:.1f} m/s and more: raise the PRF"
         )
@@ -339,106 +316,3 @@ def _body(data: Periodogram, fit: CombFit | None, *, steady: bool = True) -> dic
             turns, std = fit.centre, fit.centre_std
     scale = data.prf_hz * data.wavelength_m / 2
     return {"body_velocity_mps": -turns * scale, "body_velocity_mps_std": std * scale}
-
-
-def _edge(
-    data: Periodogram, fits: list[CombFit], rest: NDArray[np.complex128], per_turn: int, blades: int | None
-) -> tuple[float, float]:
-    """Edge of the line family and its standard deviation [cycles a sample from the body], both sides together.
-
-    Each line's power is what is seen there with all other fitted lines taken out; an order's is the mean over both
-    sides and the single rotors, since their lines part at the outer orders. Without such orders nothing is known.
-    """
-    spacings = np.array([fit.spacing * per_turn for fit in fits])
-    fastest = float(spacings.max())
-    order = np.arange(1, int(SPAN / fastest) + 1)
-    sides = np.array([[-1], [1]]) * order
-    centres = np.array([fit.centre for fit in fits])
-    frequency = np.asarray(centres[:, None, None] + spacings[:, None, None] * sides, np.float64)
-    fitted = np.stack([_amplitudes_at(fit, per_turn * sides) for fit in fits])
-    left = LineSpace(rest).at(frequency.ravel())[0].reshape(frequency.shape)
-    usable = data.usable(frequency)
-    total = np.where(usable, np.abs(left + fitted) ** 2 * data.pulses, 0.0).sum(axis=(0, 1))
-    noise = np.where(usable, data.level_of(rest)(frequency), 0.0).sum(axis=(0, 1))
-    number = usable.sum(axis=(0, 1)).astype(float)
-    # where the single rotors' lines lie in one another they add up: those orders stand too high beside the outer ones
-    nearest = float(np.diff(np.sort(spacings)).min()) if len(fits) > 1 else 1.0
-    seen = (number > 0) & (order * nearest * data.pulses >= MERGED_BINS)
-    if not seen.any():
-        return 0.0, np.inf
-    count = number[seen]
-    if _fills_span(order[seen] * fastest, total[seen], noise[seen], count):
-        return np.inf, np.inf
-    leak = SEVERAL_LEAK if len(fits) > 1 else LEAK_SHARE
-    edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades, leak=leak)
-    return edge * fastest, std * fastest
-
-
-def _fills_span(
-    away: NDArray[np.float64], total: NDArray[np.float64], noise: NDArray[np.float64], bins: NDArray[np.float64]
-) -> bool:
-    """True where a line family still stands at the end of the span.
-
-    Parameters
-    ----------
-    away : ndarray, shape (orders,)
-        Distance of each order from the body, rising [cycles a sample].
-    total, noise : ndarray, shape (orders,)
-        Power of its lines with their noise, and of that alone, summed over so many `bins`.
-    """
-    outer = (away > SPAN_OUTER * SPAN) | (away == away[-1])
-    excess, number = total - noise, bins[outer].sum()
-    deviation = float(np.sqrt((noise[outer] ** 2 / bins[outer]).sum()))
-    stands = float(excess[outer].sum()) > SPAN_DEVIATIONS * deviation
-    mean = float(excess.sum() / bins.sum())
-    return bool(away[-1] > SPAN / 2 and stands and excess[outer].sum() / number > SPAN_SHARE * mean)
-
-
-def _amplitudes_at(fit: CombFit, orders: NDArray[np.intp]) -> NDArray[np.complex128]:
-    """Amplitudes of a fit's lines of these orders, 0 where it has none, same shape."""
-    widest = int(max(np.abs(orders).max(), np.abs(fit.orders).max()))
-    table = np.zeros(2 * widest + 1, np.complex128)
-    table[widest + fit.orders] = fit.amplitudes
-    return table[widest + orders]
-
-
-def _surer(lines: tuple[float, float], around: tuple[float, float]) -> tuple[float, float]:
-    """Of unresolved rotors, the edge of the lines and its deviation, if it is the surer one; or that of all about them.
-
-    Rotors that were not told apart show in the second alone. It is known to its own deviation, whatever the first says.
-    """
-    if not np.isfinite(lines[0] + around[0]):
-        return np.inf, np.inf
-    agreed = abs(around[0] - lines[0]) < AGREED_DEVIATIONS * around[1]
-    return lines if agreed and lines[1] < around[1] else around
-
-
-def _edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | None) -> tuple[float, float]:
-    """Edge and its standard deviation by all that lies about each order: rotors that are not told apart count too."""
-    nominal, centre = float(np.mean([rotors.rates.min(), rotors.rates.max()])), rotors.fits[0].centre
-    size, pulses = len(data.power), data.pulses
-    order = np.arange(1, int(SPAN / nominal) + 1)
-    spread = max(rotors.spread, LEAST_SPREAD * nominal)
-    half_bins = min(nominal * pulses / 2, 1 + comb.last / comb.per_turn * spread * pulses)
-    half = int(half_bins * size / pulses)
-    # what lies between the lines lifts the local level: the noise is that of most of the span, and the floor at most
-    bins = np.arange(size) / size
-    floor = min(float(np.median(data.level_of(rotors.rest)(bins)[data.seen])), 1.0)
-    total, number = np.zeros(len(order)), np.zeros(len(order))
-    for sign in (-1, 1):
-        middle = np.rint((centre + sign * order * nominal) * size).astype(np.intp)
-        frequency = (middle[:, None] + np.arange(-half, half + 1)) / size
-        usable = data.usable(frequency)
-        power = data.at(frequency) * data.level_at(frequency)
-        total += np.where(usable, power, 0.0).sum(axis=1) * pulses / size
-        number += usable.sum(axis=1) * pulses / size
-    seen = number > 2
-    count = number[seen]
-    noise = np.full(len(count), floor)
-    if _fills_span(np.asarray(order[seen] * nominal, np.float64), total[seen], noise * count, count):
-        return np.inf, np.inf
-    # once the lines part, what they have of one another falls with the square of their distance
-    scatter = np.asarray(AROUND_SCATTER / (1 + (2 * order[seen] * rotors.spread * pulses) ** 2), np.float64)
-    edge, std = fit_edge(order[seen], total[seen] / count, noise, count, blades, scatter=scatter, leak=SEVERAL_LEAK)
-    fastest = float(max(nominal, rotors.rates.max()))
-    return edge * fastest, float(np.hypot(std, AROUND_LINES)) * fastest

@@ -52,6 +52,10 @@ TAPER_BETA = 3.0
 #: A flash is as long as the rotor's band is narrow: its samples beside are as strong.
 CLICK_POWER, CLICK_OVER_BESIDE, MOST_CLICKS = 25.0, 4.0, 5
 
+#: A click fills the whole span and leaves it empty; a sample cut out of a rotor's band fills what was empty beside it.
+#: Where that rises by this factor they were no clicks.
+EMPTY_RISE = 1.1
+
 
 @dataclass(frozen=True)
 class Periodogram:
@@ -266,7 +270,11 @@ def without_clicks(samples: NDArray[np.complex128]) -> NDArray[np.complex128]:
     beside = np.maximum(np.roll(power, 1), np.roll(power, -1))
     beside[[0, -1]] = np.inf  # the record may have cut a flash there
     clicks = (power > CLICK_POWER * noise) & (power > CLICK_OVER_BESIDE * beside)
-    return np.where(clicks, 0.0, samples) if 0 < clicks.sum() <= MOST_CLICKS else samples
+    if not 0 < clicks.sum() <= MOST_CLICKS:
+        return samples
+    without = np.where(clicks, 0.0, samples)
+    before, after = np.quantile(squared(fft.fft(np.stack([samples, without]))), 0.25, axis=-1)
+    return without if after < EMPTY_RISE * before else samples
 
 
 def prepare(iq: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float) -> Periodogram | None:

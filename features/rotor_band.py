@@ -48,6 +48,9 @@ SEARCHES, FINE, FINE_ENOUGH = 5, 30, 1.5
 #: Hypotheses less likely than this are left out.
 NEGLIGIBLE = 1e-3
 
+#: What lies about an order reaches to the middle between its neighbours: as good as so far more to either side [1].
+WINDOW_ORDERS = 0.35
+
 #: The coarse search has no model of the roll-off: what lies so far below the level is not seen there.
 COARSE_LEAK_SHARE = 0.03
 
@@ -87,6 +90,27 @@ def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[
         own = orders % 2 == odd if fold == 1 else slice(None)
         powers[..., own] = fft.dct(part, 1)[..., orders[own]]
     return (powers / (2 * steps)) ** 2
+
+
+def _spread_powers(gamma: NDArray[np.float64], blades: int, count: int, spread: float) -> NDArray[np.float64]:
+    """`line_powers` as they lie about each order where the rotors' rates differ by so much, relative.
+
+    The line of order n of a rotor whose rate is r stands where that of order n r of the mean rate would. What lies
+    about an order is then the mean over those that come to lie there, each line's power spread evenly to the middle
+    between its neighbours.
+    """
+    half = WINDOW_ORDERS + np.arange(1, count + 1) * spread / 2
+    if half[-1] < 0.5:
+        return line_powers(gamma, blades, count)
+    powers = line_powers(gamma, blades, count + int(np.ceil(half[-1])))
+    mixed = half > 0.5
+    ends = np.arange(count)[mixed] + 0.5 + np.array([[-1], [1]]) * half[mixed]
+    whole = ends.astype(np.intp)
+    padded = np.pad(powers, ((0, 0), (0, 0), (1, 1)))
+    upto = np.cumsum(padded, axis=-1)[..., whole] + (ends - whole) * padded[..., whole + 1]
+    powers = powers[..., :count]
+    powers[..., mixed] = (upto[..., 1, :] - upto[..., 0, :]) / (2 * half[mixed])
+    return powers
 
 
 def _log_likelihood(
@@ -142,6 +166,7 @@ def fit_edge(
     *,
     scatter: NDArray[np.float64] | float = 0.0,
     leak: float = LEAK_SHARE,
+    spread: float = 0.0,
 ) -> tuple[float, float]:
     """Fit the edge of a line family.
 
@@ -161,6 +186,9 @@ def fit_edge(
         What is known beforehand of how unlike the model the lines' powers are: variance over the mean's square.
     leak : float
         Share of the family's power that lines leak past its edge.
+    spread : float
+        Range of several rotors' rates over their mean, in whose multiples the orders are counted: what lies about a
+        high order is then of its neighbours too.
 
     Returns
     -------
@@ -184,7 +212,7 @@ def fit_edge(
         edges = np.arange(max(low, LEAST_EDGE), high + step, step)
         near = order <= high + REACH * high ** (1 / 3) / min(choices) ** (2 / 3)
         count = int(order[near][-1])
-        shapes = [line_powers(number * edges, number, count)[..., order[near] - 1] for number in choices]
+        shapes = [_spread_powers(number * edges, number, count, spread)[..., order[near] - 1] for number in choices]
         weight = _log_likelihood(
             np.stack(shapes), power[near], noise[near], bins[near], every[few, None] + scatter[near], leak * loud
         )

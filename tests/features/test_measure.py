@@ -6,7 +6,7 @@ from bladewing.features.comb_fit import fit_combs
 from bladewing.features.flashes import flash_nats
 from bladewing.features.lines import LineSpace, line_products, sum_of_lines
 from bladewing.features.one_thread import one_thread
-from bladewing.features.periodogram import prepare, without_clicks
+from bladewing.features.periodogram import CLICK_OVER_BESIDE, CLICK_POWER, prepare, without_clicks
 from bladewing.features.rotors import MAX_ROTORS
 from bladewing.features.slow_lines import notched_products, remove_bands, slepian
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
@@ -257,6 +257,23 @@ def test_clicks_are_taken_out_and_flashes_are_not():
         clicked = white(np.random.default_rng(seed), PULSES)
         clicked[[700, 1100]] += [20, 30j]
         assert np.isnan(measure(clicked, **RADAR).chopping_hz)
+
+
+def test_flashes_of_a_wide_band_are_no_clicks():
+    # bursts two samples long, as those of rotors whose band fills half the span: chance hides what lies beside some
+    cut = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        samples = 0.01 * white(rng, PULSES)
+        for instant, phase in zip(rng.uniform(0, PULSES, 400), rng.uniform(0, 2 * np.pi, 400), strict=True):
+            samples += rng.exponential() ** 2 * np.exp(1j * phase) * np.sinc((np.arange(PULSES) - instant) * 0.5)
+        empty = np.abs(np.fft.fftfreq(PULSES)) > 0.3
+        before, after = (np.mean(np.abs(np.fft.fft(x)[empty]) ** 2) for x in (samples, without_clicks(samples)))
+        assert after < 1.5 * before
+        power = np.abs(samples[1:-1]) ** 2
+        beside = np.maximum(np.abs(samples[2:]), np.abs(samples[:-2])) ** 2
+        cut += np.count_nonzero((power > CLICK_OVER_BESIDE * beside) & (power > CLICK_POWER * np.median(power)))
+    assert cut  # else nothing is tested
 
 
 def test_six_rotors_of_which_some_are_not_told_apart_keep_their_band():

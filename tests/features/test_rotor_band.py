@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
-from bladewing.features.rotor_band import fit_edge, line_powers
+from bladewing.features.rotor_band import _spread_powers, fit_edge, line_powers
 from bladewing.simulate import RotorMotion, rotor_echo
 from scipy.special import jv
 
@@ -88,6 +88,27 @@ def test_units_do_not_matter():
     power = lines(np.random.default_rng(3), 62.0, 20.0)
     base = fit_edge(ORDER, power, np.ones(144), SIDES, 2)
     np.testing.assert_allclose(fit_edge(ORDER, 1e3 * power, np.full(144, 1e3), SIDES, 2), base, rtol=1e-6)
+
+
+@pytest.mark.parametrize("spread", [0.01, 0.03])
+def test_rotors_of_different_rates_mix_as_their_lines_fall(spread):
+    gamma, orders = np.array([124.6, 300.0]), 180
+    mixed = _spread_powers(gamma, 2, orders, spread)
+    rates = 1 + spread * (np.arange(400) + 0.5 - 200) / 400
+    lines = line_powers(gamma, 2, 200)
+    # each rotor's lines where its rate puts them, all that lies nearest to an order summed
+    brute = np.zeros((2, 2, 202))
+    for rate in rates:
+        at = np.arange(1, 201) * rate
+        below = np.floor(at - 0.5).astype(int)  # between the middles of two neighbours: to the one, where it is
+        np.add.at(brute, (slice(None), slice(None), np.minimum(below + 1, 201)), lines / len(rates))
+    brute = brute[..., 1 : orders + 1]
+    known = brute > 1e-3 * brute.max(axis=-1, keepdims=True)
+    ratio = mixed[known] / brute[known]
+    assert abs(np.median(ratio) - 1) < 0.05
+    assert np.quantile(np.abs(np.log(ratio)), 0.9) < 0.7
+    np.testing.assert_allclose(mixed.sum(axis=-1), brute.sum(axis=-1), rtol=0.05)
+    np.testing.assert_array_equal(_spread_powers(gamma, 2, orders, 0.0), line_powers(gamma, 2, orders))
 
 
 def test_nothing_but_noise_has_no_sure_edge():
