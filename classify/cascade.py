@@ -4,6 +4,7 @@ What both read is computed once. A record that the fast model is sure of costs w
 returns, most of what a radar near its targets sees, are answered at a third of the better model's price.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -25,8 +26,8 @@ class Cascade(Classifier):
     """A fast model and a better one behind it; it answers like any classifier.
 
     Where the first gives a class a probability of `SURE` or more, its probabilities are the answer's; elsewhere
-    those of the second, by whose thresholds labels are given. `inputs`, `metadata`, `accept` and the detection of the
-    operating point are the second's.
+    those of the second, by whose thresholds labels are given. `metadata`, `accept` and the detection of the operating
+    point are the second's; `inputs` are those of both.
 
     Parameters
     ----------
@@ -54,6 +55,7 @@ class Cascade(Classifier):
     ) -> None:
         super().__init__(second[0], source=second[1], threads=threads)
         self.first = Classifier(first[0], source=first[1], threads=threads)
+        self.inputs = tuple(dict.fromkeys((*self.first.inputs, *self._reads)))
         if max_false_alarm is not None:
             given, own = (model._keep_to(max_false_alarm, CASCADE, models=2) for model in (self.first, self))
             self.operating_point = replace(own, false_alarm=own.false_alarm + given.false_alarm)
@@ -97,6 +99,14 @@ class Cascade(Classifier):
             rows = np.flatnonzero(~self.sure(probabilities))
             if len(rows):
                 asked = dwells if len(rows) == len(block) else dwells.rows(rows)
-                probabilities[rows] = self.from_inputs(asked.inputs(self.inputs))
+                probabilities[rows] = super().from_inputs(asked.inputs(self._reads))
             out.append(probabilities)
         return out
+
+    def from_inputs(self, inputs: Mapping[str, NDArray[np.floating]]) -> NDArray[np.float32]:
+        """As `Classifier.from_inputs`: `inputs` are those of both models."""
+        probabilities = self.first.from_inputs(inputs)
+        rows = np.flatnonzero(~self.sure(probabilities))
+        if len(rows):
+            probabilities[rows] = super().from_inputs({name: inputs[name][rows] for name in self._reads})
+        return probabilities

@@ -133,7 +133,7 @@ class Envelope:
 
     def _shorten(self, prf_hz: float) -> str:
         longest_s = min(self.pulses_max / prf_hz, self.dwell_max_s)
-        return f"take dwells of {longest_s:.4g} s or less (dwell = pulses / PRF)"
+        return f"take dwells of {_down(longest_s)} s or less (dwell = pulses / PRF)"
 
     def _prf_for_velocity_hz(self, carrier_hz: float) -> float:
         return 4 * self.unambiguous_min_mps * carrier_hz / SPEED_OF_LIGHT_MPS
@@ -148,3 +148,9 @@ def _up(value: float) -> str:
     """Round up to 4 digits, so that who follows the cure is not just short of it."""
     step = 10.0 ** (math.floor(math.log10(value)) - 3)
     return f"{math.ceil(value / step * (1 - _ROUNDING)) * step:.4g}"
+
+
+def _down(value: float) -> str:
+    """Round down to 4 digits, so that who follows the cure is not just over it."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 3)
+    return f"{math.floor(value / step * (1 + _ROUNDING)) * step:.4g}"

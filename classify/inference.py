@@ -209,7 +209,7 @@ class Classifier:
         self._session = _open_session(onnx_bytes, source, threads)
         if dict(self._session.get_modelmeta().custom_metadata_map) != dict(self.metadata):
             raise BadInput(f"{source}: damaged metadata: onnxruntime reads others: train it again")
-        self.inputs = _read_inputs(self._session, source)
+        self.inputs = self._reads = _read_inputs(self._session, source)
         self.operating_point = None
         if max_false_alarm is not None:
             self._keep_to(max_false_alarm, source)
@@ -380,11 +380,11 @@ class Classifier:
         ndarray
             Shape (records, 3), order `classes`.
         """
-        count = len(inputs[self.inputs[0]])
+        count = len(inputs[self._reads[0]])
         parts = [
             self._session.run(
                 _OUTPUTS,
-                {name: inputs[name][at : at + _STEP_INPUTS].astype(np.float32, copy=False) for name in self.inputs},
+                {name: inputs[name][at : at + _STEP_INPUTS].astype(np.float32, copy=False) for name in self._reads},
             )[0]
             for at in range(0, max(count, 1), _STEP_INPUTS)
         ]

@@ -137,7 +137,8 @@ def fuse(
         fused[-1, CLASSES.index(whose)] *= odds
     fused[-1] /= fused[-1].sum() if shown else 1  # the only dwell of a track stays as it is, to the last digit
     rule = rule or partial(decide, accept=accept)
-    (named, reasons), (doubted, _) = rule(fused), rule(_doubted(fused))
+    named, reasons = rule(fused)
+    doubted, _ = rule(_doubted(fused, named))
     # the same class, or halved odds would let the second speak
     safe = np.where((used > 0) & (named == doubted), named, UNKNOWN)
     first = int(np.argmax(safe != UNKNOWN))
@@ -167,10 +168,9 @@ def _by_length(longer: Looks | Mapping[int, Looks] | None) -> Mapping[int, Looks
     return looks
 
 
-def _doubted(p: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Divide the odds of the most probable class of each row by `DOUBT`."""
-    best = p == p.max(axis=1, keepdims=True)
-    weights = np.where(best, p / DOUBT, p)
+def _doubted(p: NDArray[np.float64], named: NDArray[np.str_]) -> NDArray[np.float64]:
+    """Divide the odds of the class that each row is named by `DOUBT`; a rule may name one that is not the likeliest."""
+    weights = np.where(np.asarray(named)[:, None] == np.array(CLASSES), p / DOUBT, p)
     return weights / weights.sum(axis=1, keepdims=True)
 
 

@@ -1,6 +1,7 @@
 """Training: synthetic records in, calibrated ONNX models and the account of the run out."""
 
 import json
+import math
 import os
 import platform
 import time
@@ -20,7 +21,7 @@ from .dataset import DataSet, Plan, simulator_digest
 from .envelope import Envelope
 from .errors import BadInput
 from .files import result_folder, write_together
-from .gather import Gathered, gather, gather_from
+from .gather import Gathered, gather, gather_from, inputs_digest
 from .inference import COVERAGES, CURVE_KEY, SETS_KEY, Classifier
 from .labels import CLASSES
 from .ladder import CASCADE
@@ -99,6 +100,7 @@ def run_training(
         {
             "settings": settings.model_dump(mode="json"),
             "simulator_sha256": simulator_digest(),
+            "inputs_sha256": inputs_digest(),
             "schema_sha256": schema_hash(),
             "versions": versions,
         },
@@ -343,16 +345,20 @@ def _network(
         "best_epoch": result.best_epoch,
         "stopped_early": result.stopped_early,
         "seconds": round(result.seconds, 1),  # of all its epochs, those before an interruption too
-        "epochs": [
-            {key: float(f"{value:.3g}") if key == "learning_rate" else round(value, 4) for key, value in epoch.items()}
-            for epoch in result.epochs
-        ],
+        "epochs": [{key: _told(key, value) for key, value in epoch.items()} for epoch in result.epochs],
     }
     return (
         lambda part: network_scores(net, inputs(part)),
         lambda calibration: export_network(net, shapes, calibration),
         detail,
     )
+
+
+def _told(metric: str, value: float) -> float | None:
+    """A metric of an epoch as the account holds it; JSON has no word for one that is not finite."""
+    if not math.isfinite(value):
+        return None
+    return float(f"{value:.3g}") if metric == "learning_rate" else round(value, 4)
 
 
 def _versions() -> dict[str, str]:

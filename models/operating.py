@@ -73,11 +73,11 @@ class OperatingCurve:
         kept = [point for point in self.points if models * point.false_alarm <= false_alarm * (1 + 1e-9)]
         if not kept:
             # rounded up, or it would be refused in its turn
-            least = f"{math.ceil(self.points[-1].false_alarm * models * 1e5) / 1e5:g}" if self.points else "any"
+            least = math.ceil(self.points[-1].false_alarm * models * 1e5) / 1e5 if self.points else None
             raise ValueError(
                 f"false-alarm rate {false_alarm:g} cannot be supported by {self.others} calibration records of birds "
-                f"and clutter: a rate must rest on {SUPPORT} false alarms or more: ask for {least} or more, or train "
-                "with more records"
+                f"and clutter: a rate must rest on {SUPPORT} false alarms or more: "
+                f"{'' if least is None else f'ask for {least:g} or more, or '}train with more records"
             )
         return kept[0]
 
@@ -97,9 +97,12 @@ class OperatingCurve:
         """
         try:
             table = json.loads(text)
-            points = tuple(OperatingPoint(*map(float, row)) for row in table["points"])
+            rows = np.array([[float(value) for value in row] for row in table["points"]]).reshape(-1, 3)
+            if not np.all((rows >= 0) & (rows <= 1)) or np.any(np.diff(rows[:, 0]) >= 0):
+                raise ValueError("rates, thresholds and detections must lie in 0 to 1, the rates falling")
+            points = tuple(OperatingPoint(*row) for row in rows.tolist())
             return cls(int(table["uavs"]), int(table["others"]), points)
-        except (KeyError, TypeError) as error:
+        except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
             raise ValueError(f"the operating curve is damaged: {error}") from None
 
 

@@ -27,6 +27,9 @@ OnEpoch = Callable[[int, int, dict[str, float]], None]
 OnSnapshot = Callable[[Snapshot], None]
 """Called with the state after an epoch; the arrays are copies."""
 
+RISE = 0.2
+"""Share of the steps in which the learning rate rises."""
+
 ADAM = 0.3
 """Adam's learning rate over Muon's."""
 
@@ -166,8 +169,10 @@ def train_network(
         Muon(matrices, lr=learning_rate, weight_decay=weight_decay),
         torch.optim.Adam(others, lr=ADAM * learning_rate),
     )
+    planned = max(3, epochs * steps)
+    rise = max(RISE, 2 / planned)  # a rise of one step has no length
     schedules = tuple(
-        OneCycleLR(optimiser, optimiser.defaults["lr"], epochs * steps, pct_start=0.2, cycle_momentum=False)
+        OneCycleLR(optimiser, optimiser.defaults["lr"], planned, pct_start=rise, cycle_momentum=False)
         for optimiser in optimisers
     )
     criterion = nn.CrossEntropyLoss(label_smoothing=label_smoothing)

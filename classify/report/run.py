@@ -22,8 +22,10 @@ from bladewing.simulate import Radar, Records, draw_records
 from numpy.typing import NDArray
 
 from ..bounds import MOST_MODEL_BYTES
+from ..dataset import simulator_digest
 from ..errors import BadInput
 from ..files import read_bounded, result_folder, settle, write_together
+from ..gather import inputs_digest
 from ..inference import Classifier
 from ..labels import CLASSES
 from ..ladder import CASCADE, STAGES_KEY
@@ -333,6 +335,8 @@ def _of(settings: ReportConfig, models: Mapping[str, bytes]) -> dict[str, Any]:
         "schema": SCHEMA_VERSION,
         "version": metadata.version("bladewing"),
         "features": schema_hash(),
+        "simulator_sha256": simulator_digest(),
+        "inputs_sha256": inputs_digest(),
         "settings": settings.model_dump(mode="json"),
         "models": {name: hashlib.sha256(content).hexdigest() for name, content in models.items()},
     }

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import bandwidth, chopping, notch, shape, smearing, vector
-from ..axis import axis_velocities_mps
-from ..spectrum import Spectrum
+from ..axis import UNSEEN_DB, axis_velocities_mps
+from ..spectrum import LOWEST_DB, Spectrum
 from .operators import Value
 from .spectrum import dft
 
@@ -128,8 +128,15 @@ def symmetry(radar: Spectrum, energy: Value, body: Body) -> Value:
 
 def band_levels_db(axis_db: Value, bins: int) -> tuple[Value, Value]:
     """As `shape.band_levels_db`, shape (n, bands) each."""
-    one, other = (axis_db.graph.matmul(axis_db, side.T) for side in np.split(shape._band_shares(bins), 2))
+    one, other = (_marked(axis_db.graph.matmul(axis_db, side.T)) for side in np.split(shape._band_shares(bins), 2))
     return one.at_least(other), one.at_most(other)
+
+
+def _marked(level_db: Value) -> Value:
+    """Levels within rounding of the floor's or of "unseen" as exactly these: trees split there."""
+    for mark_db in (LOWEST_DB, UNSEEN_DB):
+        level_db = level_db.graph.where((level_db - mark_db).apply("Abs") > 1e-4, level_db, mark_db)
+    return level_db
 
 
 def change_levels_db(change: Value, bins: int) -> Value:

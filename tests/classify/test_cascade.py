@@ -9,6 +9,7 @@ from bladewing.classify import BadInput, Classifier, inference
 from bladewing.classify.cascade import SURE, Cascade
 from bladewing.classify.inference import CURVE_KEY, model_names
 from bladewing.classify.ladder import CASCADE, STAGES_KEY, shipped_account
+from bladewing.features import model_inputs
 from bladewing.models.operating import OperatingCurve
 from bladewing.simulate import Radar, draw_records
 
@@ -51,6 +52,11 @@ def test_the_second_is_asked_about_no_record_that_the_first_is_sure_of(cascade, 
     by_first = [row for row in asked if not row[0]]
     assert sum(count for _, count, _ in by_first) == len(records)
     assert sum(count for second, count, _ in asked if second) == len(records) - sum(sure for *_, sure in by_first)
+
+
+def test_inputs_that_are_made_are_answered_as_samples_are(cascade, records):
+    inputs = model_inputs(records, **RADAR, names=cascade.inputs)
+    np.testing.assert_array_equal(cascade.from_inputs(inputs), cascade.predict(records, **RADAR).probabilities)
 
 
 def test_batch_equals_loop_bit_for_bit(cascade, records):

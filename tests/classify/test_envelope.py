@@ -28,9 +28,9 @@ C_MPS = 299_792_458.0
         (10e9, 5e3, 63, "63 pulses are fewer than 64: take 64 pulses, 0.0128 s, or more (dwell = pulses / PRF)"),
         (10e9, 50e3, 63, "63 pulses are fewer than 64: take 250 pulses, 0.005 s, or more (dwell = pulses / PRF)"),
         (10e9, 20e3, 99, "dwell 4.95 ms is below 5 ms: take 100 pulses, 0.005 s, or more (dwell = pulses / PRF)"),
-        (10e9, 20e3, 70_000, "70000 pulses are more than 65536: take dwells of 3.277 s or less (dwell = pulses / PRF)"),
+        (10e9, 20e3, 70_000, "70000 pulses are more than 65536: take dwells of 3.276 s or less (dwell = pulses / PRF)"),
         (3e9, 90e3, 70_000, "70000 pulses are more than 65536: "
-                            "take dwells of 0.7282 s or less (dwell = pulses / PRF)"),
+                            "take dwells of 0.7281 s or less (dwell = pulses / PRF)"),
         (10e9, 10e3, 60_000, "dwell 6 s is above 5 s: take dwells of 5 s or less (dwell = pulses / PRF)"),
     ],
 )  # fmt: skip
@@ -90,7 +90,7 @@ def test_who_follows_the_cures_gets_inside(carrier_hz, prf_hz, pulses):
         elif match := re.search(r"take (\d+) pulses", reason):
             pulses = int(match[1])
         elif match := re.search(r"take dwells of (\S+) s or less", reason):
-            pulses = int(float(match[1]) * prf_hz * (1 - 1e-3))
+            pulses = round(float(match[1]) * prf_hz * (1 - 1e-9))
     assert ENVELOPE.reason(carrier_hz, prf_hz, pulses) is None
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bladewing.classify import gather as gather_module
 from bladewing.classify.errors import BadInput
-from bladewing.classify.gather import gather
+from bladewing.classify.gather import gather, inputs_digest
 from bladewing.classify.parts import Parts
 from bladewing.features import INPUT_SHAPES
 
@@ -23,6 +23,20 @@ def test_inputs_do_not_depend_on_the_workers(monkeypatch):
         np.testing.assert_array_equal(one.inputs[name], two.inputs[name])
     np.testing.assert_array_equal(one.labels, np.arange(60) % 3)
     np.testing.assert_array_equal(one.truth["kind"], two.truth["kind"])
+
+
+def test_other_measurements_have_another_digest(monkeypatch):
+    from bladewing.features import cadence
+
+    inputs_digest.cache_clear()
+    before = inputs_digest()
+    inputs_digest.cache_clear()
+    assert inputs_digest() == before
+    monkeypatch.setattr(cadence, "CLIP", 0.9 * cadence.CLIP)
+    inputs_digest.cache_clear()
+    changed = inputs_digest()
+    inputs_digest.cache_clear()
+    assert changed != before
 
 
 def test_a_longer_set_begins_with_the_shorter_one():

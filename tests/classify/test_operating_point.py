@@ -39,8 +39,24 @@ def test_rates_that_cannot_be_kept_are_refused(model, uav_model, make_model):
         Classifier.load(model, max_false_alarm=2)
     with pytest.raises(BadInput, match=r"holds no operating curve, .*: train it again"):
         Classifier.load(uav_model, max_false_alarm=0.1)
-    with pytest.raises(BadInput, match="damaged"):
-        Classifier(make_model(operating_curve="[]"), max_false_alarm=0.1)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[]",
+        "[" * 200_000,
+        '{"uavs": 1e999, "others": 2000, "points": [[0.1, 0.5, 0.9]]}',
+        '{"uavs": 500, "others": 2000, "points": [[0.1, NaN, 0.9]]}',
+        '{"uavs": 500, "others": 2000, "points": [[-0.1, 0.5, 0.9]]}',
+        '{"uavs": 500, "others": 2000, "points": [[0.1, 0.5, 0.9], [0.2, 0.4, 0.95]]}',
+        '{"uavs": 500, "others": 2000, "points": [[0.1, 0.5]]}',
+    ],
+    ids=lambda text: text[:60],
+)
+def test_a_damaged_curve_is_refused(make_model, text):
+    with pytest.raises(BadInput, match="the operating curve is damaged"):
+        Classifier(make_model(operating_curve=text), max_false_alarm=0.1)
 
 
 def test_predict_states_what_remains(model, sigmf_pair, capsys):

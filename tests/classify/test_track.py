@@ -119,6 +119,17 @@ def test_declared_at_the_first_dwell_that_names_a_class_at_half_the_odds(p, corr
     assert (track.declared, track.declared_after) == (safe[0] if safe else ("", 0))
 
 
+def test_declared_is_what_is_named_with_its_own_odds_halved_also_where_another_is_likelier():
+    def rule(p):  # as prediction sets may: the bird's own limit is low
+        named = np.where(p[:, 1] >= 0.38, "bird", np.where(p[:, 0] >= 0.5, "uav", UNKNOWN))
+        return named, [""] * len(p)
+
+    sure, unsure = np.float32([[0.39, 0.6, 0.01]]), np.float32([[0.49, 0.4, 0.11]])
+    assert fuse(sure, ["bird"], rule=rule).declared == "bird"
+    found = fuse(unsure, ["bird"], rule=rule)
+    assert (found.label, found.declared) == ("bird", "")
+
+
 def test_a_declaration_stands_though_later_dwells_disagree():
     p = np.float32([[0.9, 0.05, 0.05]] + [[0.05, 0.05, 0.9]] * 9)
     track = fuse(p, labelled(p), accept=ACCEPT)

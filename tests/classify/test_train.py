@@ -3,6 +3,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from bladewing.classify.errors import BadInput
 from bladewing.classify.gather import Gathered
 from bladewing.classify.inference import COVERAGES
 from bladewing.classify.train import run_training
-from bladewing.classify.training_account import figures
+from bladewing.classify.training_account import alarm_threshold, figures
 from bladewing.classify.training_config import TrainingConfig, training_config
 from bladewing.features import INPUT_SHAPES
 from bladewing.models import tabular, training
@@ -237,6 +238,30 @@ def test_a_network_that_no_longer_gains_stops_and_says_so():
     assert len(detail["epochs"]) == detail["best_epoch"] + 1 < 60
 
 
+def test_epochs_without_a_number_are_told_and_do_not_cost_the_network(monkeypatch):
+    real = training.train_network
+
+    def ruined_at_last(*given, **options):
+        result = real(*given, **options)
+        return replace(result, epochs=(*result.epochs, dict.fromkeys(result.epochs[0], float("nan"))))
+
+    monkeypatch.setattr(training, "train_network", ruined_at_last)
+    _, _, detail = train._network("spectrum-cnn", SETTINGS, _few_sets(), lambda _: None, None)
+    assert set(detail["epochs"][-1].values()) == {None}
+    json.dumps(detail, allow_nan=False)
+
+
+@pytest.mark.parametrize(("others", "tied"), [(200, 0), (201, 0), (350, 0), (401, 0), (3333, 0), (400, 60), (10, 0)])
+def test_the_threshold_of_a_rate_keeps_to_it_on_its_own_records(others, tied):
+    probabilities = np.random.default_rng(others).dirichlet(np.ones(3), others + 50).astype(np.float32)
+    probabilities[:tied, 0] = 0.999
+    labels = np.repeat([1, 0], [others, 50])
+    threshold = alarm_threshold(probabilities, labels, 0.01)
+    false = np.sum(probabilities[labels != 0, 0] >= threshold)
+    assert false <= 0.01 * others
+    assert tied or false == int(0.01 * others)
+
+
 def test_figures_against_brute_force():
     rng = np.random.default_rng(0)
     labels = rng.integers(0, 3, 3000)
@@ -244,7 +269,7 @@ def test_figures_against_brute_force():
     probabilities[np.arange(3000), labels] += 1
     probabilities /= 2
     found = figures(probabilities, labels, np.array([0.7, 0.6, 0.5]), 0.01)
-    threshold = sorted(probabilities[labels != 0, 0])[int(np.ceil(0.99 * ((labels != 0).sum() - 1)))]
+    threshold = sorted(probabilities[labels != 0, 0])[-int(0.01 * (labels != 0).sum()) - 1]
     assert found["uav_detection"] == pytest.approx(np.mean(probabilities[labels == 0, 0] > threshold), abs=1e-4)
     winner = probabilities.argmax(1)
     named = probabilities.max(1) >= np.array([0.7, 0.6, 0.5])[winner]
@@ -272,6 +297,7 @@ def test_options_come_before_the_file_and_the_file_before_quick(tmp_path):
         ("precision = 1.5", r"precision is 1.5"),
         ('learning_rate = "0.01"', r"learning_rate is '0.01'"),
         ("seed = true", r"seed is True"),
+        ("seed = 4294967296", r"seed is 4294967296: it should be less than 4294967296"),
         ('models = ["spectrum-cnn", "spectrum-cnn"]', r"models holds 'spectrum-cnn' twice: name each once"),
         ('models = ["magic"]', r"models holds 'magic': it may hold features-linear"),
         ("models = []", r"models is \[\]"),

@@ -47,7 +47,7 @@ def test_the_tip_of_rotors_that_are_not_told_apart_has_a_true_deviation(found):
 
 
 def test_a_mirrored_record_has_the_mirrored_body(found):
-    velocity_mps, tip, std = found
+    velocity_mps, tip, _ = found
     same = np.abs(velocity_mps[1] + velocity_mps[0]) < 0.01
     assert same.sum() >= SEEDS - 1  # two orders may be equally likely
-    assert np.all(np.abs(tip[1] - tip[0])[same] < 2 * std[0][same])
+    assert np.abs(tip[1] - tip[0])[same].max() < 0.02

@@ -185,6 +185,16 @@ def test_the_learning_rate_of_each_epoch_is_that_of_the_schedule():
     assert 0 < rates[-1] < 1e-6
 
 
+@pytest.mark.parametrize("steps", [1, 2, 3, 4, 5, 6, 9])
+def test_the_shortest_trainings_have_a_schedule_too(steps):
+    inputs, y = _spectra(12, 1)
+    net = SpectrumNet(SHAPES, seed=0)
+    result = train_network(net, inputs, y, (inputs, y), seed=0, epochs=steps, batch=12, learning_rate=0.01)
+    rates = [epoch["learning_rate"] for epoch in result.epochs]
+    assert all(0 < rate <= 0.01 for rate in rates)
+    assert steps == 1 or max(rates) > 0.009
+
+
 def test_training_stops_where_the_validation_loss_no_longer_falls():
     def worsen(epoch, epochs, metrics):
         if epoch >= 2:
