@@ -38,9 +38,10 @@ NEAR_ZERO = 1e-4
 #: Step of the first search [lines]: the lines' ripple repeats every pi of the phase deviation.
 STEP = 0.2
 
-#: The first search goes so far about all lines that may be the last [lines], which the coarse one has as likely as this
-#: [nats], in so many steps at most; and no nearer to the body than this.
-HALF_RANGE, COARSE_NATS, MOST_STEPS, LEAST_EDGE = 2.5, 6.0, 60, 0.7
+#: The first search goes so far about all lines that may be the last [lines], and so many widths of the roll-off, over
+#: which strong lines still show; which these are the coarse search has as likely as this [nats]. It takes so many steps
+#: at most, and goes no nearer to the body than this.
+HALF_RANGE, HALF_WIDTHS, COARSE_NATS, MOST_STEPS, LEAST_EDGE = 2.5, 1.5, 6.0, 100, 0.7
 
 #: Searches, each about what is left of the one before in so many steps, until the deviation is so many of these.
 SEARCHES, FINE, FINE_ENOUGH = 5, 30, 1.5
@@ -198,9 +199,9 @@ def fit_edge(
     excess = np.maximum(power - noise, 0.0)
     loud = float((excess**2).sum() / max(excess.sum(), 1e-9))
     maybe = order[_coarse_nats(power, noise, bins, loud) > -COARSE_NATS]
-    low, high = maybe[0] - HALF_RANGE, maybe[-1] + HALF_RANGE
-    step = max(STEP, (high - low) / MOST_STEPS)
     choices = list(BLADES) if blades is None else [blades]
+    low, high = (maybe[end] - sign * _half_range(maybe[end], min(choices)) for end, sign in ((0, 1), (-1, -1)))
+    step = max(STEP, (high - low) / MOST_STEPS)
     # shares that the noise outweighs are all alike
     least = 0.1 * float((noise / bins).mean()) / max(loud, 1e-9)
     every = np.array([share for share in SHARES if share >= least or share == SHARES[-1]])
@@ -234,6 +235,11 @@ def fit_edge(
         live = few[weight.sum(axis=(0, 1, 2)) > NEGLIGIBLE]
         few = np.arange(max(live.min() - 2, 0), min(live.max() + 3, len(every)))
     return edge, std
+
+
+def _half_range(order: int, blades: int) -> float:
+    """How far from a line that may be the last the edge may be [lines]."""
+    return float(max(HALF_RANGE, HALF_WIDTHS * order ** (1 / 3) / blades ** (2 / 3)))
 
 
 def _coarse_nats(

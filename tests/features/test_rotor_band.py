@@ -148,3 +148,17 @@ def test_blades_unlike_the_ideal_one_stay_within_what_is_stated(blade, snr_db):
         error_hz = found.bandwidth_hz - 8 * np.pi * rate_hz * 0.15 / WAVELENGTH_M
         assert abs(error_hz) < 4 * found.bandwidth_hz_std
         assert abs(error_hz) < 0.02 * found.bandwidth_hz
+
+
+@pytest.mark.parametrize("gamma", [150.0, 470.0])
+def test_the_edge_of_blades_that_reflect_at_their_tips_is_found_far_out_too(gamma):
+    # strong lines still show five past the edge there: the search went half as far
+    count = int(0.6 * gamma)
+    order, sides = np.arange(1, count + 1), np.full(count, 2.0)
+    rng = np.random.default_rng(7)
+    for _ in range(6):
+        tip = gamma * rng.uniform(0.98, 1.02)
+        shape = 1e3 * jv(2 * order, tip) ** 2 * tip / 2
+        power = np.mean(np.abs(np.sqrt(shape) + white(rng, 2, count)) ** 2, axis=0)
+        edge, _ = fit_edge(order, power, np.ones(count), sides, 2)
+        assert abs(2 * edge / tip - 1) < 2e-3
