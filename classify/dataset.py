@@ -96,6 +96,8 @@ class DataSet:
     ----------
     plan : Plan
         What it holds.
+    simulator_sha256 : str
+        `simulator_digest` of who wrote it.
 
     Raises
     ------
@@ -108,7 +110,7 @@ class DataSet:
         manifest = _read_manifest(folder)
         if manifest is None:
             raise BadInput(f"{folder}: holds no {MANIFEST}: give the folder that `bladewing dataset` wrote")
-        self.plan, self._contents, _ = manifest
+        self.plan, self._contents, self.simulator_sha256 = manifest
         missing = len(self.plan.shards()) - len(self._contents)
         if missing:
             raise BadInput(f"{folder}: not complete, {missing} shards are missing: run `bladewing dataset` again")

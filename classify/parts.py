@@ -9,6 +9,7 @@ import shutil
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -96,8 +97,10 @@ class Parts:
         return BadInput(f"{self._folder / name}.{suffix}: not what this run kept: {why}: remove it and start again")
 
     def forget(self) -> None:
-        """Remove all parts: the result stands."""
-        shutil.rmtree(self._all, ignore_errors=True)
+        """Remove all parts of this run, whose result stands; those of others stay."""
+        shutil.rmtree(self._folder, ignore_errors=True)
+        with suppress(OSError):
+            self._all.rmdir()
 
     def _write(self, file: Path, content: bytes) -> None:
         self._folder.mkdir(parents=True, exist_ok=True)

@@ -95,11 +95,12 @@ def run_training(
         raise BadInput(f"{data}: holds sets of {stored.plan.records}, a training takes {settings.sets}: write it again")
     result_folder(out)
     versions = _versions()
+    simulator = simulator_digest() if stored is None else stored.simulator_sha256
     parts = Parts(
         out / PARTS,
         {
             "settings": settings.model_dump(mode="json"),
-            "simulator_sha256": simulator_digest(),
+            "simulator_sha256": simulator,
             "inputs_sha256": inputs_digest(),
             "schema_sha256": schema_hash(),
             "versions": versions,
@@ -114,6 +115,8 @@ def run_training(
     with Progress(visible=progress) as bars:
         if resumed:
             bars.say(f"Going on with what an interrupted run left in {out / PARTS}")
+        if simulator != simulator_digest():
+            bars.say(f"{data}: written by another simulator or on another machine: a drawn set would differ")
         sets = _gather(settings, stored, bars, parts)
         gathered_s = time.perf_counter() - started
         files: dict[str, bytes] = {}
@@ -131,7 +134,7 @@ def run_training(
             with bars.phase(f"train {name}", 1) as on_fraction:
                 files[f"{name}.onnx"], models[name] = _take_or_train(name, settings, sets, on_fraction, parts, taught)
         models = {name: models[name] for name in settings.models}
-    cascade = add_costs(files, models, sets.test, settings.false_alarm)
+    cascade = add_costs(files, models, sets.calibrate, sets.test, settings.false_alarm)
     account = {
         "format": 1,
         "settings": settings.model_dump(mode="json"),
@@ -141,6 +144,7 @@ def run_training(
         "false_alarm": settings.false_alarm,
         "models": models,
         CASCADE: cascade,
+        "simulator_sha256": simulator,
         "schema_sha256": schema_hash(),
         "versions": versions,
     }

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from bladewing.models.calibration import expected_calibration_error
 from bladewing.simulate import Radar, draw_records
+from numpy.typing import NDArray
 
 from .cascade import Cascade
 from .gather import Gathered
@@ -18,7 +19,11 @@ _RADAR = Radar(10e9, 25e3, PULSES)
 
 
 def add_costs(
-    files: Mapping[str, bytes], models: dict[str, dict[str, Any]], test: Gathered, false_alarm: float
+    files: Mapping[str, bytes],
+    models: dict[str, dict[str, Any]],
+    calibrate: Gathered,
+    test: Gathered,
+    false_alarm: float,
 ) -> dict[str, Any] | None:
     """Write into each model's account what it costs, and give the account of the cascade from the fast to the best.
 
@@ -28,6 +33,8 @@ def add_costs(
         File name, `<name>.onnx`, to the sealed model.
     models
         Name to account; `COST_KEY` is added.
+    calibrate : Gathered
+        The records on which the two are chosen.
     test : Gathered
         The test records.
     false_alarm
@@ -42,7 +49,11 @@ def add_costs(
     classifiers = {name: Classifier(files[f"{name}.onnx"], source=name) for name in models}
     for name, cost in costs_ffts(classifiers).items():
         models[name][COST_KEY] = round(cost, 1)
-    stages = [by_place(place, models) for place in ("fast", "best")]
+    chosen_by = {
+        name: models[name] | {"test": _accuracy(classifier.from_inputs(calibrate.inputs), calibrate.labels)}
+        for name, classifier in classifiers.items()
+    }
+    stages = [by_place(place, chosen_by) for place in ("fast", "best")]
     if stages[0] == stages[1]:
         return None
     first, second = ((files[f"{name}.onnx"], name) for name in stages)
@@ -58,6 +69,12 @@ def add_costs(
         COST_KEY: round(costs_ffts({CASCADE: cascade})[CASCADE], 1),
         "accept": [float(limit) for limit in cascade.accept],
     }
+
+
+def _accuracy(probabilities: NDArray[np.floating], labels: NDArray[np.integer]) -> dict[str, float]:
+    """Balanced accuracy, as an account holds it."""
+    right = probabilities.argmax(axis=1) == labels
+    return {"balanced_accuracy": float(np.mean([right[labels == index].mean() for index in np.unique(labels)]))}
 
 
 def costs_ffts(classifiers: Mapping[str, Classifier]) -> dict[str, float]:

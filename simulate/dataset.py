@@ -45,7 +45,7 @@ KINDS: dict[str, dict[str, float]] = {
 QUIET = 0.12
 
 #: What a set of records is for; each has streams of its own, so a test record is never a training record.
-PURPOSES = {"train": 0, "validate": 1, "calibrate": 2, "test": 3, "bench": 4}
+PURPOSES = {"train": 0, "validate": 1, "calibrate": 2, "test": 3, "bench": 4, "report": 5}
 
 #: Columns of `Records.truth`: name -> unit. Where a column has no meaning for a record it holds NaN.
 TRUTH_UNITS = {

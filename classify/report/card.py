@@ -86,8 +86,8 @@ def expectations(report: Mapping[str, Any]) -> str:
         f"Frankly, what fails first (shipped `{name}`; figures from `docs/report.json`: "
         f"{count(report['records']['total'])} synthetic test records of {count(report['records']['radars'])} radars "
         f"over the whole envelope, many of which hold nothing to see: SNR of nine in ten {number(low)} to "
-        f"{number(high)} dB, dwells from {number(shortest)} ms, blades seen along their axis; 95 % intervals in "
-        "brackets):",
+        f"{number(high)} dB, dwells from {number(shortest)} ms, blades seen along their axis; in brackets 95 % "
+        "intervals as of independent records: those of one radar are alike, so read them as 1.5 to 2 times as wide):",
         "",
         f"- balanced accuracy over the three classes {_rate(found['balanced_accuracy'])}"
         + (f" ({others})" if others else "")
@@ -155,5 +155,6 @@ def _training(report: Mapping[str, Any]) -> str:
         return f"{drawn} There is no account of how these models were trained."
     return (
         f"{drawn} {count(given['records']['train'])} records, seed {given['settings']['seed']}, and "
-        f"{count(given['records']['calibrate'])} others to calibrate; {number(given['seconds'])} s."
+        f"{count(given['records']['calibrate'])} others to calibrate; {number(given['seconds'])} s"
+        f"{' since an interruption' if given.get('resumed') else ''}."
     )

@@ -60,7 +60,8 @@ def time_chain(
             if on_share is not None:
                 on_share((place + done) / len(BATCHES))
 
-        taken = time_in_turns(works, seconds=seconds, least_rounds=least_rounds, most_rounds=5000, on_share=share)
+        most = max(5000, least_rounds)
+        taken = time_in_turns(works, seconds=seconds, least_rounds=least_rounds, most_rounds=most, on_share=share)
         bare = taken["fft", "fft"]
         stages = [
             {"stage": stage, "name": name, **quote(laps, per=batch), **ratio(laps, bare)}

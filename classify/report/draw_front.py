@@ -133,7 +133,8 @@ def by_dwell(report: Mapping[str, Any]) -> list[Panel]:
                 axes.xaxis.set_minor_locator(NullLocator())
                 axes.set_xlabel("dwell [ms]")
                 _share(axes, label)
-                alt = f"{label.capitalize()} against the dwell, {title}, shortest to longest. {' '.join(words)}"
+                said = label[0].upper() + label[1:]
+                alt = f"{said} against the dwell, {title}, shortest to longest. {' '.join(words)}"
                 panels.append(panel(figure, name=f"dwells-{slug}-{key}", title=f"{title}: {label}", alt=alt))
     return panels
 

@@ -11,7 +11,7 @@ from ..inference import Classifier
 from ..labels import CLASSES
 from .scores import UNKNOWN, Answers, Truth
 
-PURPOSE = "test"
+PURPOSE = "report"
 
 
 def ask(

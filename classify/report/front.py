@@ -249,8 +249,8 @@ def _costs(
         operations = {}
         for name, answer in answers.items():
             with counted_transforms() as counter:
-                answer(iq[:1], radar)
-            operations[name] = counter.total
+                answer(iq, radar)
+            operations[name] = round(counter.total / len(iq))  # of a cascade the mean
         timed = [_timed(answers, iq, radar, size, config.front_s) for size in BATCHES]
         for name in answers:
             cost = [part[name] for part in timed]
@@ -269,7 +269,11 @@ def _timed(
         works[name] = in_turn([partial(answer, one, radar) for one in some])
     taken = time_in_turns(works, seconds=seconds, least_rounds=3, most_rounds=1000)
     return {
-        name: {"batch": batch, **quote(laps, per=batch), **ratio(laps, taken[None])}
+        name: {
+            "batch": batch,
+            **quote(laps, per=batch, turns=len(some)),
+            **ratio(laps, taken[None], turns=len(some)),
+        }
         for name, laps in taken.items()
         if name is not None
     }

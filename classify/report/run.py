@@ -191,6 +191,7 @@ def _training(account: Mapping[str, Any] | None) -> dict[str, Any] | None:
         "settings": account["settings"],
         "records": account["records"],
         "seconds": account["seconds"]["all"],
+        "resumed": bool(account.get("resumed")),
         "versions": account["versions"],
     }
 
@@ -307,7 +308,7 @@ def run_report(
     out = result_folder(out)
     stability = worst_of_each(out)
     parts = Parts(out / PARTS, _of(settings, found))
-    started, clock = datetime.now(UTC), time.perf_counter()
+    started, clock, resumed = datetime.now(UTC), time.perf_counter(), parts.begun
     with Progress(visible=progress) as bars:
         body = measure(found, settings, parts=parts, progress=bars, account=account)
         made = {
@@ -316,6 +317,7 @@ def run_report(
             "quick": quick,
             "seed": settings.seed,
             "seconds": round(time.perf_counter() - clock, 1),
+            "resumed": resumed,
         }
         extremes = {} if stability is None else {"stability": stability}
         text = _json({"schema_version": SCHEMA_VERSION, "made": made, **body, **extremes})
@@ -356,5 +358,5 @@ def _command(out: Path, models: Path | None, *, quick: bool, seed: int | None, c
     words += ["--models", str(models)] if models is not None else []
     words += ["--quick"] if quick else []
     words += ["--config", str(config)] if config is not None else []
-    words += ["--seed", str(seed)] if seed else []
+    words += ["--seed", str(seed)] if seed is not None else []
     return shlex.join(words)

@@ -33,7 +33,7 @@ class ReportConfig(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     #: Root seed of the test records.
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0  # scikit-learn takes no larger
     #: Test records of any radar in the envelope.
     records: Annotated[int, Field(ge=3, le=10_000_000)] = 30_000
     #: Records that are timed, weighed and shown.

@@ -105,7 +105,10 @@ def _costs(report: Mapping[str, Any]) -> Iterator[str]:
     yield from front_budgets(report, batch=report["cost"]["batches"][-1]["batch"])
     for part in report["trade"]:
         bought = budget_sentence(part["budgets"])
-        yield f"Any radar of the envelope, on one thread, {batch_words(part['batch'])}: {bought}"
+        yield (
+            "Accuracy at any radar of the envelope, time of a record of "
+            f"{count(report['reference']['pulses'])} pulses on one thread, {batch_words(part['batch'])}: {bought}"
+        )
     for part in report["fft_against_stft"]:
         ratios = [row["ratio_to_fft"] for row in part["stft"]]
         low, high = part["paper_ratio"]

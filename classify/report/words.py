@@ -14,8 +14,14 @@ def percent(value: float | None) -> str:
 
 def number(value: float) -> str:
     """Write a number with three digits that count, and a true minus sign."""
-    text = f"{value:.3g}" if abs(value) < 1000 else f"{round(value, 2 - len(str(int(abs(value)))) + 1):.0f}"
+    value = three_digits(value)
+    text = f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
     return text.replace("-", MINUS)
+
+
+def three_digits(value: float) -> float:
+    """Round to the three digits that are shown, so that the unit is chosen for what is shown."""
+    return float(f"{value:.3g}")
 
 
 def count(value: int) -> str:
@@ -25,13 +31,13 @@ def count(value: int) -> str:
 
 def micros(value: float) -> str:
     """Write a time [us]."""
-    return f"{number(value)}{NBSP}µs" if value < 1000 else f"{number(value / 1000)}{NBSP}ms"
+    return f"{number(value)}{NBSP}µs" if three_digits(value) < 1000 else f"{number(value / 1000)}{NBSP}ms"
 
 
 def size(value: float) -> str:
     """Write a number of bytes, in powers of 1000."""
     for unit in ("B", "kB", "MB"):
-        if value < 1000:
+        if three_digits(value) < 1000:
             return f"{number(value)}{NBSP}{unit}"
         value /= 1000
     return f"{number(value)}{NBSP}GB"
@@ -55,7 +61,7 @@ def millis(value_s: float) -> str:
 def large(value: float) -> str:
     """Write a large count with the prefix of its thousands."""
     for prefix in ("", "k", "M"):
-        if value < 1000:
+        if three_digits(value) < 1000:
             return number(value) + (f"{NBSP}{prefix}" if prefix else "")
         value /= 1000
     return f"{number(value)}{NBSP}G"

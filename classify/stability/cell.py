@@ -29,7 +29,7 @@ class Cell:
     said : str
         The stage's reason where there is no number.
     warned : str
-        A warning from inside a library; there must be none.
+        A warning from inside a library, or an exception that is no refusal; there must be none.
     """
 
     stage: str
@@ -72,10 +72,11 @@ def sweep(
     values : iterable
         Where the parameter goes.
     error_at : callable
-        The error at a value; a ValueError of one line is the stage's own word that it refuses.
+        The error at a value. Where `guard` says that the stage refuses, a ValueError of one line is its word.
     show : callable
         The value as text, with its unit.
     """
+    refuses = "refused" in guard
     for value in values:
         error: float | None = None
         said = warned = ""
@@ -84,9 +85,13 @@ def sweep(
             try:
                 outcome = error_at(value)
                 error, said = outcome if isinstance(outcome, tuple) else (outcome, "")
-            except ValueError as refusal:
-                said = f"refused: {str(refusal).splitlines()[0]}"
-        if caught:
+            except Exception as fault:
+                line = (str(fault).splitlines() or [""])[0]
+                if refuses and isinstance(fault, ValueError):
+                    said = f"refused: {line}"
+                else:
+                    warned = f"{type(fault).__name__}: {line}"
+        if caught and not warned:
             warned = f"{caught[0].category.__name__}: {caught[0].message}"
         if error is not None and not math.isfinite(error):
             error = None if math.isnan(error) else 1e300  # an infinity is no answer

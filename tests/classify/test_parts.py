@@ -21,8 +21,10 @@ def test_parts_are_measured_once_and_only_for_the_same_run(tmp_path: Path) -> No
     assert not parts.have("one")
     assert parts.take("one", measure) == [1]
     assert Parts(tmp_path / "parts", {"seed": 0}).take("one", measure) == [1]
-    assert Parts(tmp_path / "parts", {"seed": 1}).take("one", measure) == [2]
+    other = Parts(tmp_path / "parts", {"seed": 1})
+    assert other.take("one", measure) == [2]
     parts.forget()
+    other.forget()
     assert not (tmp_path / "parts").exists()
 
 
@@ -80,6 +82,17 @@ def test_a_damaged_part_is_one_line_or_what_was_kept(tmp_path: Path) -> None:
                 assert found[name].tobytes() == ARRAYS[name].tobytes()
     assert len(said) > 0.8 * len(cut + turned)
     assert all("some.npz: not what" in line and line.endswith("remove it and start again") for line in said)
+
+
+def test_a_run_that_is_done_leaves_the_parts_of_another(tmp_path: Path) -> None:
+    one, other = (Parts(tmp_path / "parts", {"seed": seed}) for seed in (1, 2))
+    for parts in (one, other):
+        parts.keep_arrays("some", {"values": np.arange(3)})
+    one.forget()
+    assert not one.begun
+    assert other.begun
+    other.forget()
+    assert not list(tmp_path.iterdir())
 
 
 class _Bomb:

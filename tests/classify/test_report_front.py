@@ -13,7 +13,8 @@ from bladewing.classify.report import front, pictures, stft
 from bladewing.classify.report.bounds import detection_bound
 from bladewing.classify.report.memory import peak_bytes
 from bladewing.classify.report.operations import counted_transforms, network_operations
-from bladewing.classify.report.timing import Laps, ratio
+from bladewing.classify.report.timing import Laps, quote, ratio
+from bladewing.classify.report.words import micros, millis, number, size
 from bladewing.simulate import Radar
 
 RADAR = Radar(carrier_hz=9.85e9, prf_hz=25e3, pulses=2000)
@@ -191,6 +192,28 @@ def test_a_ratio_lies_within_its_spread() -> None:
     base = Laps([1.0, 2.0, 1.0, 2.0, 1.0], [])
     found = ratio(Laps([3.0, 6.0, 3.0, 8.0, 3.0], []), base)
     assert found == {"ratio_to_fft": 3.0, "ratio_low": 3.0, "ratio_high": pytest.approx(3.6)}
+
+
+def test_of_pieces_of_different_cost_that_take_turns_the_mean_is_typical() -> None:
+    # a cascade: of four records one costs ten times the others; the median of all laps hid it
+    laps = Laps([1.0, 1.0, 1.0, 10.0] * 5 + [1.0], [1.0, 1.0, 1.0, 10.0] * 5 + [1.0])
+    found = quote(laps, turns=4)
+    assert found["median_us"] == found["passed_us"] == pytest.approx(3.25e6)
+    base = Laps([1.0] * 21, [])
+    assert ratio(laps, base, turns=4)["ratio_to_fft"] == pytest.approx(3.25)
+    assert quote(Laps([2.0, 4.0], [2.0, 4.0]), turns=64)["median_us"] == pytest.approx(3e6)  # fewer rounds than pieces
+
+
+@pytest.mark.parametrize(
+    ("said", "text"),
+    [
+        (number(999.5), "1000"), (number(-0.001234), "\u22120.00123"), (micros(999.7), "1\u00a0ms"),
+        (micros(999.4), "999\u00a0\u00b5s"), (size(999_700), "1\u00a0MB"), (size(12), "12\u00a0B"),
+        (millis(0.9996), "1000\u00a0ms"), (number(123_456), "123000"),
+    ],
+)  # fmt: skip
+def test_numbers_have_three_digits_and_the_unit_of_what_is_shown(said: str, text: str) -> None:
+    assert said == text
 
 
 def test_the_front_holds_every_choice_at_every_dwell(report: dict[str, Any]) -> None:

@@ -16,6 +16,7 @@ def test_options_come_before_the_file_and_the_file_before_quick(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
+        ("seed = 4294967296", "seed is 4294967296: it should be less than 4294967296"),
         ("recrods = 5", "unknown field 'recrods': the fields are seed, records"),
         ("front_s = 0", "front_s is 0: it should be greater than 0"),
         ("records = 'many'", "records is 'many'"),

@@ -10,8 +10,8 @@ from bladewing.classify.stability.cell import Cell, sweep
 from bladewing.simulate.rotor import LARGEST_GAMMA, rotor_echo
 
 
-def at(error_at, limit=1.0):
-    (cell,) = sweep("stage", "parameter", [1], "error", limit, "guard", error_at, str)
+def at(error_at, limit=1.0, guard="guard"):
+    (cell,) = sweep("stage", "parameter", [1], "error", limit, guard, error_at, str)
     return cell
 
 
@@ -27,8 +27,12 @@ def test_a_refusal_is_an_answer_and_a_warning_is_none():
     def refuse(_):
         raise ValueError("too few pulses\nand more")
 
-    assert at(refuse).said == "refused: too few pulses"
-    assert at(refuse).holds
+    assert at(refuse, guard="few pulses are refused").said == "refused: too few pulses"
+    assert at(refuse, guard="few pulses are refused").holds
+    assert not at(refuse).holds  # no refusal was promised: it is a fault
+    assert at(refuse).warned == "ValueError: too few pulses"
+    assert at(lambda _: 1 / 0).warned == "ZeroDivisionError: division by zero"
+    assert not at(lambda _: 1 / 0, guard="all is refused").holds
 
     def warn(_):
         warnings.warn("divide by zero", RuntimeWarning, stacklevel=1)
