@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .fusion import CORRELATION, LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN, decide
+from .samples import positive
 
 LONGER = 5
 """Dwells of each look that comes without its length."""
@@ -105,10 +106,15 @@ def fuse(
     Raises
     ------
     ValueError
-        The shapes do not match, looks are of a length without a weight, or `correlation` is outside 0 to 1.
+        The shapes do not match, a probability is not finite, looks are of a length without a weight, `shown` holds
+        something else, `dwell_s` is not above 0, or `correlation` is outside 0 to 1.
     """
     if not 0 <= correlation <= 1:
         raise ValueError(f"correlation is {correlation}: it must be in 0 to 1")
+    positive(dwell_s, "dwell_s")
+    for name in shown:
+        if name not in ODDS:
+            raise ValueError(f"shown holds {name!r}: it may hold {', '.join(ODDS)}")
     p, heard = _heard(probabilities, labels)
     uniform = np.full(len(CLASSES), 1 / len(CLASSES), dtype=np.float32)
     if not heard.any():
@@ -184,6 +190,8 @@ def _heard(
         raise ValueError(
             f"probabilities {p.shape} and labels {answers.shape} must have shapes (dwells, 3) and (dwells,)"
         )
+    if not np.isfinite(p).all():
+        raise ValueError(f"probabilities of look {int(np.argmin(np.isfinite(p).all(axis=1)))} are not finite")
     return p, (answers != UNKNOWN) | np.any(np.abs(p - p.mean(axis=1, keepdims=True)) >= 1e-6, axis=1)
 
 

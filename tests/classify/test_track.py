@@ -254,6 +254,20 @@ def test_bad_arguments(p, labels, correlation, message):
         fuse(p, labels, correlation=correlation)
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"dwell_s": -1.0}, "dwell_s is -1"),
+        ({"dwell_s": float("nan")}, "dwell_s is nan"),
+        ({"shown": ["nothing"]}, "shown holds 'nothing': it may hold comb, wings, heaves, steps"),
+        ({"longer": {2: (np.full((1, 3), np.nan), ["uav"])}}, "probabilities of look 0 are not finite"),
+    ],
+)
+def test_what_a_track_cannot_be_fused_with_is_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        fuse(np.full((2, 3), [0.8, 0.1, 0.1]), ["uav"] * 2, **options)
+
+
 def test_reason_shows_that_the_probability_is_below_the_limit():
     labels, reasons = decide(np.array([[0.48, 0.32, 0.2], [0.6199, 0.2, 0.1801], [0.62, 0.2, 0.18]]), (0.62,) * 3)
     assert list(labels) == [UNKNOWN, UNKNOWN, "uav"]
