@@ -47,10 +47,29 @@ LEAST_SPREAD = 0.02
 def edge_of_lines(
     data: Periodogram, fits: list[CombFit], rest: NDArray[np.complex128], per_turn: int, blades: int | None
 ) -> tuple[float, float]:
-    """Edge of the line family and its standard deviation [cycles a sample from the body], both sides together.
+    """Edge of the line family by the fitted lines, both sides together.
 
     Each line's power is what is seen there with all other fitted lines taken out; an order's is the mean over both
-    sides and the single rotors, since their lines part at the outer orders. Without such orders nothing is known.
+    sides and the single rotors, since their lines part at the outer orders.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    fits : list of CombFit
+        The rotors' combs.
+    rest : ndarray of complex128, shape (pulses,)
+        Samples that these leave.
+    per_turn : int
+        Strong lines are this many spacings of a fit apart.
+    blades : int, optional
+        Of a rotor.
+
+    Returns
+    -------
+    edge, edge_std : float
+        The tip's Doppler frequency and its standard deviation [cycles a sample from the body]; 0 and infinity where
+        no lines part, infinity both where they fill the span.
     """
     spacings = np.array([fit.spacing * per_turn for fit in fits])
     fastest = float(spacings.max())
@@ -109,6 +128,11 @@ def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple
     """Of unresolved rotors, the edge of the lines and its deviation, if it is the surer one; or that of all about them.
 
     Rotors that were not told apart show in the second alone. It is known to its own deviation, whatever the first says.
+
+    Parameters
+    ----------
+    lines, around : (float, float)
+        From `edge_of_lines` and `edge_around`.
     """
     if not np.isfinite(lines[0] + around[0]):
         return np.inf, np.inf
@@ -117,7 +141,24 @@ def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple
 
 
 def edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | None) -> tuple[float, float]:
-    """Edge and its standard deviation by all that lies about each order: rotors that are not told apart count too."""
+    """Edge of the line family by all that lies about each order: rotors that are not told apart count too.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    comb : Comb
+        The comb found in it.
+    rotors : Rotors
+        What was told apart of it.
+    blades : int, optional
+        Of a rotor.
+
+    Returns
+    -------
+    edge, edge_std : float
+        As from `edge_of_lines`, of the fastest rotor.
+    """
     nominal, centre = float(np.mean([rotors.rates.min(), rotors.rates.max()])), rotors.fits[0].centre
     size, pulses = len(data.power), data.pulses
     order = np.arange(1, int(SPAN / nominal) + 1)
