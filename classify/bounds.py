@@ -23,6 +23,9 @@ MOST_MODEL_BYTES = 1 << 28
 #: Fewest records that can be trained on: of every kind the other three sets must hold some.
 LEAST_RECORDS = 600
 
+#: Seeds of a training or a report are below this: scikit-learn takes no larger.
+SEEDS = 1 << 32
+
 # Samples hardly compress; text does, but is small. What unpacks to more than this is no recording.
 _FREE_BYTES, _RATIO = 64 << 20, 100
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
 
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
@@ -146,11 +147,14 @@ def _under(value: float, limit: float) -> str:
 
 def _up(value: float) -> str:
     """Round up to 4 digits, so that who follows the cure is not just short of it."""
-    step = 10.0 ** (math.floor(math.log10(value)) - 3)
-    return f"{math.ceil(value / step * (1 - _ROUNDING)) * step:.4g}"
+    return _four_digits(value, math.ceil, 1 - _ROUNDING)
 
 
 def _down(value: float) -> str:
     """Round down to 4 digits, so that who follows the cure is not just over it."""
+    return _four_digits(value, math.floor, 1 + _ROUNDING)
+
+
+def _four_digits(value: float, whole: Callable[[float], int], slack: float) -> str:
     step = 10.0 ** (math.floor(math.log10(value)) - 3)
-    return f"{math.floor(value / step * (1 + _ROUNDING)) * step:.4g}"
+    return f"{whole(value / step * slack) * step:.4g}"

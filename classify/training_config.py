@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from .bounds import LEAST_RECORDS
+from .bounds import LEAST_RECORDS, SEEDS
 from .errors import BadInput
 from .settings_file import build_settings, given_settings
 
@@ -20,7 +20,7 @@ class TrainingConfig(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     records: Annotated[int, Field(ge=LEAST_RECORDS, le=10_000_000)] = 30_000
-    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0  # scikit-learn takes no larger
+    seed: Annotated[int, Field(ge=0, lt=SEEDS)] = 0
     epochs: Annotated[int, Field(ge=1, le=1000)] = 8
     #: Epochs in a row without a lower validation loss after which a network stops; 0: never.
     patience: Annotated[int, Field(ge=0, le=1000)] = 20

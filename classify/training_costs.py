@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from bladewing.models.calibration import expected_calibration_error
 from bladewing.simulate import Radar, draw_records
-from numpy.typing import NDArray
 
 from .cascade import Cascade
 from .gather import Gathered
@@ -49,10 +48,10 @@ def add_costs(
     classifiers = {name: Classifier(files[f"{name}.onnx"], source=name) for name in models}
     for name, cost in costs_ffts(classifiers).items():
         models[name][COST_KEY] = round(cost, 1)
-    chosen_by = {
-        name: models[name] | {"test": _accuracy(classifier.from_inputs(calibrate.inputs), calibrate.labels)}
-        for name, classifier in classifiers.items()
-    }
+    chosen_by = {}
+    for name, classifier in classifiers.items():
+        said, accept = classifier.from_inputs(calibrate.inputs), np.asarray(classifier.accept)
+        chosen_by[name] = models[name] | {"test": figures(said, calibrate.labels, accept, false_alarm)}
     stages = [by_place(place, chosen_by) for place in ("fast", "best")]
     if stages[0] == stages[1]:
         return None
@@ -69,12 +68,6 @@ def add_costs(
         COST_KEY: round(costs_ffts({CASCADE: cascade})[CASCADE], 1),
         "accept": [float(limit) for limit in cascade.accept],
     }
-
-
-def _accuracy(probabilities: NDArray[np.floating], labels: NDArray[np.integer]) -> dict[str, float]:
-    """Balanced accuracy, as an account holds it."""
-    right = probabilities.argmax(axis=1) == labels
-    return {"balanced_accuracy": float(np.mean([right[labels == index].mean() for index in np.unique(labels)]))}
 
 
 def costs_ffts(classifiers: Mapping[str, Classifier]) -> dict[str, float]:

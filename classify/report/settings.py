@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from ..bounds import SEEDS
 from ..settings_file import build_settings, given_settings
 
 #: What `--quick` changes: enough to see every figure, with wide intervals.
@@ -33,7 +34,7 @@ class ReportConfig(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     #: Root seed of the test records.
-    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0  # scikit-learn takes no larger
+    seed: Annotated[int, Field(ge=0, lt=SEEDS)] = 0
     #: Test records of any radar in the envelope.
     records: Annotated[int, Field(ge=3, le=10_000_000)] = 30_000
     #: Records that are timed, weighed and shown.

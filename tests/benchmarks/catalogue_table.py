@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from bladewing.features import measure
+from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 from bladewing.simulate import Scene
 from bladewing.simulate.catalogue import AIRFRAMES
 
-C_MPS = 299_792_458.0
 CARRIERS_HZ = (3.3e9, 9.85e9, 24.1e9, 77e9)
 
 #: Of the unambiguous span, the tips take so much; blades are so far below the catalogue's level [dB].
@@ -47,7 +47,7 @@ def drawn(rng: np.random.Generator, airframe: str) -> tuple[Scene, float, float]
     tip_mps = max(2 * np.pi * abs(rotor["rotation_hz"]) * rotor["blade_length_m"] for rotor in rotors)
     tip_mps *= np.cos(np.radians(beta_deg))
     carrier_hz = rng.choice(CARRIERS_HZ)
-    prf_hz = 4 * max(tip_mps / rng.uniform(*FOLDS), LEAST_SPAN_MPS) * carrier_hz / C_MPS
+    prf_hz = 4 * max(tip_mps / rng.uniform(*FOLDS), LEAST_SPAN_MPS) * carrier_hz / SPEED_OF_LIGHT_MPS
     scene = {
         "radar": {"carrier_hz": carrier_hz, "prf_hz": prf_hz, "pulses": int(min(DWELL_S * prf_hz, MOST_PULSES))},
         "uav": [fields | {"name": "uav", "velocity_mps": velocity_mps, "rotors": rotors, "body": body}],
