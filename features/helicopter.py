@@ -44,6 +44,8 @@ MEETING_BINS = 1.5
 #: Candidates looked at closely.
 CLOSER = 4
 
+SEVERAL = "no second comb: several rotors of nearly one rate, or of a changing one"
+
 
 @dataclass(frozen=True)
 class Gear:
@@ -84,8 +86,9 @@ class Gear:
 def find_gear(data: Periodogram, comb: Comb, edge: float) -> tuple[Gear | None, Rotors, str]:
     """Find a second comb a gear ratio from the first, and the single rotors of the first.
 
-    Several rotors of nearly one rate leave so many lines that some of them pass for a second comb. So the rotors are
-    separated without the second comb's lines: a helicopter leaves a single one.
+    Several rotors of nearly one rate leave so many lines that some of them pass for a second comb. Where such explain
+    the record, none is sought; where they do not, they are separated again without the second comb's lines: a
+    helicopter leaves a single one.
 
     Parameters
     ----------
@@ -105,12 +108,16 @@ def find_gear(data: Periodogram, comb: Comb, edge: float) -> tuple[Gear | None, 
     reason : str
         Why there is no second comb; empty where there is one.
     """
+    rotors = judged(separate_rotors(data, comb, edge), data, comb, edge)
+    if len(rotors.rates) > 1 and rotors.resolved:
+        return None, rotors, SEVERAL
     gear, reason = _second_comb(data, comb)
-    rotors = separate_rotors(*((data, comb) if gear is None else (gear.alone, gear.first)), edge)
-    if gear is not None and (len(rotors.rates) > 1 or not rotors.resolved):
-        gear, reason = None, "no second comb: several rotors of nearly one rate, or of a changing one"
-        rotors = separate_rotors(data, comb, edge)
-    return gear, rotors if gear is not None else judged(rotors, data, comb, edge), reason
+    if gear is None:
+        return None, rotors, reason
+    alone = separate_rotors(gear.alone, gear.first, edge)
+    if len(alone.rates) > 1 or not alone.resolved:
+        return None, rotors, SEVERAL
+    return gear, alone, ""
 
 
 def _second_comb(data: Periodogram, comb: Comb) -> tuple[Gear | None, str]:
