@@ -3,8 +3,11 @@
 from collections.abc import Callable
 from functools import partial
 
+import numpy as np
+import onnxruntime
 import pytest
 from bladewing.classify import Classifier
+from bladewing.classify.export import export_raw_iq
 from bladewing.classify.inference import model_names
 from bladewing.features import model_inputs
 from bladewing.simulate import Radar, draw_records
@@ -53,8 +56,16 @@ def test_model_inputs_against_one_fft(records):
 
 
 @pytest.mark.parametrize("records", [1, 64])
-def test_answers_against_one_fft(records):
+def test_answers_against_one_fft(records, tmp_path):
     iq = draw_records(RADAR, records, 0, purpose="bench").iq
-    candidates = {name: partial(Classifier.load(name).predict, iq, **AXES) for name in model_names()}
+    packed = {"iq": iq.view(np.float32).reshape(*iq.shape, 2)}
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    candidates = {}
+    for name in model_names():
+        candidates[name] = partial(Classifier.load(name).predict, iq, **AXES)
+        export_raw_iq(tmp_path / name, **AXES, pulses=RADAR.pulses, model=name)
+        exported = onnxruntime.InferenceSession(tmp_path / name, options)
+        candidates[f"{name}, exported"] = partial(exported.run, None, packed)
     goal = f"IQ to probabilities, goal of the cheapest {GOALS[records]} x"
     costs(iq, candidates, f"Answers of {records}: batches of {records} x 2048 pulses, {goal}")
