@@ -80,9 +80,10 @@ def measure_front(
     dict
         ``dwells_s``, ``train_records``, ``test_records`` (of each dwell), ``epochs``; ``declared`` (``shares`` and
         ``snr_db``), ``quoted_dwell_s``; ``bounds``: see `bounds.detection_bounds`; ``choices``: one a picture, one for
-        the measurements and one a model, see `_row`; ``budgets``: for each batch size and budget the most accurate
-        choice, or None; ``stored``: for each number of bins and bits ``bytes``, ``bytes_per_million``, the accuracy and
-        whether nothing is as small and as good (``front``).
+        the measurements and one a model, see `_row`; ``budgets``: for each batch size and budget the choice most
+        accurate on half of the test records and what it gives on the other half, or None; ``stored``: for each number
+        of bins and bits ``bytes``, ``bytes_per_million``, the accuracy and whether nothing is as small and as good
+        (``front``).
     """
     _score(models, config, reference, parts=parts, phase=phase)
     entries = [("picture", name) for name in PICTURES] + [("features", FEATURES)]
@@ -188,7 +189,9 @@ def _by_dwell(test: Sets, probabilities: NDArray[np.floating]) -> dict[str, Any]
     for place in range(len(DWELLS_S)):
         here = test.dwell == place
         labels, mine = test.labels[here], probabilities[here]
-        dwells.append(_scores(labels, mine))
+        # the best of many looks better than it is on the records it was chosen by
+        halves = [_scores(labels[half::2], mine[half::2]) for half in (0, 1)]
+        dwells.append({**_scores(labels, mine), "chosen_by": halves[0]["balanced_accuracy"], "quoted": halves[1]})
         # the same false alarms, but only UAVs that show something
         strong = (labels != 0) | (test.snr_db[here] > DECLARED_SNR_DB)
         declared.append(_scores(labels[strong], mine[strong])["uav_found"]["value"])
@@ -321,8 +324,8 @@ def _row(
     }
 
 
-def _accuracy(point: Mapping[str, Any]) -> float:
-    return float(point["balanced_accuracy"]["value"] or 0.0)
+def _accuracy(point: Mapping[str, Any], by: str = "balanced_accuracy") -> float:
+    return float(point[by]["value"] or 0.0)
 
 
 def _mark(rows: Sequence[Mapping[str, Any]]) -> None:
@@ -337,13 +340,16 @@ def _mark(rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _budget(rows: Sequence[Mapping[str, Any]], place: int, budget_us: float) -> dict[str, Any]:
-    """The most accurate choice and dwell within a record's time; of equals the cheapest."""
+    """The most accurate on one half of the test records within a record's time; of equals the cheapest.
+
+    What it gives is quoted from the other half.
+    """
     points = [(row, point, point["cost"][place]["median_us"]) for row in rows for point in row["dwells"]]
     within = [entry for entry in points if entry[2] <= budget_us]
-    best = max(within, key=lambda entry: (_accuracy(entry[1]), -entry[2]), default=None)
+    best = max(within, key=lambda entry: (_accuracy(entry[1], "chosen_by"), -entry[2]), default=None)
     asked = {"batch": BATCHES[place], "budget_us": budget_us}
     if best is None:
         return {**asked, "choice": None}
     row, point, cost_us = best
-    gives = {key: point[key] for key in ("dwell_s", "balanced_accuracy", "uav_found")}
-    return {**asked, "choice": row["name"], "kind": row["kind"], "words": row["words"], "cost_us": cost_us, **gives}
+    about = {"choice": row["name"], "kind": row["kind"], "words": row["words"], "dwell_s": point["dwell_s"]}
+    return {**asked, **about, "cost_us": cost_us, **point["quoted"]}

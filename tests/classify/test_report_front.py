@@ -270,11 +270,24 @@ def test_what_is_marked_is_not_beaten_and_a_budget_buys_the_best_within(report: 
             assert point["cost"][place]["front"] is not beaten
         for budget_us in (1e-9, 1e9, float(np.median([cost for cost, _ in spots]))):
             found = front._budget(report["front"]["choices"], place, budget_us)
-            within = [value for cost, value in spots if cost <= budget_us]
+            within = [point for (cost, _), (_, point) in zip(spots, points, strict=True) if cost <= budget_us]
             assert found["batch"] == batch
             assert (found["choice"] is None) is (not within)
             if within:
-                assert found["balanced_accuracy"]["value"] == max(within)
+                best = max(point["chosen_by"]["value"] for point in within)
+                quoted = [point["quoted"] for point in within if point["chosen_by"]["value"] == best]
+                assert {key: found[key] for key in ("balanced_accuracy", "uav_found")} in quoted
+
+
+def test_a_choice_is_made_on_other_records_than_it_is_quoted_on() -> None:
+    places = len(front.DWELLS_S)
+    labels, dwell = np.tile(np.repeat(np.arange(3), 40), places), np.repeat(np.arange(places), 120)
+    lucky = np.arange(len(labels)) % 2 == 0  # right on one half, always "uav" on the other
+    probabilities = np.where(lucky[:, None], np.eye(3)[labels], np.eye(3)[0]).astype(np.float32)
+    point = front._by_dwell(front.Sets({}, labels, np.full(len(labels), 5.0), dwell), probabilities)["dwells"][0]
+    assert point["chosen_by"]["value"] == 1.0
+    assert point["quoted"]["balanced_accuracy"]["value"] == pytest.approx(1 / 3)
+    assert point["balanced_accuracy"]["value"] == pytest.approx(2 / 3)
 
 
 def test_time_to_declare_is_the_first_dwell_that_finds_enough() -> None:
