@@ -19,6 +19,11 @@ SURE_DEVIATIONS, LEAST_RISE_DB = 5.0, 2.0
 #: Pulses that a line's smear can be told from, at least.
 LEAST_PULSES = 32
 
+#: A dwell of many steps is searched in fourths, then in halves: a line smears over one bin of a part by the square of
+#: their number as much, and so a sixteenth of the steps is enough. So many of the best, and none at all, which is what
+#: most targets have, are looked at more closely.
+PARTS, MANY_STEPS, CANDIDATES = (4, 2, 1), 256, 8
+
 
 def body_acceleration(
     iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float
@@ -56,31 +61,41 @@ def body_acceleration(
     tried = np.arange(-reach, reach + 1) * step
     size = fft.next_fast_len(2 * pulses)
 
-    def heights_at(values: NDArray[np.float64], dwells: NDArray[np.complex64], size: int) -> NDArray[np.float32]:
-        # value by value: a long dwell has thousands of steps, and together they would fill the memory
-        return np.stack([_sharpened(dwells, one, wavelength_m, prf_hz, size).max(axis=-1) for one in values], axis=-1)
+    def heights_at(
+        steps: NDArray, dwells: NDArray[np.complex64], parts: int = 1, finer: int = 1
+    ) -> NDArray[np.float32]:
+        # value by value: a long dwell has hundreds of steps, and together they would fill the memory
+        values = (_sharpened(dwells, one * step, wavelength_m, prf_hz, finer * size, parts) for one in steps)
+        return np.stack([value.max(axis=-1).sum(axis=-1) for value in values], axis=-1)
 
+    first, *further = PARTS if reach > MANY_STEPS else (1,)
+    tried = np.arange(-(reach // first**2), reach // first**2 + 1) * first**2
     scale = np.abs(flat).max(axis=-1)
     held = np.flatnonzero(scale >= LEAST_PART) if pulses >= LEAST_PULSES else np.zeros(0, np.intp)
     loud = in_blocks(flat[held] / scale[held, None])
-    each = (pair for block in loud for pair in zip(block, heights_at(tried, block, size), strict=True))
+    each = (pair for block in loud for pair in zip(block, heights_at(tried, block, first), strict=True))
     for index, (one, heights) in zip(held, each, strict=True):
-        best = int(heights.argmax())
-        sharp = _sharpened(one, tried[best], wavelength_m, prf_hz, size)
+        steps, apart = np.append(tried[np.argsort(-heights)[:CANDIDATES]], 0), first**2
+        for parts in further:
+            steps = np.unique(steps[:, None] + np.arange(-apart, apart + 1, parts**2))
+            steps, apart = steps[np.argsort(-heights_at(steps, one, parts))[:CANDIDATES]], parts**2
+        best = int(steps[0])
+        height, steady = heights_at(np.array([best, 0]), one)
+        sharp = _sharpened(one, best * step, wavelength_m, prf_hz, size)
         noise = float(np.median(sharp)) / np.log(2)
-        if best in (0, 2 * reach) or heights[best] < noise * 10 ** (LEAST_LINE_DB / 10):
+        if abs(best) >= reach or height < noise * 10 ** (LEAST_LINE_DB / 10):
             continue
-        at = tried[best]
-        for finer in (0.5, 0.1):
-            left, middle, right = np.log(heights_at(at + finer * step * np.array([-1, 0, 1]), one, 4 * size))
+        at = float(best)
+        for share in (0.5, 0.1):
+            left, middle, right = np.log(heights_at(at + share * np.array([-1, 0, 1]), one, finer=4))
             curve = 2 * middle - left - right
-            at += finer * step * (np.clip((right - left) / (2 * curve), -1, 1) if curve > 0 else 0.0)
-        value[index] = at
+            at += share * (np.clip((right - left) / (2 * curve), -1, 1) if curve > 0 else 0.0)
+        value[index] = at * step
         # the line's height is pulses^2 A^2, the noise's pulses sigma^2
-        snr = heights[best] / noise / pulses
+        snr = height / noise / pulses
         std[index] = np.sqrt(90 / (snr * float(pulses) ** 5)) * prf_hz**2 * wavelength_m / (2 * np.pi)
-        rise = heights[best] / heights[reach]
-        smeared[index] = abs(at) > max(step, SURE_DEVIATIONS * std[index]) and rise > 10 ** (LEAST_RISE_DB / 10)
+        risen = height > steady * 10 ** (LEAST_RISE_DB / 10)
+        smeared[index] = risen and abs(value[index]) > max(step, SURE_DEVIATIONS * std[index])
     lead = samples.shape[:-1]
     return value.reshape(lead), std.reshape(lead), smeared.reshape(lead)
 
@@ -115,9 +130,17 @@ def _phase_rad(acceleration: NDArray[np.float64], pulses: int, wavelength_m: flo
 
 
 def _sharpened(
-    samples: NDArray[np.complex64], acceleration_mps2: float, wavelength_m: float, prf_hz: float, size: int
+    samples: NDArray[np.complex64],
+    acceleration_mps2: float,
+    wavelength_m: float,
+    prf_hz: float,
+    size: int,
+    parts: int = 1,
 ) -> NDArray[np.float32]:
-    """Power spectra of dwells (..., pulses) with an acceleration taken out."""
+    """Power spectra of parts of dwells (..., pulses) with an acceleration taken out, shape (..., parts, bins)."""
     phase = _phase_rad(np.asarray(acceleration_mps2), samples.shape[-1], wavelength_m, prf_hz)
-    spectrum = fft.fft(samples * np.exp(1j * phase).astype(np.complex64), n=size)
+    steady = samples * np.exp(1j * phase).astype(np.complex64)
+    each = samples.shape[-1] // parts
+    cut = steady[..., : each * parts].reshape(*samples.shape[:-1], parts, each)
+    spectrum = fft.fft(cut, n=fft.next_fast_len(-(-size // parts)))
     return np.asarray(spectrum.real**2 + spectrum.imag**2)

@@ -52,6 +52,19 @@ def test_the_deviation_of_an_acceleration_is_true():
     assert 0.45 < np.mean(((found - truth) / std) ** 2) < 1.8
 
 
+@pytest.mark.parametrize("height_db", [24.0, 40.0])
+@pytest.mark.parametrize("truth", [-17.7, 0.2, 12.3])
+def test_the_acceleration_of_a_long_dwell_is_as_sure(height_db, truth):
+    # 0.8 s: 1600 steps of acceleration, most of which are never looked at
+    prf_hz, pulses = 8e3, 6400
+    time_s = (np.arange(pulses) - (pulses - 1) / 2) / prf_hz
+    line = np.exp(-2j * np.pi * (1234.5 * time_s + truth * time_s**2 / WAVELENGTH_M))
+    noise = white(np.random.default_rng(7), pulses) * np.sqrt(pulses / 10 ** (height_db / 10))
+    found, std, smeared = body_acceleration(line + noise, carrier_hz=CARRIER_HZ, prf_hz=prf_hz)
+    assert abs(found - truth) < 4 * std
+    assert smeared
+
+
 def test_steady_dwells_noise_and_silence_are_left_alone():
     rng = np.random.default_rng(3)
     iq = np.stack([rotors([57.7], body=5.0) + white(rng, PULSES), white(rng, PULSES), np.zeros(PULSES)])
