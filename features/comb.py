@@ -54,12 +54,15 @@ class Comb:
         Outermost order that speaks for it.
     per_turn : int
         Strong lines are this many spacings apart: 1 for equal blades (or a lone one), else the number of blades.
+    body_std : float
+        Standard deviation of the body's place, where several of its lines may be the body's [cycles a sample].
     """
 
     fit: CombFit
     rest: NDArray[np.complex128]
     last: int
     per_turn: int
+    body_std: float
 
     @property
     def chopping(self) -> float:
@@ -145,7 +148,7 @@ def find_comb(data: Periodogram) -> tuple[Comb | None, str]:
         return None, "dwell too short: no chopping frequency could be told from its neighbours"
     if start.score < threshold(data):
         return None, f"no comb: evidence {start.score:.1f} below {threshold(data):.0f} nats"
-    start = centred(data, start)
+    start, open_orders = centred(data, start)
     fitted = fit_combs(data, start.centre, [start.spacing], [(start.low, start.high)])
     if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
         return None, f"no comb: fewer than {LEAST_LINES} lines"
@@ -159,4 +162,4 @@ def find_comb(data: Periodogram) -> tuple[Comb | None, str]:
     power = np.abs(seen) ** 2 * data.pulses / data.level_of(fitted[1])(fit.frequencies)
     within = (fit.orders >= start.low) & (fit.orders <= start.high)
     per_turn = strong_multiple(fit.orders[within], power[within])
-    return Comb(fit, fitted[1], max(start.high, -start.low), per_turn), ""
+    return Comb(fit, fitted[1], max(start.high, -start.low), per_turn, open_orders * fit.spacing), ""

@@ -18,11 +18,16 @@ EVEN, ENDS_DB, CLEAR_DB = 20.0, 20.0, 30.0
 #: which it is even is sought.
 ENDS_GAP, MIDDLE_REACH = 2, 3
 
-#: What is at rest may be the background: its level counts up to so much over that of the strongest line that moves.
-REST_DB = 15.0
+#: What speaks for the order at rest at most where a background lies there, and more where no line that moves is as
+#: strong as a body's [nats]: a background is strong whatever hovers in it, and a line of the comb comes as near to it
+#: by chance, but many do hover. Where no line stands out that moves, the body hides in what was taken out there.
+REST, HOVERS = 8.0, 11.0
+
+#: Other orders that have at most so much less [nats] leave the choice open; asked are those within so many of the best.
+OPEN_NATS, NEAR_ORDERS = 3.0, 3
 
 
-def centred(data: Periodogram, found: Candidate) -> Candidate:
+def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
     """Count a comb from the line that is most likely the body's.
 
     A rotor's lines reach equally far to both sides of the body and are as strong on both, and the body's own line is
@@ -37,45 +42,28 @@ def centred(data: Periodogram, found: Candidate) -> Candidate:
 
     Returns
     -------
-    Candidate
+    best : Candidate
         The same comb.
+    open_orders : float
+        Standard deviation of the body's order, of those that may be the body's as well; 0 where none is as likely.
     """
-    pulses, evidence = data.pulses, data.contrast
-    middle = found.centre + found.spacing * round((found.high + found.low) / 2)
-    options = [(found.centre, 0.0), (middle, 0.0)]
-    places = found.centre + found.spacing * np.arange(found.low, found.high + 1)
-    power = data.at(places) * data.level_at(places) * data.usable(places)
-    highest_db = 10 * float(np.log10(power.max(initial=1.0)))
-    if highest_db > CLEAR_DB:
-        order = _even_order(data, found, 10 ** ((highest_db - ENDS_DB) / 10))
-        options.append((found.centre + found.spacing * order, EVEN))
-    others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
-    moving = max(
-        (db for c, db in zip(data.centres, data.centres_db, strict=True) if abs(c) > data.rest_half), default=99.0
-    )
-    for centre, level_db in zip(data.centres, data.centres_db, strict=True):
-        shown_db = level_db if abs(centre) > data.rest_half else min(level_db, moving + REST_DB)
-        orders = (centre - found.centre) / found.spacing
-        # several rotors' spacings differ: the further off, the less one comb for them all tells where a line must be
-        off = (orders - round(orders)) * found.spacing * pulses / (1 + 0.2 * abs(orders))
-        if abs(off) < 1.5 and level_db > LINE_DB:
-            over_db = max(shown_db - others_db, 0.0)
-            strong = STRONG_LINE * min(over_db / STRONG_OVER_DB, 1.0)
-            more = STRONG_LINE_DB * max(over_db - STRONG_OVER_DB, 0.0)
-            options.append((centre, strong + more - 16 * off**2))
+    evidence = data.contrast
     best, most = found, -np.inf
-    steps = found.spacing * (1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * pulses))
-    for centre, bonus in dict(options).items():
+    totals: dict[int, float] = {}
+    steps = found.spacing * (1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * data.pulses))
+    for centre, bonus in _bonuses(data, found).items():
+        shift = round((centre - found.centre) / found.spacing)
         # one comb for several rotors may pass a little beside the body's line: either place will do
-        beside = found.centre + found.spacing * round((centre - found.centre) / found.spacing)
+        beside = found.centre + found.spacing * shift
         scores, _ = even_scores(evidence, np.repeat(steps, 2), np.tile([centre, beside], len(steps)))
         index = int(scores.argmax())
-        if scores[index] + bonus > most:
-            most = scores[index] + bonus
+        total = float(scores[index]) + bonus
+        totals[shift] = max(totals.get(shift, -np.inf), total)
+        if total > most:
+            most = total
             if centre == found.centre:
                 best = found
             else:
-                shift = round((centre - found.centre) / found.spacing)
                 best = Candidate(
                     float(steps[index // 2]),
                     centre,
@@ -83,7 +71,47 @@ def centred(data: Periodogram, found: Candidate) -> Candidate:
                     max(found.high - shift, 0),
                     found.score,
                 )
-    return best
+    chosen = round((best.centre - found.centre) / found.spacing)
+    others = np.setdiff1d(chosen + np.arange(-NEAR_ORDERS, NEAR_ORDERS + 1), list(totals))
+    places = best.centre + best.spacing * (others - chosen)
+    scores, _ = even_scores(evidence, np.full(len(others), best.spacing), places)
+    away = np.append(others, list(totals)) - chosen
+    likely = np.exp(np.append(scores, list(totals.values())) - most)
+    likely[likely < np.exp(-OPEN_NATS)] = 0.0
+    return best, float(np.sqrt((likely * away**2).sum() / likely.sum()))
+
+
+def _bonuses(data: Periodogram, found: Candidate) -> dict[float, float]:
+    """Places where the body's line may be [cycles a sample], and what speaks for each besides the comb [nats]."""
+    middle = found.centre + found.spacing * round((found.high + found.low) / 2)
+    out = [(found.centre, 0.0), (middle, 0.0)]
+    places = found.centre + found.spacing * np.arange(found.low, found.high + 1)
+    power = data.at(places) * data.level_at(places) * data.usable(places)
+    highest_db = 10 * float(np.log10(power.max(initial=1.0)))
+    if highest_db > CLEAR_DB:
+        order = _even_order(data, found, 10 ** ((highest_db - ENDS_DB) / 10))
+        out.append((found.centre + found.spacing * order, EVEN))
+    others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
+    moving, hides = 0.0, all(abs(centre) <= data.rest_half for centre in data.centres)
+    for centre, level_db in sorted(zip(data.centres, data.centres_db, strict=True), key=lambda line: -abs(line[0])):
+        over_db = max(level_db - others_db, 0.0)
+        nats = STRONG_LINE * min(over_db / STRONG_OVER_DB, 1.0)
+        nats += STRONG_LINE_DB * max(over_db - STRONG_OVER_DB, 0.0)
+        if abs(centre) > data.rest_half:
+            moving = nats
+        elif hides:
+            reach = int(data.rest_half / found.spacing) + 1
+            hidden = found.centre % found.spacing + found.spacing * np.arange(-reach, reach + 1)
+            out += [(float(place), nats) for place in hidden[np.abs(hidden) <= data.rest_half]]
+            nats += REST
+        else:
+            nats = min(nats, REST + max(HOVERS - moving, 0.0))
+        orders = (centre - found.centre) / found.spacing
+        # several rotors' spacings differ: the further off, the less one comb for them all tells where a line must be
+        off = (orders - round(orders)) * found.spacing * data.pulses / (1 + 0.2 * abs(orders))
+        if abs(off) < 1.5 and level_db > LINE_DB:
+            out.append((centre, nats - 16 * off**2))
+    return dict(out)
 
 
 def _even_order(data: Periodogram, found: Candidate, least: float) -> int:

@@ -249,7 +249,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
             out[f"{name}_chopping_hz"], out[f"{name}_chopping_hz_std"] = rate * prf_hz, std * prf_hz
         out["gear_ratio"], out["gear_ratio_std"] = gear.ratio, gear.ratio_std
     count = len(rotors.rates)
-    out |= _body(data, rotors.fits[0] if count > 1 else comb.fit, steady=rotors.resolved)
+    out |= _body(data, rotors.fits[0] if count > 1 else comb.fit, steady=rotors.resolved, open_std=comb.body_std)
     if count > 1:
         # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
         out["chopping_hz"] = float(rotors.rates.mean()) * prf_hz
@@ -273,6 +273,8 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
             f"no band: lines may fill the unambiguous span, tips of {least_mps:.1f} m/s and more: raise the PRF"
         )
         edge = edge_std = np.nan
+    # counted from a line beside the body's, the family is so much the wider on one side
+    edge_std = float(np.hypot(edge_std, comb.body_std))
     out["bandwidth_hz"], out["bandwidth_hz_std"] = 2 * edge * prf_hz, 2 * edge_std * prf_hz
     cosine = 1.0 if beta_rad is None else float(np.cos(beta_rad))
     tip, tip_std = (value * prf_hz * wavelength_m / 2 / cosine for value in (edge, edge_std))
@@ -298,10 +300,11 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     return out
 
 
-def _body(data: Periodogram, fit: CombFit | None, *, steady: bool = True) -> dict[str, float]:
+def _body(data: Periodogram, fit: CombFit | None, *, steady: bool = True, open_std: float = 0.0) -> dict[str, float]:
     """The body's velocity: from its own line, or from the comb's centre where background may hide that line; or NaN.
 
-    Of unresolved rotors, or a rate that is not steady, the centre has no true deviation.
+    Of unresolved rotors, or a rate that is not steady, the centre has no true deviation. `open_std` is what the choice
+    of the comb's centre adds [cycles a sample].
     """
     own, level_db = data.centres[0], data.centres_db[0]
     # the bound of a single line's frequency, and what its interpolation between bins is off by
@@ -315,4 +318,4 @@ def _body(data: Periodogram, fit: CombFit | None, *, steady: bool = True) -> dic
         if abs(offset) > 1.0 or (steady and fit.centre_std < own_std):
             turns, std = fit.centre, fit.centre_std
     scale = data.prf_hz * data.wavelength_m / 2
-    return {"body_velocity_mps": -turns * scale, "body_velocity_mps_std": std * scale}
+    return {"body_velocity_mps": -turns * scale, "body_velocity_mps_std": float(np.hypot(std, open_std)) * scale}
