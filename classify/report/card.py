@@ -67,7 +67,7 @@ def model_card(report: Mapping[str, Any]) -> str:
             for row in found["by_kind"]
         ],
         "",
-        *_section("Cost", front_budgets(report)),
+        *_section("Cost (chosen on half of the test records, quoted from the other)", front_budgets(report)),
     ]
     return "\n".join(parts).rstrip() + "\n"
 
