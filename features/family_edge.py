@@ -28,6 +28,9 @@ AROUND_SCATTER, AROUND_LINES = 0.4, 0.035
 #: [lines].
 MIXED_LINES = 0.25
 
+#: Lines of unlike orders nearer than this [bins] cover one another.
+COVERED_BINS = 1.5
+
 #: Lines are looked for so far from the body [cycles a sample]. A family that still stands there at this share of its
 #: mean power, by so many deviations of the noise, has no edge to be seen: it fills the span, and what lies beyond has
 #: been folded back between its lines.
@@ -79,7 +82,7 @@ def edge_of_lines(
     frequency = np.asarray(centres[:, None, None] + spacings[:, None, None] * sides, np.float64)
     fitted = np.stack([_amplitudes_at(fit, per_turn * sides) for fit in fits])
     left = LineSpace(rest).at(frequency.ravel())[0].reshape(frequency.shape)
-    usable = data.usable(frequency)
+    usable = data.usable(frequency) & ~_covered(spacings, order, data.pulses)[:, None]
     total = np.where(usable, np.abs(left + fitted) ** 2 * data.pulses, 0.0).sum(axis=(0, 1))
     noise = np.where(usable, data.level_of(rest)(frequency), 0.0).sum(axis=(0, 1))
     number = usable.sum(axis=(0, 1)).astype(float)
@@ -94,6 +97,17 @@ def edge_of_lines(
     leak = SEVERAL_LEAK if len(fits) > 1 else LEAK_SHARE
     edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades, leak=leak)
     return edge * fastest, std * fastest
+
+
+def _covered(spacings: NDArray[np.float64], order: NDArray[np.intp], pulses: int) -> NDArray[np.bool_]:
+    """True where another order of another rotor lies on a rotor's, shape (rotors, orders).
+
+    Past a slower rotor's edge it would pass for a line of its own, and what both hold is shared out between them.
+    """
+    own, others = spacings[:, None, None], spacings[:, None]
+    there = np.rint(order * own / others)
+    away = np.abs(order * own - there * others) * pulses
+    return np.asarray(((there != order) & (away < COVERED_BINS)).any(axis=1))
 
 
 def _fills_span(
