@@ -21,13 +21,10 @@ from scipy import fft
 
 from .errors import BadInput
 from .files import write_whole
-from .inference import Classifier, chosen_name, read_model
+from .inference import EXPORTED, Classifier, chosen_name, read_model
 from .labels import CLASSES, UNKNOWN
 from .ladder import CASCADE
 from .samples import positive
-
-PRODUCT = "bladewing raw-IQ graph"
-"""What the metadata of an exported graph call it."""
 
 TOLERANCE = 2e-3
 """Largest difference of a probability from `Classifier.predict` that an exported graph may show on records with noise;
@@ -49,10 +46,10 @@ def export_raw_iq(
     Parameters
     ----------
     out
-        The file to write. Its graph reads "iq", float32 of shape (batch, pulses, 2), batch 1 or more, I and Q at any
-        gain, and gives "probabilities", float32 (batch, 3) in the order uav, bird, clutter, and "label", int64
-        (batch,): the place in (uav, bird, clutter, unknown). A record without signal, or with a sample that is not
-        finite, is unknown with probabilities of 1/3.
+        The file to write, its name ending in ".onnx". Its graph reads "iq", float32 of shape (batch, pulses, 2), batch
+        1 or more, I and Q at any gain, and gives "probabilities", float32 (batch, 3) in the order uav, bird, clutter,
+        and "label", int64 (batch,): the place in (uav, bird, clutter, unknown). A record without signal, or with a
+        sample that is not finite, is unknown with probabilities of 1/3.
     carrier_hz, prf_hz
         Carrier and pulse repetition frequency [Hz] that it is made for.
     pulses
@@ -68,9 +65,11 @@ def export_raw_iq(
     Raises
     ------
     BadInput
-        The radar or the dwell lies outside the model's envelope, the model reads an image, or the file cannot be
-        written.
+        The name ends in something else, the radar or the dwell lies outside the model's envelope, the model reads an
+        image, or the file cannot be written.
     """
+    if Path(out).suffix.lower() != ".onnx":
+        raise BadInput(f"{os.fspath(out)}: a graph's name ends in .onnx: give it such a name")
     name = chosen_name(model, single=True)
     if name == CASCADE:
         raise BadInput(
@@ -145,7 +144,7 @@ def _sealed(
     """The graph with what the model says of itself, what it was made for and where it came from."""
     metadata = {key: value for key, value in classifier.metadata.items() if key not in (SEAL_KEY, "inputs")}
     metadata |= {
-        "product": PRODUCT,
+        "product": EXPORTED,
         "labels": json.dumps([*CLASSES, UNKNOWN]),
         "carrier_hz": repr(carrier_hz),
         "prf_hz": repr(prf_hz),

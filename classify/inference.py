@@ -48,6 +48,9 @@ _STEP_RECORDS = 256
 _STEP_SAMPLES = 1 << 21
 _STEP_INPUTS = 4096
 
+#: What the metadata of an exported graph call it.
+EXPORTED = "bladewing raw-IQ graph"
+
 _OUTPUTS = ["probabilities"]
 
 
@@ -418,6 +421,8 @@ def _open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.I
 
 def _read_metadata(metadata: Mapping[str, str], source: str) -> tuple[Envelope, tuple[float, float, float]]:
     """Check what a model says of itself against what this version can serve."""
+    if metadata.get("product") == EXPORTED:
+        raise BadInput(f"{source}: an exported graph, for onnxruntime alone: give the model that it was made of")
     if metadata.get("product") != "bladewing":
         raise BadInput(f"{source}: not a bladewing model: its product is {metadata.get('product')!r}")
     if metadata.get("format") != FORMAT:

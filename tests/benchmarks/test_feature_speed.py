@@ -64,8 +64,9 @@ def test_answers_against_one_fft(records, tmp_path):
     candidates = {}
     for name in model_names():
         candidates[name] = partial(Classifier.load(name).predict, iq, **AXES)
-        export_raw_iq(tmp_path / name, **AXES, pulses=RADAR.pulses, model=name)
-        exported = onnxruntime.InferenceSession(tmp_path / name, options)
+        graph = tmp_path / f"{name}.onnx"
+        export_raw_iq(graph, **AXES, pulses=RADAR.pulses, model=name)
+        exported = onnxruntime.InferenceSession(graph, options)
         candidates[f"{name}, exported"] = partial(exported.run, None, packed)
     goal = f"IQ to probabilities, goal of the cheapest {GOALS[records]} x"
     costs(iq, candidates, f"Answers of {records}: batches of {records} x 2048 pulses, {goal}")
