@@ -421,10 +421,11 @@ def _open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.I
 
 def _read_metadata(metadata: Mapping[str, str], source: str) -> tuple[Envelope, tuple[float, float, float]]:
     """Check what a model says of itself against what this version can serve."""
-    if metadata.get("product") == EXPORTED:
-        raise BadInput(f"{source}: an exported graph, for onnxruntime alone: give the model that it was made of")
-    if metadata.get("product") != "bladewing":
-        raise BadInput(f"{source}: not a bladewing model: its product is {metadata.get('product')!r}")
+    product = metadata.get("product")
+    if product != "bladewing":
+        exported = "an exported graph, for onnxruntime alone: give the model that it was made of"
+        what = exported if product == EXPORTED else f"its product is {product!r}"
+        raise BadInput(f"{source}: not a bladewing model: {what}")
     if metadata.get("format") != FORMAT:
         raise BadInput(
             f"{source}: model format {metadata.get('format')!r}, this version reads {FORMAT!r}: train it again"

@@ -58,7 +58,6 @@ def body_acceleration(
     # one step smears a line over one bin of the dwell
     step = wavelength_m / 2 * (prf_hz / pulses) ** 2
     reach = int(min(MAX_MPS2 / step, pulses / 8)) + 1
-    tried = np.arange(-reach, reach + 1) * step
     size = fft.next_fast_len(2 * pulses)
 
     def heights_at(
@@ -80,8 +79,8 @@ def body_acceleration(
             steps = np.unique(steps[:, None] + np.arange(-apart, apart + 1, parts**2))
             steps, apart = steps[np.argsort(-heights_at(steps, one, parts))[:CANDIDATES]], parts**2
         best = int(steps[0])
-        height, steady = heights_at(np.array([best, 0]), one)
-        sharp = _sharpened(one, best * step, wavelength_m, prf_hz, size)
+        sharp, steady = (_sharpened(one, at * step, wavelength_m, prf_hz, size) for at in (best, 0))
+        height = float(sharp.max())
         noise = float(np.median(sharp)) / np.log(2)
         if abs(best) >= reach or height < noise * 10 ** (LEAST_LINE_DB / 10):
             continue
@@ -94,7 +93,7 @@ def body_acceleration(
         # the line's height is pulses^2 A^2, the noise's pulses sigma^2
         snr = height / noise / pulses
         std[index] = np.sqrt(90 / (snr * float(pulses) ** 5)) * prf_hz**2 * wavelength_m / (2 * np.pi)
-        risen = height > steady * 10 ** (LEAST_RISE_DB / 10)
+        risen = height > float(steady.max()) * 10 ** (LEAST_RISE_DB / 10)
         smeared[index] = risen and abs(value[index]) > max(step, SURE_DEVIATIONS * std[index])
     lead = samples.shape[:-1]
     return value.reshape(lead), std.reshape(lead), smeared.reshape(lead)

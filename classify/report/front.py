@@ -190,8 +190,8 @@ def _by_dwell(test: Sets, probabilities: NDArray[np.floating]) -> dict[str, Any]
         here = test.dwell == place
         labels, mine = test.labels[here], probabilities[here]
         # the best of many looks better than it is on the records it was chosen by
-        halves = [_scores(labels[half::2], mine[half::2]) for half in (0, 1)]
-        dwells.append({**_scores(labels, mine), "chosen_by": halves[0]["balanced_accuracy"], "quoted": halves[1]})
+        chosen, quoted = (_scores(labels[half::2], mine[half::2]) for half in (0, 1))
+        dwells.append({**_scores(labels, mine), "chosen_by": chosen["balanced_accuracy"], "quoted": quoted})
         # the same false alarms, but only UAVs that show something
         strong = (labels != 0) | (test.snr_db[here] > DECLARED_SNR_DB)
         declared.append(_scores(labels[strong], mine[strong])["uav_found"]["value"])

@@ -170,6 +170,8 @@ def test_the_file_says_what_it_is_for_and_shows_any_change(small):
     assert json.loads(said["labels"]) == LABELS.tolist()
     assert (float(said["carrier_hz"]), float(said["prf_hz"]), int(said["pulses"])) == tuple(radar.values())
     assert {"classes", "envelope", "accept", "schema_sha256", "model_sha256", "calibration"} <= set(said)
+    with pytest.raises(BadInput, match="not a bladewing model"):
+        Classifier.load(out)
 
 
 def test_the_graph_needs_only_the_standard(small):
