@@ -51,8 +51,8 @@ VALUES = (
     "gear_ratio_std",
 )
 
-#: What a recording's JSON object holds of the wingbeat.
-WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std")
+#: What a recording's JSON object holds of the wingbeat and of the body's course.
+WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std", "acceleration_mps2", "acceleration_mps2_std")
 
 #: Radars that are measured [Hz]: beyond, a frequency was given in another unit.
 CARRIER_RANGE_HZ, PRF_RANGE_HZ = (1e8, 1e12), (1.0, 1e8)
@@ -161,16 +161,18 @@ class Measured:
         return {**counts, **medians, **gear, **self.over_all()}
 
     def over_all(self) -> dict[str, Any]:
-        """Wingbeat and acceleration over the whole recording; nothing where that is too short."""
+        """Wingbeat and acceleration over the whole recording; nothing where that is too short.
+
+        A rotor has no wingbeat, and the strong line that is followed may be a blade's.
+        """
         if self.beat is None:
             return {}
         combs = int(np.isfinite(self.values.chopping_hz).sum())
         # one false comb in a hundred dwells must not hide a bird
         rotor = combs > 0.1 * len(self.iq)
-        names = ("acceleration_mps2", "acceleration_mps2_std")
         beat = {name: None if rotor else _number(getattr(self.beat, name)) for name in WINGBEAT}
         reason = f"no wingbeat: a rotor in {combs} of {len(self.iq)} dwells" if rotor else str(self.beat.reason) or None
-        return beat | {name: _number(getattr(self.beat, name)) for name in names} | {"wingbeat_reason": reason}
+        return beat | {"wingbeat_reason": reason}
 
     def beat_sentence(self) -> str:
         """Wingbeat and acceleration in one line; empty where there is no wingbeat."""
@@ -192,12 +194,11 @@ class Measured:
         for column in table.columns:
             column.justify, column.no_wrap = "right", True
         console.print(Text(one_line(self.recording.name), style="bold"), soft_wrap=True)
-        silent: dict[str, int] = {}
+        silent: dict[str, list[str]] = {}
         for n in range(len(self.iq)):
             reason = str(v.reason[n])
             if reason:
-                short = reason.split(":")[0]
-                silent[short] = silent.get(short, 0) + 1
+                silent.setdefault(reason.split(":")[0], []).append(reason)
                 continue
             count = f"{v.rotor_count[n]:.0f}" if v.rotors_resolved[n] else f">={v.rotor_count[n]:.0f}"
             table.add_row(
@@ -214,8 +215,10 @@ class Measured:
             table.collapse_padding = table.__rich_measure__(console, endless).maximum > console.width
             console.width = max(console.width, table.__rich_measure__(console, endless).maximum)
             console.print(table)
-        for reason, dwells in silent.items():
-            console.print(Text(f"{counted(dwells)}: {reason}"), soft_wrap=True)
+        for short, reasons in silent.items():
+            detail = reasons[0][len(short) + 1 :].strip()
+            detail = detail and f"{': ' if len(set(reasons)) == 1 else ', e.g. '}{detail}"
+            console.print(Text(f"{counted(len(reasons))}: {short}{detail}"), soft_wrap=True)
         console.print(Text(self.sentence()), soft_wrap=True)
         if beat := self.beat_sentence():
             console.print(Text(beat), soft_wrap=True)

@@ -13,8 +13,15 @@ MAX_MPS2 = 50.0
 #: A body line must stand so high over the median of the spectrum [dB].
 LEAST_LINE_DB = 20.0
 
+#: What lies within so many bins beside the line moves it as noise of that power would: blades, wings, a background. The
+#: line must stand so high over it [dB].
+BESIDE_BINS, LEAST_OVER_BESIDE_DB = 6, 10.0
+
 #: The smear is taken out where it is over a bin, sure by so many standard deviations, and the line rises so much [dB].
 SURE_DEVIATIONS, LEAST_RISE_DB = 5.0, 2.0
+
+#: A line that is smeared over more bins than these rises when the smear is taken out; what does not is no line.
+SHOWN_STEPS = 2.5
 
 #: Pulses that a line's smear can be told from, at least.
 LEAST_PULSES = 32
@@ -89,11 +96,14 @@ def body_acceleration(
             left, middle, right = np.log(heights_at(at + share * np.array([-1, 0, 1]), one, finer=4))
             curve = 2 * middle - left - right
             at += share * (np.clip((right - left) / (2 * curve), -1, 1) if curve > 0 else 0.0)
+        beside = _beside(one, at * step, wavelength_m, prf_hz, size)
+        risen = height > float(steady.max()) * 10 ** (LEAST_RISE_DB / 10)
+        if height < beside * 10 ** (LEAST_OVER_BESIDE_DB / 10) or (abs(at) > SHOWN_STEPS and not risen):
+            continue
         value[index] = at * step
         # the line's height is pulses^2 A^2, the noise's pulses sigma^2
-        snr = height / noise / pulses
+        snr = height / max(noise, beside) / pulses
         std[index] = np.sqrt(90 / (snr * float(pulses) ** 5)) * prf_hz**2 * wavelength_m / (2 * np.pi)
-        risen = height > float(steady.max()) * 10 ** (LEAST_RISE_DB / 10)
         smeared[index] = risen and abs(value[index]) > max(step, SURE_DEVIATIONS * std[index])
     lead = samples.shape[:-1]
     return value.reshape(lead), std.reshape(lead), smeared.reshape(lead)
@@ -126,6 +136,21 @@ def without_acceleration(
 def _phase_rad(acceleration: NDArray[np.float64], pulses: int, wavelength_m: float, prf_hz: float) -> NDArray:
     time_s = (np.arange(pulses) - (pulses - 1) / 2) / prf_hz
     return np.asarray(2 * np.pi / wavelength_m * acceleration * time_s**2)
+
+
+def _beside(
+    samples: NDArray[np.complex64], acceleration_mps2: float, wavelength_m: float, prf_hz: float, size: int
+) -> float:
+    """Mean power of the bins beside the strongest line of one dwell, with an acceleration and the line taken out."""
+    pulses = len(samples)
+    steady = samples * np.exp(1j * _phase_rad(np.asarray(acceleration_mps2), pulses, wavelength_m, prf_hz))
+    spectrum = fft.fft(steady, n=size)
+    top = int((spectrum.real**2 + spectrum.imag**2).argmax())
+    left, middle, right = np.log(np.abs(spectrum[np.array([top - 1, top, top + 1]) % size]))
+    turns = (top + (right - left) / (2 * (2 * middle - left - right))) / size
+    still = steady * np.exp(-2j * np.pi * turns * np.arange(pulses))
+    rest = fft.fft(still - still.mean())
+    return float(np.mean(np.abs(rest[np.r_[1 : BESIDE_BINS + 1, -BESIDE_BINS:0]]) ** 2))
 
 
 def _sharpened(

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .chopping import CHOPPING_RANGE_HZ
 from .comb_centre import centred
 from .comb_fit import CombFit, fit_combs
-from .comb_search import best_candidate
+from .comb_search import FINE_STEPS, MIN_SPACING_BINS, SEARCHED_RATIO, best_candidate, heights, spacing_limits
 from .lines import LineSpace
 from .periodogram import LINE_DB, Periodogram
 
@@ -35,6 +36,10 @@ UNEQUAL_FACTOR = 4.0
 
 #: Among the outer half of the lines alone, they must be by this.
 OUTER_FACTOR = 2.5
+
+#: A half or a third of the spacing, where that is too fine for the search, may be the comb's nevertheless: if its lines
+#: speak for it as loudly as this beside those of the spacing found.
+FRACTIONS, FRACTION_SHARE = (2, 3), 0.9
 
 #: And so much must speak for two kinds of lines [nats]: near the noise every other one is strong by chance.
 UNEQUAL_NATS = 8.0
@@ -121,11 +126,40 @@ def of_mains(fit: CombFit, data: Periodogram, score: float) -> bool:
     return False
 
 
+def finer_spacing(data: Periodogram, fit: CombFit) -> float | None:
+    """Spacing that is too fine for the search, where lines stand between those of a comb; or None [cycles a sample].
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    fit : CombFit
+        A comb of two to three times that spacing: it holds every second or third line.
+    """
+    spacings = fit.spacing / np.array([1, *FRACTIONS])
+    if spacings[-1] * data.pulses >= MIN_SPACING_BINS:
+        return None
+    steps = 1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (FINE_STEPS * data.pulses)
+    tried = np.outer(spacings, steps)
+    scores = heights(data.contrast, tried.ravel(), np.full(tried.size, fit.centre)).reshape(tried.shape).max(axis=1)
+    finer = (spacings * data.pulses < MIN_SPACING_BINS) & (scores > FRACTION_SHARE * scores[0])
+    return float(spacings[finer][0]) if finer.any() else None
+
+
 def threshold(data: Periodogram) -> float:
     """Score a comb must exceed in this record [nats]."""
     if data.rest_half > 0:
         return THRESHOLDS[2]
     return THRESHOLDS[1] if data.centres_db[0] > LINE_DB else THRESHOLDS[0]
+
+
+def _too_short(data: Periodogram) -> str:
+    """Why no comb is sought at all."""
+    _, highest = spacing_limits(data.pulses, data.prf_hz)
+    if CHOPPING_RANGE_HZ[0] * SEARCHED_RATIO >= highest * data.prf_hz:
+        return f"PRF too low: chopping frequencies from {CHOPPING_RANGE_HZ[0]:.0f} Hz up do not fit into it"
+    least_s = MIN_SPACING_BINS * SEARCHED_RATIO / highest / data.prf_hz
+    return f"dwell too short: no chopping frequency can be told in less than {1e3 * least_s:.1f} ms at this PRF"
 
 
 def find_comb(data: Periodogram) -> tuple[Comb | None, str]:
@@ -145,7 +179,7 @@ def find_comb(data: Periodogram) -> tuple[Comb | None, str]:
     """
     start = best_candidate(data)
     if start is None:
-        return None, "dwell too short: no chopping frequency could be told from its neighbours"
+        return None, _too_short(data)
     if start.score < threshold(data):
         return None, f"no comb: evidence {start.score:.1f} below {threshold(data):.0f} nats"
     start, open_orders = centred(data, start)
@@ -156,6 +190,13 @@ def find_comb(data: Periodogram) -> tuple[Comb | None, str]:
     reach_mps = max(start.high, -start.low) * fit.spacing * data.prf_hz * data.wavelength_m / 2
     if reach_mps < LEAST_REACH_MPS:
         return None, f"no rotor: lines reach {reach_mps:.1f} m/s, rotors {LEAST_REACH_MPS:.0f} m/s and more"
+    finer = finer_spacing(data, fit)
+    if finer is not None:
+        least_s = MIN_SPACING_BINS / finer / data.prf_hz
+        return None, (
+            f"dwell too short: lines {fit.spacing * data.prf_hz:.0f} Hz apart with others between them, "
+            f"a dwell of {1e3 * least_s:.0f} ms tells them apart"
+        )
     if of_mains(fit, data, start.score):
         return None, f"no rotor: lines every {fit.spacing * data.prf_hz:.1f} Hz may be the mains"
     seen = fit.amplitudes + LineSpace(fitted[1]).at(fit.frequencies)[0]

@@ -17,6 +17,9 @@ from .periodogram import Periodogram
 #: Lines nearer than this are not told apart [bins].
 MIN_SPACING_BINS = 3.0
 
+#: The largest spacing sought is so many times the smallest, or none is sought.
+SEARCHED_RATIO = 1.5
+
 #: Shares of the whole span within which lines are sought: noise outside a comb's band only hides it.
 BANDS = (1.0, 0.5, 0.25, 0.125)
 
@@ -294,7 +297,7 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     Any line of the comb may pass for its centre: see `comb_centre`.
     """
     low, high = spacing_limits(data.pulses, data.prf_hz)
-    if low * 1.5 >= high:
+    if low * SEARCHED_RATIO >= high:
         return None
     evidence = data.contrast
     tried = [(coarse_spacings(data, evidence, centre), centre) for centre in data.centres]

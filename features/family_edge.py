@@ -31,6 +31,9 @@ MIXED_LINES = 0.25
 #: Lines of unlike orders nearer than this [bins] cover one another.
 COVERED_BINS = 1.5
 
+#: Lines stronger by this than the one on the other side and than most of so many beside it are another target's.
+FOREIGN_FACTOR, FOREIGN_ORDERS = 10.0, 8
+
 #: Lines are looked for so far from the body [cycles a sample]. A family that still stands there at this share of its
 #: mean power, by so many deviations of the noise, has no edge to be seen: it fills the span, and what lies beyond has
 #: been folded back between its lines.
@@ -83,7 +86,9 @@ def edge_of_lines(
     fitted = np.stack([_amplitudes_at(fit, per_turn * sides) for fit in fits])
     left = LineSpace(rest).at(frequency.ravel())[0].reshape(frequency.shape)
     usable = data.usable(frequency) & ~_covered(spacings, order, data.pulses)[:, None]
-    total = np.where(usable, np.abs(left + fitted) ** 2 * data.pulses, 0.0).sum(axis=(0, 1))
+    power = np.abs(left + fitted) ** 2 * data.pulses
+    usable &= ~_foreign(np.where(usable, power, 0.0).sum(axis=0), usable.sum(axis=0))
+    total = np.where(usable, power, 0.0).sum(axis=(0, 1))
     noise = np.where(usable, data.level_of(rest)(frequency), 0.0).sum(axis=(0, 1))
     number = usable.sum(axis=(0, 1)).astype(float)
     # where the single rotors' lines lie in one another they add up: those orders stand too high beside the outer ones
@@ -108,6 +113,24 @@ def _covered(spacings: NDArray[np.float64], order: NDArray[np.intp], pulses: int
     there = np.rint(order * own / others)
     away = np.abs(order * own - there * others) * pulses
     return np.asarray(((there != order) & (away < COVERED_BINS)).any(axis=1))
+
+
+def _foreign(power: NDArray[np.float64], number: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """True where another target's echo lies on an order, shape (sides, orders).
+
+    Parameters
+    ----------
+    power : ndarray, shape (2, orders)
+        Power of the lines on each side of the body, summed over so many as `number`.
+    """
+    known = number > 0
+    mean = np.where(known, power / np.maximum(number, 1e-9), np.inf)
+    around = np.pad(mean, ((0, 0), (FOREIGN_ORDERS, FOREIGN_ORDERS)), constant_values=np.inf)
+    near = np.sort(np.lib.stride_tricks.sliding_window_view(around, 2 * FOREIGN_ORDERS + 1, axis=-1), axis=-1)
+    middle = np.isfinite(near).sum(axis=-1) // 2
+    median = np.take_along_axis(near, middle[..., None], axis=-1)[..., 0]
+    # a rotor's lines are about as strong as their neighbours on one side, or as those on the other
+    return np.asarray(known & (mean > FOREIGN_FACTOR * np.maximum(median, mean[::-1])))
 
 
 def _fills_span(
@@ -179,14 +202,13 @@ def edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | Non
     spread = max(rotors.spread, LEAST_SPREAD * nominal)
     half_bins = min(nominal * pulses / 2, 1 + comb.last / comb.per_turn * spread * pulses)
     half = int(half_bins * size / pulses)
-    total, number = np.zeros(len(order)), np.zeros(len(order))
-    for sign in (-1, 1):
-        middle = np.rint((centre + sign * order * nominal) * size).astype(np.intp)
-        frequency = (middle[:, None] + np.arange(-half, half + 1)) / size
-        usable = data.usable(frequency)
-        power = data.at(frequency) * data.level_at(frequency)
-        total += np.where(usable, power, 0.0).sum(axis=1) * pulses / size
-        number += usable.sum(axis=1) * pulses / size
+    middle = np.rint((centre + np.array([[-1], [1]]) * order * nominal) * size).astype(np.intp)
+    frequency = (middle[..., None] + np.arange(-half, half + 1)) / size
+    usable = data.usable(frequency)
+    sides = np.where(usable, data.at(frequency) * data.level_at(frequency), 0.0).sum(axis=-1) * pulses / size
+    numbers = usable.sum(axis=-1) * pulses / size
+    own = ~_foreign(sides, numbers)
+    total, number = (sides * own).sum(axis=0), (numbers * own).sum(axis=0)
     seen = number > 2
     count = number[seen]
     # what lies between the lines lifts the local level, and lines that fill most of the span the floor; the lowest

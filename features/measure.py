@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .bandwidth import threshold_band_hz
+from .body_velocity import body_velocity
 from .chopping import Chopping
 from .comb import LEAST_REACH_MPS, find_comb
-from .comb_fit import CombFit
 from .family_edge import SPAN, edge_around, edge_of_lines, surer_edge
 from .helicopter import find_gear
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .one_thread import one_thread
-from .periodogram import LINE_DB, Periodogram, prepared
+from .periodogram import prepared
 from .rotors import MAX_ROTORS
 from .smearing import smearing_index
 from .spectrum import LEAST_PART, Spectrum, as_complex, doppler_spectrum, largest_part
@@ -25,6 +25,9 @@ PAPER_THRESHOLD_DB = 20.0
 
 #: A fitted edge that may be so far out [cycles a sample] by so many of its deviations may be none.
 FURTHEST_EDGE, EDGE_DEVIATIONS = 0.48, 3.0
+
+#: The fields of the body's velocity and its deviation.
+BODY = ("body_velocity_mps", "body_velocity_mps_std")
 
 #: Blade counts listed where none is given.
 BLADE_CHOICES = (1, 2, 3, 4, 5)
@@ -235,7 +238,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
                 f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s",
             )
     if comb is None:
-        return out | _body(data, None)
+        return out | dict(zip(BODY, body_velocity(data, spectrum, None), strict=True))
     out["chopping_hz"], out["chopping_hz_std"] = comb.chopping * prf_hz, comb.chopping_std * prf_hz
     out["comb_order"] = float(comb.last // comb.per_turn)
     out["comb_snr_db"] = float(10 * np.log10(max(comb.fit.snr.sum() / data.pulses, 1e-9)))
@@ -249,7 +252,9 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
             out[f"{name}_chopping_hz"], out[f"{name}_chopping_hz_std"] = rate * prf_hz, std * prf_hz
         out["gear_ratio"], out["gear_ratio_std"] = gear.ratio, gear.ratio_std
     count = len(rotors.rates)
-    out |= _body(data, rotors.fits[0] if count > 1 else comb.fit, steady=rotors.resolved, open_std=comb.body_std)
+    middle = rotors.fits[0] if count > 1 else comb.fit
+    velocity = body_velocity(data, spectrum, middle, steady=rotors.resolved, open_std=comb.body_std)
+    out |= dict(zip(BODY, velocity, strict=True))
     if count > 1:
         # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
         out["chopping_hz"] = float(rotors.rates.mean()) * prf_hz
@@ -298,24 +303,3 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     )
     out["smearing_index"] = float(index)
     return out
-
-
-def _body(data: Periodogram, fit: CombFit | None, *, steady: bool = True, open_std: float = 0.0) -> dict[str, float]:
-    """The body's velocity: from its own line, or from the comb's centre where background may hide that line; or NaN.
-
-    Of unresolved rotors, or a rate that is not steady, the centre has no true deviation. `open_std` is what the choice
-    of the comb's centre adds [cycles a sample].
-    """
-    own, level_db = data.centres[0], data.centres_db[0]
-    # the bound of a single line's frequency, and what its interpolation between bins is off by
-    snr = 10 ** (level_db / 10)
-    own_std = float(np.hypot(np.sqrt(1.5 / snr) / np.pi, 0.01)) / data.pulses
-    turns, std = own, own_std
-    if fit is None and level_db < LINE_DB:
-        return {"body_velocity_mps": np.nan, "body_velocity_mps_std": np.nan}
-    if fit is not None:
-        offset = (own - fit.centre) * data.pulses
-        if abs(offset) > 1.0 or (steady and fit.centre_std < own_std):
-            turns, std = fit.centre, fit.centre_std
-    scale = data.prf_hz * data.wavelength_m / 2
-    return {"body_velocity_mps": -turns * scale, "body_velocity_mps_std": float(np.hypot(std, open_std)) * scale}

@@ -30,6 +30,9 @@ THINNED_BINS = 4
 #: Half width taken out about the body line [m/s]. A body is steadier than the clutter about velocity zero.
 BODY_NOTCH_MPS = 0.5
 
+#: A second body's line stands so far over all others but the first one's [dB]: a bird's beside a drone, or a drone's.
+OTHER_OVER_DB = 8.0
+
 #: Transform length in units of the dwell: between two bins a line loses 0.2 dB.
 PADDING = 4
 
@@ -277,6 +280,22 @@ def without_clicks(samples: NDArray[np.complex128]) -> NDArray[np.complex128]:
     return without if after < EMPTY_RISE * before else samples
 
 
+def _other_body(spectrum: Spectrum, known: list[float], half_bins: float) -> Body | None:
+    """A line that stands out of all others beside these [cycles a sample], each with so much about it: another body."""
+    place = spectrum.frequency_hz / spectrum.prf_hz
+    left = spectrum.relative_power
+    for number in range(2):
+        away = place - np.array(known)[:, None]
+        near = (np.abs(away - np.rint(away)) * spectrum.pulses <= half_bins).any(axis=0)
+        left = np.where(near, np.float32(0), left)
+        if number:
+            break
+        line = body_line(replace(spectrum, relative_power=left))
+        known = [*known, float(-2 * line.velocity_mps / spectrum.wavelength_m / spectrum.prf_hz)]
+    over_db = float(line.level_db) - 10 * float(np.log10(max(left.max(initial=0), 1.0)))
+    return line if line.level_db > LINE_DB and over_db > OTHER_OVER_DB else None
+
+
 def prepare(iq: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float) -> Periodogram | None:
     """Make one record ready: find the body line, take it and the static background out, whiten.
 
@@ -339,6 +358,9 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
             centres.append((turns(line), float(line.level_db)))
     else:
         centres.append((turns(body), float(body.level_db)))
+    other = _other_body(spectrum, [turn for turn, _ in centres], max(rest_half if bands else 0.0, LOBE_BINS))
+    if other is not None:
+        centres.append((turns(other), float(other.level_db)))
     centres.sort(key=lambda c: -c[1])
     bands += [
         (turn, half_bins(BODY_NOTCH_MPS))

@@ -1,0 +1,113 @@
+"""The body's velocity with a deviation that knows what else may be the body's line, and what lies beside it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .comb_fit import CombFit
+from .notch import LOBE_BINS
+from .periodogram import LINE_DB, Periodogram
+from .spectrum import KAISER_BETA, NOISE_BANDWIDTH_BINS, Spectrum
+
+#: What the interpolation between bins is off by [bins], and by how much noise moves it where a line stands at its floor
+#: [bins]: it falls with the line's amplitude. The window makes it 2.5 times the bound of a line's frequency.
+INTERPOLATION_BINS, NOISE_BINS = 0.01, 0.68
+
+#: And what the slow part of a background moves it by, where a line lies in one: leaves in a wind [bins].
+BACKGROUND_BINS = 0.05
+
+#: Where the body's line and its comb's centre differ by so many deviations, the comb is not one.
+APART_DEVIATIONS = 3.0
+
+#: Without a comb that tells which line is the body's, one that is so much weaker than the strongest is as likely
+#: beside it as 1 to e, and none that is weaker by more than the second [dB].
+RIVAL_DB, WEAKEST_DB = 2.0, 8.0
+
+#: Lines from and up to so far off pull at the body's [bins]: nearer ones are one with it, the lobe ends further out.
+BESIDE_BINS = (1.5, 8.0)
+
+#: Noise beside the line is hardly above this, in units of the floor: the bound of the line's frequency knows it.
+NOISE_BESIDE = 4.0
+
+
+def body_velocity(
+    data: Periodogram, spectrum: Spectrum, fit: CombFit | None, *, steady: bool = True, open_std: float = 0.0
+) -> tuple[float, float]:
+    """The body's velocity: from its own line, or from the comb's centre where background may hide that line.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    spectrum : Spectrum
+        The spectrum that it was made from.
+    fit : CombFit, optional
+        The rotor's comb, or that of one of several; None where there is none.
+    steady : bool
+        False for unresolved rotors, or a rate that is not steady: the comb's centre has no true deviation then.
+    open_std : float
+        What the choice of the comb's centre adds to the deviation [cycles a sample].
+
+    Returns
+    -------
+    velocity_mps, std_mps : float
+        Positive when the range grows; NaN where no line stands out.
+    """
+    own, level_db = data.centres[0], data.centres_db[0]
+    if fit is None and level_db < LINE_DB:
+        return np.nan, np.nan
+    noise_bins = NOISE_BINS * 10 ** (-level_db / 20)
+    at_rest_bins = BACKGROUND_BINS if abs(own) < data.rest_half else 0.0
+    own_std = float(np.linalg.norm([noise_bins, INTERPOLATION_BINS, at_rest_bins, _pulled_bins(spectrum, own)]))
+    turns, std = own, own_std / data.pulses
+    if fit is None:
+        open_std = _rivals_std(spectrum, own)
+    else:
+        offset = abs(own - fit.centre)
+        # rotors that were taken for one move its comb
+        apart = offset if offset > APART_DEVIATIONS * np.hypot(std, fit.centre_std) else 0.0
+        if offset * data.pulses > 1.0:
+            turns, std = fit.centre, fit.centre_std
+        elif steady and fit.centre_std < std:
+            turns, std = fit.centre, float(np.hypot(fit.centre_std, apart))
+    scale = data.prf_hz * data.wavelength_m / 2
+    return -turns * scale, float(np.hypot(std, open_std)) * scale
+
+
+def _lobe(bins: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Amplitude of the window's main lobe (Kaiser and Schafer 1980)."""
+    root = np.sqrt(np.maximum(KAISER_BETA**2 - (np.pi * bins) ** 2, 1e-9))
+    return np.asarray(np.sinh(root) / root * (KAISER_BETA / np.sinh(KAISER_BETA)))
+
+
+def _bins_from(spectrum: Spectrum, place: float) -> NDArray[np.float64]:
+    """Distance of each bin from a frequency [cycles a sample], around the circle [bins]."""
+    away = spectrum.frequency_hz / spectrum.prf_hz - place
+    return np.asarray((away - np.rint(away)) * spectrum.bins, np.float64)
+
+
+def _pulled_bins(spectrum: Spectrum, own: float) -> float:
+    """How far lines beside a line may pull the top of its lobe [bins].
+
+    A share d of the amplitude at one of the two bins beside the top moves the parabola's top by d over twice its curve.
+    """
+    away = np.abs(_bins_from(spectrum, own))
+    near = (away >= BESIDE_BINS[0]) & (away <= BESIDE_BINS[1])
+    if not near.any():
+        return 0.0
+    top = float(spectrum.relative_power[away <= 1].max())
+    seen = np.sqrt(spectrum.relative_power[near] / top)
+    unlike = np.sqrt(np.maximum((seen - _lobe(away[near])) ** 2 - NOISE_BESIDE / top, 0))
+    share = float((unlike * _lobe(away[near] - 1)).max(initial=0)) / float(_lobe(np.array(1.0)))
+    curve = np.pi / NOISE_BANDWIDTH_BINS**2
+    return share / (2 * curve)
+
+
+def _rivals_std(spectrum: Spectrum, own: float) -> float:
+    """Deviation of a line's place, where others may be the body's as well [cycles a sample]."""
+    power, level_db = spectrum.relative_power, spectrum.level_db
+    away = _bins_from(spectrum, own)
+    tops = (power >= np.roll(power, 1)) & (power >= np.roll(power, -1)) & (np.abs(away) > LOBE_BINS)
+    highest_db = float(level_db[np.abs(away) <= 1].max())
+    rivals = tops & (level_db > max(highest_db - WEAKEST_DB, LINE_DB))
+    likely = np.exp((np.minimum(level_db[rivals], highest_db) - highest_db) / RIVAL_DB)
+    return float(np.sqrt((likely * away[rivals] ** 2).sum() / (1 + likely.sum()))) / spectrum.bins

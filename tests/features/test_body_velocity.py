@@ -1,0 +1,71 @@
+import numpy as np
+import pytest
+from bladewing.features import measure
+from bladewing.features.body_velocity import NOISE_BINS
+from bladewing.features.spectrum import KAISER_BETA
+
+from .signals import CARRIER_HZ, PRF_HZ, WAVELENGTH_M, white
+
+RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+PULSES = 700
+BIN_MPS = PRF_HZ / PULSES * WAVELENGTH_M / 2
+
+
+def lines(rng, draws, *, snr_db, beside=()):
+    """A body's line of this level over the noise and others (bins off, amplitude) beside it, and its velocities."""
+    velocity_mps = rng.uniform(-30, 30, draws)
+    time_s = np.arange(PULSES) / PRF_HZ
+    iq = np.sqrt(PULSES) * 10 ** (-snr_db / 20) * white(rng, draws, PULSES)
+    for away_bins, amplitude in ((0.0, 1.0), *beside):
+        turns = -2 * (velocity_mps[:, None] - away_bins * BIN_MPS) / WAVELENGTH_M * time_s
+        iq += amplitude * np.exp(2j * np.pi * (turns + rng.uniform(size=(draws, 1))))
+    return iq, velocity_mps
+
+
+def normalised(iq, velocity_mps):
+    found = measure(iq, **RADAR)
+    return (found.body_velocity_mps - velocity_mps) / found.body_velocity_mps_std
+
+
+@pytest.mark.parametrize("snr_db", [23.0, 26.0, 30.0])
+def test_the_deviation_of_a_line_in_noise_is_true(snr_db):
+    errors = normalised(*lines(np.random.default_rng(int(snr_db)), 60, snr_db=snr_db))
+    # chi-squared of 60 degrees of freedom over 60 lies within 0.53..1.63 in 99.8 %
+    assert 0.53 < np.mean(errors**2) < 1.63
+
+
+def test_the_noise_of_the_interpolation_follows_from_the_window():
+    # brute force: the three bins about a line that lies anywhere between two of them, with little noise and without
+    rng = np.random.default_rng(3)
+    pulses, draws = 256, 4000
+    window, time = np.kaiser(pulses, KAISER_BETA), np.arange(pulses)
+    clean = np.exp(2j * np.pi * rng.uniform(-0.5, 0.5, (draws, 1)) / pulses * time)
+    bins = np.exp(-2j * np.pi * np.array([[-1], [0], [1]]) / pulses * time) * window
+    tops = []
+    for iq in (clean, clean + 1e-3 * white(rng, draws, pulses)):
+        left, middle, right = np.log(np.abs(bins @ iq.T))
+        tops.append((right - left) / (2 * (2 * middle - left - right)))
+    level = np.exp(2 * middle) / (window**2).sum() * 1e6
+    errors = (tops[1] - tops[0]) * np.sqrt(level)
+    assert np.sqrt(np.mean(errors**2)) == pytest.approx(NOISE_BINS, rel=0.03)
+
+
+@pytest.mark.parametrize("beside", [((2.5, 0.3), (-2.5, 0.3)), ((3.0, 0.7),), ((-4.0, 0.7), (4.0, 0.7))])
+def test_lines_beside_the_body_show_in_its_deviation(beside):
+    rng = np.random.default_rng(4)
+    errors = normalised(*lines(rng, 60, snr_db=40, beside=beside))
+    assert np.mean(np.abs(errors) > 4) < 0.05
+
+
+def test_without_a_comb_a_line_as_strong_may_be_the_body_as_well():
+    rng = np.random.default_rng(5)
+    iq, velocity_mps = lines(rng, 20, snr_db=35, beside=((80.0, 1.05),))
+    found = measure(iq, **RADAR)
+    combless = np.isnan(found.chopping_hz)
+    assert combless.sum() > 15
+    off_mps = np.abs(found.body_velocity_mps - velocity_mps)[combless]
+    assert off_mps.max() > 50  # the other one is the stronger
+    assert (off_mps < 4 * found.body_velocity_mps_std[combless]).all()
+    # one that is far weaker says nothing
+    alone = measure(lines(rng, 20, snr_db=35, beside=((80.0, 0.3),))[0], **RADAR)
+    assert np.median(alone.body_velocity_mps_std) < 0.05
