@@ -89,14 +89,19 @@ class Envelope:
         wavelength_m = SPEED_OF_LIGHT_MPS / carrier_hz
         unambiguous_mps = wavelength_m * prf_hz / 4
         if not self.carrier_min_hz <= carrier_hz <= self.carrier_max_hz:
-            if self.carrier_min_hz <= carrier_hz * 1e9 <= self.carrier_max_hz:
-                return f"carrier {carrier_hz:g} Hz is no radar's: give {carrier_hz:g} GHz as {carrier_hz:g}e9"
+            for unit, power in (("GHz", 9), ("MHz", 6)):
+                if self.carrier_min_hz <= carrier_hz * 10.0**power <= self.carrier_max_hz:
+                    return (
+                        f"carrier {carrier_hz:g} Hz is no radar's: give {carrier_hz:g} {unit} as {carrier_hz:g}e{power}"
+                    )
             return (
                 f"carrier {carrier_hz / 1e9:g} GHz is outside {self.carrier_min_hz / 1e9:g} to "
                 f"{self.carrier_max_hz / 1e9:g} GHz, the bands this model was trained for: use or train another model"
             )
         if prf_hz < self.prf_min_hz:
-            return f"PRF {prf_hz:g} Hz is below {self.prf_min_hz:g} Hz: {self._raise_prf(carrier_hz)}"
+            in_khz = self.prf_min_hz <= prf_hz * 1e3 <= self.prf_max_hz
+            cure = f"give {prf_hz:g} kHz as {prf_hz:g}e3, or " if in_khz else ""
+            return f"PRF {prf_hz:g} Hz is below {self.prf_min_hz:g} Hz: {cure}{self._raise_prf(carrier_hz)}"
         if prf_hz > self.prf_max_hz:
             step = math.ceil(prf_hz / self.prf_max_hz)
             return (

@@ -17,7 +17,7 @@ from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 from .errors import BadInput, one_line
 from .predict import checked_dwell_s, distinct
 from .progress import Progress
-from .recording import Recording, load_recording
+from .recording import Recording, left_out_sentence, load_recording
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -158,7 +158,7 @@ class Measured:
         pair = ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
         gear = {name: _median(getattr(self.values, name)[geared]) for name in pair}
         counts = {"dwells": len(self.iq), "with_comb": int(held.sum()), "with_second_comb": int(geared.sum())}
-        return {**counts, **medians, **gear, **self.over_all()}
+        return {**counts, "left_out_s": self.recording.left_out_s(self.iq), **medians, **gear, **self.over_all()}
 
     def over_all(self) -> dict[str, Any]:
         """Wingbeat and acceleration over the whole recording; nothing where that is too short.
@@ -219,6 +219,8 @@ class Measured:
             detail = reasons[0][len(short) + 1 :].strip()
             detail = detail and f"{': ' if len(set(reasons)) == 1 else ', e.g. '}{detail}"
             console.print(Text(f"{counted(len(reasons))}: {short}{detail}"), soft_wrap=True)
+        if left_out := left_out_sentence(self.recording.left_out_s(self.iq)):
+            console.print(Text(left_out), soft_wrap=True)
         console.print(Text(self.sentence()), soft_wrap=True)
         if beat := self.beat_sentence():
             console.print(Text(beat), soft_wrap=True)
@@ -357,7 +359,7 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     Parameters
     ----------
     recording
-        One range cell. A rest shorter than a dwell is dropped, but a recording shorter than one dwell is taken whole.
+        One range cell. A rest shorter than a dwell is left out, but a recording shorter than one dwell is taken whole.
     settings
         What is asked.
     progress

@@ -14,7 +14,7 @@ from bladewing.features.wingbeat import wingbeat
 from .errors import BadInput, one_line
 from .fusion import LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
-from .recording import Recording, find_recording, load_recording
+from .recording import Recording, find_recording, left_out_sentence, load_recording
 from .samples import positive
 from .track import Track, fuse
 
@@ -67,6 +67,8 @@ class Answer:
         What that is [Hz], by the keys of `ODDS`: about what the chopping frequency of a comb is that stays (of several
         rotors, one's), the rate of wings, of a body that heaves or of a walker's steps. The last three are sought in
         1.5 s and more.
+    left_out_s
+        The end of the recording that is shorter than a dwell [s].
     """
 
     name: str
@@ -75,6 +77,7 @@ class Answer:
     dwells: "Prediction"
     track: Track
     shown: Mapping[str, float] = field(default_factory=dict)
+    left_out_s: float = 0.0
 
     @property
     def declared_s(self) -> float | None:
@@ -108,6 +111,7 @@ class Answer:
             "wingbeat_hz": rates.get("wings"),
             "heave_hz": rates.get("heaves", rates.get("steps")),
             "steps": "steps" in rates,
+            "left_out_s": self.left_out_s,
         }
         yield {"file": self.name, "track": track}
 
@@ -140,6 +144,8 @@ class Answer:
         if self.track.reason:
             line.append(f"  ({self.track.reason})")
         console.print(line)
+        if left_out := left_out_sentence(self.left_out_s):
+            console.print(Text(left_out))
         for name, rate_hz in self.shown.items():
             whose, odds = ODDS[name]
             said = f"{_SHOWN[name].format(rate_hz)}: the odds of {_WHOSE[whose]} count {odds:g} times"
@@ -177,7 +183,7 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
         The model to ask.
     dwell_s
         Length of a dwell [s], above 0. Dwells follow one another without overlap; a rest shorter than a dwell is
-        dropped, but a recording shorter than one dwell is taken whole.
+        left out, but a recording shorter than one dwell is taken whole.
 
     Raises
     ------
@@ -210,7 +216,7 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
         dwell_s=wanted / recording.prf_hz,
     )
     stop_s = start_s + wanted / recording.prf_hz
-    return Answer(recording.name, start_s, stop_s, dwells, track, shown)
+    return Answer(recording.name, start_s, stop_s, dwells, track, shown, recording.left_out_s(iq))
 
 
 def long_look(iq: np.ndarray, carrier_hz: float, prf_hz: float) -> dict[str, float]:

@@ -38,7 +38,7 @@ class Recording:
     start_s: float = 0.0
 
     def dwells(self, dwell_s: float, least: int = 1) -> NDArray[np.complex64]:
-        """Cut the recording into dwells that follow one another; a rest shorter than a dwell is dropped.
+        """Cut the recording into dwells that follow one another; a rest shorter than a dwell is left out.
 
         Parameters
         ----------
@@ -63,6 +63,21 @@ class Recording:
         pulses = max(least, round(min(dwell_s * self.prf_hz, len(self.iq))))
         count = len(self.iq) // pulses
         return self.iq[: count * pulses].reshape(count, pulses)
+
+    def left_out_s(self, dwells: NDArray[np.complex64]) -> float:
+        """What `dwells` left out at the end [s]."""
+        return round((len(self.iq) - dwells.size) / self.prf_hz, 9)
+
+
+def left_out_sentence(left_out_s: float) -> str:
+    """What was left out of a recording in words; empty where it was nothing.
+
+    Examples
+    --------
+    >>> left_out_sentence(0.02)
+    'the last 0.02 s, shorter than a dwell, are left out'
+    """
+    return f"the last {left_out_s:.2g} s, shorter than a dwell, are left out" if left_out_s else ""
 
 
 def load_recording(

@@ -9,11 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import BadInput
-from .files import write_together
+from .files import read_bounded, write_together
 
 if TYPE_CHECKING:
     from bladewing.simulate.render import Rendering
     from bladewing.simulate.scene import Scene
+
+#: Under this name the writer of a recording stands in its metadata.
+RECORDER = "bladewing simulate"
+
+#: More metadata than this no rendering has [bytes].
+MOST_META_BYTES = 16 << 20
 
 #: Version of the fields under "bladewing:".
 EXTENSION_VERSION = "1.0.0"
@@ -40,13 +46,16 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
     Raises
     ------
     BadInput
-        The folder is missing or cannot be written to, or a sample is not finite.
+        The folder is missing or cannot be written to, a sample is not finite, or a recording of that name was not made
+        by a rendering.
     """
     name = re.sub(r"\.sigmf(-meta|-data)?$", "", stem.name)
     if not name or name == "..":
         raise BadInput(f"{stem}: no name for the recording: give --out NAME")
     if not np.isfinite(rendering.iq).all():
         raise BadInput(f"{stem}: the scene's samples exceed what complex64 holds: lower its levels")
+    if foreign := _foreign(stem.parent / f"{name}.sigmf-meta", stem.parent / f"{name}.sigmf-data"):
+        raise BadInput(f"{foreign} is there and was not simulated: it is not written over: give another --out NAME")
     data = rendering.iq.astype("<c8").tobytes()
     meta = metadata(rendering, scene, seed, hashlib.sha512(data).hexdigest())
     text = json.dumps(meta, indent=2, allow_nan=False) + "\n"
@@ -56,6 +65,17 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
     except OSError as error:
         raise BadInput(f"{stem}: cannot be written: {error.strerror or error}: give a folder that exists") from None
     return [stem.parent / file for file in files]
+
+
+def _foreign(meta: Path, data: Path) -> Path | None:
+    """The file of a recording that is there and was not made by a rendering, or None."""
+    if not meta.exists():
+        return data if data.exists() else None
+    try:
+        recorder = json.loads(read_bounded(meta, MOST_META_BYTES))["global"]["core:recorder"]
+    except (OSError, ValueError, LookupError, TypeError):
+        return meta
+    return None if recorder == RECORDER else meta
 
 
 def metadata(rendering: "Rendering", scene: "Scene", seed: int, sha512: str) -> dict[str, Any]:
@@ -69,7 +89,7 @@ def metadata(rendering: "Rendering", scene: "Scene", seed: int, sha512: str) -> 
             "core:version": "1.2.0",
             "core:sha512": sha512,
             "core:description": scene.title or "simulated scene",
-            "core:recorder": "bladewing simulate",
+            "core:recorder": RECORDER,
             "core:extensions": [{"name": "bladewing", "version": EXTENSION_VERSION, "optional": True}],
             "bladewing:seed": seed,
             "bladewing:scene": scene.model_dump(mode="json"),

@@ -17,6 +17,9 @@ from .receiver import FAULT_CHANCE
 #: Size of any number, at most: beyond every scene, and its samples are finite still.
 MOST = 1e12
 
+#: A carrier below this was given in another unit [Hz].
+LEAST_CARRIER_HZ = 1e6
+
 #: Scatterers of a blade that is a row of them, at most.
 MOST_POINTS = 1000
 
@@ -53,6 +56,13 @@ class RadarPart(Part):
     carrier_hz: Positive
     prf_hz: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1e9)]
     pulses: Annotated[int, Field(strict=True, ge=1, le=10_000_000)]
+
+    @field_validator("carrier_hz")
+    @classmethod
+    def _of_a_radar(cls, value: float) -> float:
+        if value < LEAST_CARRIER_HZ:
+            raise ValueError(f"{value:g} Hz is no radar's: it must be {LEAST_CARRIER_HZ:g} Hz or more: 10 GHz is 10e9")
+        return value
 
 
 class BodyPart(Part):

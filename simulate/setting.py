@@ -11,6 +11,9 @@ from .receiver import FAULT_CHANCE
 
 _SOUND_MPS = 340.0
 
+#: A PRF below this may have been given in kHz [Hz].
+_LEAST_PRF_HZ = 100.0
+
 #: Names that random streams of the receiver go by.
 _RESERVED = ("noise", "jitter", "receiver")
 
@@ -97,6 +100,8 @@ class Setting(BaseModel):
     def warnings(self) -> list[str]:
         """What is right but may not be meant: one line each."""
         radar, said = self.sight, []
+        if radar.prf_hz < _LEAST_PRF_HZ:
+            said.append(f"radar.prf_hz is {radar.prf_hz:g}: in Hz, so that {radar.prf_hz:g} kHz is {radar.prf_hz:g}e3")
         for part in self.uavs:
             for number, rotor in enumerate(part.rotors):
                 where = f"{part.name}: rotors[{number}]"

@@ -148,8 +148,9 @@ def page(cells: list[Cell]) -> str:
     style = (
         "body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;padding:0 1rem;color:#1b1f24}"
         "table{border-collapse:collapse;width:100%;margin:.5rem 0 2rem}th,td{text-align:left;padding:.25rem .6rem;"
-        "border-bottom:1px solid #d9dee4;vertical-align:top}td:nth-child(3){font-variant-numeric:tabular-nums}"
-        ".no{background:#fbe3e0}"
+        "border-bottom:1px solid #d9dee4;vertical-align:top}td{font-variant-numeric:tabular-nums}"
+        "td:not(:nth-child(3),:last-child),.number{white-space:nowrap}.no{background:#fbe3e0}"
+        "@media(max-width:60rem){table{display:block;overflow-x:auto}td:last-child{min-width:18rem}}"
     )
     parts = [
         "<!doctype html><html lang=en><meta charset=utf-8><title>Stability</title>",
@@ -161,6 +162,9 @@ def page(cells: list[Cell]) -> str:
         parts.append(f"<h2>{html.escape(stage)}</h2><p>Error: {html.escape(measure)}.</p><table><tr>{heads}")
         for cell in group:
             kind = "" if cell.holds else " class=no"
-            parts.append(f"<tr{kind}>" + "".join(f"<td>{html.escape(text)}" for text in _row(cell)))
+            cells_of_row = [f"<td>{html.escape(text)}" for text in _row(cell)]
+            if cell.error is not None and not cell.warned:  # a number breaks nowhere, a reason may
+                cells_of_row[2] = cells_of_row[2].replace("<td>", "<td class=number>", 1)
+            parts.append(f"<tr{kind}>" + "".join(cells_of_row))
         parts.append("</table>")
     return "\n".join(parts) + "\n"

@@ -61,14 +61,16 @@ def refused(result, said: str) -> None:
 
 
 def test_one_line_a_dwell_and_a_closing_line(run_json, sigmf_pair):
-    meta = sigmf_pair()  # 4000 pulses at 20 kHz: 0.2 s, two dwells of 0.08 s and a rest that is dropped
+    meta = sigmf_pair()  # 4000 pulses at 20 kHz: 0.2 s, two dwells of 0.08 s and a rest that is left out
     first, second, closing = run_json(meta)
     said = {"file": str(meta), "label": "uav", "probabilities": {"uav": 0.8, "bird": 0.15, "clutter": 0.05}}
     assert first == said | {"start_s": 0.0, "stop_s": 0.08, "reason": None}
     assert second == said | {"start_s": 0.08, "stop_s": 0.16, "reason": None}
     assert list(first) == ["file", "start_s", "stop_s", "label", "probabilities", "reason"]
     assert list(closing) == ["file", "track"]
-    assert list(closing["track"]) == ["label", "probabilities", "dwells", "declared", "declared_s", *STILL]
+    told = ["label", "probabilities", "dwells", "declared", "declared_s", *STILL, "left_out_s"]
+    assert list(closing["track"]) == told
+    assert closing["track"]["left_out_s"] == 0.04
     assert (closing["track"]["label"], closing["track"]["dwells"]) == ("uav", 2)
     assert (closing["track"]["declared"], closing["track"]["declared_s"]) == ("uav", 0.08)
     assert list(closing["track"]["probabilities"]) == NAMES
@@ -107,7 +109,7 @@ def test_outside_the_envelope_is_answered_unknown_with_the_cure(run_json, sigmf_
     }
     assert dwells[0]["probabilities"] == dict.fromkeys(NAMES, 0.333333)
     nothing = {"label": "unknown", "probabilities": dict.fromkeys(NAMES, 0.333333), "declared": None}
-    assert closing["track"] == nothing | {"dwells": 4, "declared_s": None} | STILL
+    assert closing["track"] == nothing | {"dwells": 4, "declared_s": None, "left_out_s": 0.0} | STILL
 
 
 def test_a_dwell_too_short_is_unknown(run_json, sigmf_pair):
@@ -133,6 +135,7 @@ def test_a_silent_dwell_is_unknown_and_left_out_of_the_track(run_json, sigmf_pai
     assert closing["track"] == said | {
         "declared": "uav",
         "declared_s": 0.16,
+        "left_out_s": 0.0,
         **STILL,
     }  # the silent dwell took its time
 

@@ -64,6 +64,24 @@ def test_the_name_of_a_recording_may_carry_a_suffix_of_sigmf(scene_file, tmp_pat
     assert set(capsys.readouterr().out.split()) == written == {str(path) for path in tmp_path.glob("rec*")}
 
 
+@pytest.mark.parametrize("held", ["rec.sigmf-data", "rec.sigmf-meta", "both", "another"])
+def test_a_recording_that_was_not_simulated_is_not_written_over(scene_file, tmp_path, capsys, held):
+    if held in ("both", "another"):
+        recorder = {"core:recorder": "an oscilloscope"} if held == "another" else {}
+        (tmp_path / "rec.sigmf-meta").write_text(json.dumps({"global": recorder}))
+        (tmp_path / "rec.sigmf-data").write_bytes(b"measured")
+    else:
+        (tmp_path / held).write_bytes(b"measured")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert main(["simulate", str(scene_file), "--out", str(tmp_path / "rec")]) == 2
+    assert "was not simulated: it is not written over: give another --out NAME" in capsys.readouterr().err
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    # what was simulated is replaced
+    assert main(["simulate", str(scene_file), "--out", str(tmp_path / "own")]) == 0
+    assert main(["simulate", str(scene_file), "--out", str(tmp_path / "own"), "--seed", "2"]) == 0
+    assert json.loads((tmp_path / "own.sigmf-meta").read_text())["global"]["bladewing:seed"] == 2
+
+
 def test_the_recording_holds_the_scene_it_was_made_from(scene_file, tmp_path):
     assert main(["simulate", str(scene_file), "--out", str(tmp_path / "rec.sigmf-meta"), "--seed", "3", "--full"]) == 0
     info = json.loads((tmp_path / "rec.sigmf-meta").read_text())["global"]

@@ -21,6 +21,8 @@ C_MPS = 299_792_458.0
         (101e9, 100e3, 1000, "carrier 101 GHz is outside 2 to 100 GHz, the bands this model was trained for: "
                              "use or train another model"),
         (24.125, 10e3, 1000, "carrier 24.125 Hz is no radar's: give 24.125 GHz as 24.125e9"),
+        (9850.0, 10e3, 1000, "carrier 9850 Hz is no radar's: give 9850 MHz as 9850e6"),
+        (3e9, 25.0, 1000, "PRF 25 Hz is below 1000 Hz: give 25 kHz as 25e3, or raise the PRF to 1000 Hz or more"),
         (3e9, 999.0, 1000, "PRF 999 Hz is below 1000 Hz: raise the PRF to 1000 Hz or more"),
         (10e9, 999.0, 1000, "PRF 999 Hz is below 1000 Hz: raise the PRF to 1335 Hz or more"),
         (10e9, 250e3, 1000, "PRF 250000 Hz is above 100000 Hz: sum every 3 pulses into one, "

@@ -56,6 +56,25 @@ def test_noise_has_nulls_and_a_reason(folder, capsys):
     assert closing["recording"]["with_comb"] == 0
 
 
+def test_what_is_shorter_than_a_dwell_is_said_to_be_left_out(folder, capsys):
+    given = ["measure", str(folder / "drone.npy"), *RADAR, "--dwell", "0.08"]
+    left_out_s = 2 * PULSES / PRF_HZ - 2 * 0.08
+    assert main([*given, "--json"]) == 0
+    closing = json.loads(capsys.readouterr().out.splitlines()[-1])["recording"]
+    assert closing["left_out_s"] == pytest.approx(left_out_s)
+    assert main(given) == 0
+    assert f"the last {left_out_s:.2g} s, shorter than a dwell, are left out" in capsys.readouterr().out
+
+
+def test_the_reason_for_no_rotor_is_given_whole(folder, capsys):
+    assert main(["measure", str(folder / "drone.npy"), *RADAR, "--dwell", "0.018"]) == 0
+    # two flashes a dwell
+    said = (
+        r"\d dwells: dwell too short.* lines \d+ Hz apart with others between them, a dwell of \d+ ms tells them apart"
+    )
+    assert re.search(said, capsys.readouterr().out)
+
+
 def test_the_table_says_rate_and_blade(folder, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     assert main(["measure", str(folder / "drone.npy"), *RADAR, "--blades", "2"]) == 0

@@ -36,6 +36,7 @@ def power_spectrum(iq: np.ndarray) -> np.ndarray:
         ({"radar": {**RADAR, "pulses": 0}}, r"radar\.pulses is 0: it should be greater than or equal to 1"),
         ({"radar": {**RADAR, "pulses": 2.5}}, r"radar\.pulses is 2\.5: it should be a valid integer"),
         ({"radar": {**RADAR, "prf_hz": -1.0}}, r"radar\.prf_hz is -1\.0: it should be greater than 0"),
+        ({"radar": {**RADAR, "carrier_hz": 9.85}}, r"radar\.carrier_hz: 9\.85 Hz is no radar's: .*: 10 GHz is 10e9"),
         ({"radar": {"carrier_hz": 1e9, "prf_hz": 1e3}}, r"radar\.pulses is missing"),
         (scene(uav=[uav(rotors=[{**ROTOR, "blade_length_m": -0.1}])]), r"\[0\]\.blade_length_m is -0\.1: .*than 0"),
         (scene(uav=[uav(rotors=[{**ROTOR, "root_m": 0.2}])]), r"root_m is 0\.2: it must not exceed blade_length_m"),
@@ -133,6 +134,11 @@ def test_tips_beyond_the_unambiguous_velocity_alias_and_are_warned_of():
     assert fast.warnings() == []
     ours, theirs = slow.without("noise").render().iq, fast.without("noise").render().iq[::6]
     np.testing.assert_allclose(ours, theirs, atol=1e-4)
+
+
+def test_a_prf_in_khz_is_warned_of():
+    said = Scene.build({"radar": {**RADAR, "prf_hz": 25.0}}).warnings()
+    assert said == ["radar.prf_hz is 25: in Hz, so that 25 kHz is 25e3"]
 
 
 def test_ninety_degrees_is_right_and_warned_of():
