@@ -129,13 +129,17 @@ def without_acceleration(
     """
     samples = np.asarray(iq, np.complex64)
     acceleration = np.asarray(acceleration_mps2, np.float64)[..., None]
-    phase = _phase_rad(acceleration, samples.shape[-1], SPEED_OF_LIGHT_MPS / carrier_hz, prf_hz)
-    return samples * np.exp(1j * phase).astype(np.complex64)
+    return _steadied(samples, acceleration, SPEED_OF_LIGHT_MPS / carrier_hz, prf_hz)
 
 
-def _phase_rad(acceleration: NDArray[np.float64], pulses: int, wavelength_m: float, prf_hz: float) -> NDArray:
+def _steadied(
+    samples: NDArray[np.complex64], acceleration_mps2: NDArray[np.float64], wavelength_m: float, prf_hz: float
+) -> NDArray[np.complex64]:
+    """Samples (..., pulses) with an acceleration taken out; the phase grows, and is float64."""
+    pulses = samples.shape[-1]
     time_s = (np.arange(pulses) - (pulses - 1) / 2) / prf_hz
-    return np.asarray(2 * np.pi / wavelength_m * acceleration * time_s**2)
+    phase = 2 * np.pi / wavelength_m * acceleration_mps2 * time_s**2
+    return np.asarray(samples * np.exp(1j * phase).astype(np.complex64))
 
 
 def _beside(
@@ -143,7 +147,7 @@ def _beside(
 ) -> float:
     """Mean power of the bins beside the strongest line of one dwell, with an acceleration and the line taken out."""
     pulses = len(samples)
-    steady = samples * np.exp(1j * _phase_rad(np.asarray(acceleration_mps2), pulses, wavelength_m, prf_hz))
+    steady = _steadied(samples, np.asarray(acceleration_mps2), wavelength_m, prf_hz)
     spectrum = fft.fft(steady, n=size)
     top = int((spectrum.real**2 + spectrum.imag**2).argmax())
     left, middle, right = np.log(np.abs(spectrum[np.array([top - 1, top, top + 1]) % size]))
@@ -162,8 +166,7 @@ def _sharpened(
     parts: int = 1,
 ) -> NDArray[np.float32]:
     """Power spectra of parts of dwells (..., pulses) with an acceleration taken out, shape (..., parts, bins)."""
-    phase = _phase_rad(np.asarray(acceleration_mps2), samples.shape[-1], wavelength_m, prf_hz)
-    steady = samples * np.exp(1j * phase).astype(np.complex64)
+    steady = _steadied(samples, np.asarray(acceleration_mps2), wavelength_m, prf_hz)
     each = samples.shape[-1] // parts
     cut = steady[..., : each * parts].reshape(*samples.shape[:-1], parts, each)
     spectrum = fft.fft(cut, n=fft.next_fast_len(-(-size // parts)))

@@ -280,18 +280,23 @@ def without_clicks(samples: NDArray[np.complex128]) -> NDArray[np.complex128]:
     return without if after < EMPTY_RISE * before else samples
 
 
+def _turns(spectrum: Spectrum, line: Body) -> float:
+    """Frequency of a line [cycles a sample]."""
+    return float(-2 * line.velocity_mps / spectrum.wavelength_m / spectrum.prf_hz)
+
+
 def _other_body(spectrum: Spectrum, known: list[float], half_bins: float) -> Body | None:
     """A line that stands out of all others beside these [cycles a sample], each with so much about it: another body."""
-    place = spectrum.frequency_hz / spectrum.prf_hz
+
+    def without(power: NDArray[np.float32], turns: float) -> NDArray[np.float32]:
+        near = fft.fftshift(_within(spectrum.bins, turns, half_bins / spectrum.pulses))
+        return np.where(near, np.float32(0), power)
+
     left = spectrum.relative_power
-    for number in range(2):
-        away = place - np.array(known)[:, None]
-        near = (np.abs(away - np.rint(away)) * spectrum.pulses <= half_bins).any(axis=0)
-        left = np.where(near, np.float32(0), left)
-        if number:
-            break
-        line = body_line(replace(spectrum, relative_power=left))
-        known = [*known, float(-2 * line.velocity_mps / spectrum.wavelength_m / spectrum.prf_hz)]
+    for place in known:
+        left = without(left, place)
+    line = body_line(replace(spectrum, relative_power=left))
+    left = without(left, _turns(spectrum, line))
     over_db = float(line.level_db) - 10 * float(np.log10(max(left.max(initial=0), 1.0)))
     return line if line.level_db > LINE_DB and over_db > OTHER_OVER_DB else None
 
@@ -325,9 +330,6 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
     def half_bins(half_mps: float) -> float:
         return float(np.ceil(2 * min(max(half_mps / bin_mps, 1.0), widest)) / 2)
 
-    def turns(line: Body) -> float:
-        return float(-2 * line.velocity_mps / spectrum.wavelength_m / spectrum.prf_hz)
-
     bands: list[tuple[float, float]] = []
     centres: list[tuple[float, float]] = []
     body = body_line(spectrum)
@@ -339,7 +341,7 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
     skirt = (offset <= min(rest_half, SKIRT_BINS)) & (np.abs(np.arange(spectrum.bins) - body.index) > LOBE_BINS + 1)
     # the only strong line, at rest, without a skirt: a body that hovers, not a background
     hovers = (
-        abs(turns(body)) * pulses <= rest_half
+        abs(_turns(spectrum, body)) * pulses <= rest_half
         and 2 * rest_half > 3 * LOBE_BINS
         and float(spectrum.level_db[skirt].max()) < SKIRT_DB
         and float(spectrum.level_db[offset > rest_half].max()) < LINE_DB
@@ -349,18 +351,18 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
         # what stands at rest may be the background; the body is then the strongest line that moves
         moving = offset > rest_half + 2 * NOISE_BANDWIDTH_BINS
         # the strongest line of all, if it is as slow as that, has its own level; if not, it is the one that moves
-        slow = abs(turns(body)) * pulses <= rest_half
+        slow = abs(_turns(spectrum, body)) * pulses <= rest_half
         line = body
         if slow:
             line = body_line(replace(spectrum, relative_power=np.where(moving, spectrum.relative_power, np.float32(0))))
-        centres.append((turns(body), float(body.level_db)) if slow else (0.0, rest_db))
+        centres.append((_turns(spectrum, body), float(body.level_db)) if slow else (0.0, rest_db))
         if line.level_db > LINE_DB:
-            centres.append((turns(line), float(line.level_db)))
+            centres.append((_turns(spectrum, line), float(line.level_db)))
     else:
-        centres.append((turns(body), float(body.level_db)))
+        centres.append((_turns(spectrum, body), float(body.level_db)))
     other = _other_body(spectrum, [turn for turn, _ in centres], max(rest_half if bands else 0.0, LOBE_BINS))
     if other is not None:
-        centres.append((turns(other), float(other.level_db)))
+        centres.append((_turns(spectrum, other), float(other.level_db)))
     centres.sort(key=lambda c: -c[1])
     bands += [
         (turn, half_bins(BODY_NOTCH_MPS))
