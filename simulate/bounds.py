@@ -196,17 +196,28 @@ class UavBounds:
         """Blades at the angles of other instants, or of a steady rate, in place of the true ones."""
         out = np.zeros(len(self.times_s))
         (share, moment), phase = self._moments(rotor), self._phase(rotor)
+        hub = hub_range_m(self.centre_m, rotor.offset_m, np.deg2rad(rotor.bearing_deg))
+        length = rotor.blade_length_m
+        # near by, the sphere's sag moves the flash, and a blade that turns runs towards the radar faster
+        faster = hub / np.maximum(hub - length, 1e-3 * length)
+
+        def straight(cosine: Amplitude) -> Amplitude:
+            """What is left of a blade's phase where the sag may have taken its slope away."""
+            sag = self.wavenumber * length**2 * (1 - cosine**2) / (2 * hub)
+            if rotor.points:  # their phases come together again and again
+                return np.asarray(np.where(sag < 0.05, phase * np.abs(cosine), 0) * (1 - share))
+            return np.asarray(np.maximum(phase * np.abs(cosine) - 2 * sag, 0) * (1 - share))
+
         others = rotor_angle_rad(rotor, times_s, wanders) - rotor_angle_rad(rotor, self.times_s, True)
         away = np.abs(others)
         for amplitude, true in self._blades(rotor):
             here, there = np.cos(true), np.cos(true + others)
             # the flash is where the cosine is smallest: at an end of the arc between both, or within it
             least = np.where((here * there <= 0) | (away > 1), 0.0, np.minimum(np.abs(here), np.abs(there)))
-            z = phase * (1 - share)
-            slope = phase * np.sqrt(1 - least**2) * moment(1, z * least)
+            slope = faster * phase * np.sqrt(1 - least**2) * moment(1, straight(least))
             edges = 1 + np.abs(rotor.edge_asymmetry)
-            error = away * (edges * slope + np.abs(rotor.edge_asymmetry) * moment(0, z * least))
-            apart = edges * (moment(0, z * here) + moment(0, z * there))
+            error = away * (edges * slope + np.abs(rotor.edge_asymmetry) * moment(0, straight(least)))
+            apart = edges * (moment(0, straight(here)) + moment(0, straight(there)))
             out += amplitude * np.minimum(error, apart)
         return out
 

@@ -270,7 +270,8 @@ def _texture(draws: Draws, radar: Radar, shape: NDArray[np.float64]) -> NDArray[
     rate_hz = draws.value("texture_hz", _SWELLS)
     weights = draws.normal(2 * _SWELLS) / np.sqrt(_SWELLS)
     # The swells are slow: 40 points a period of the fastest, drawn out to the pulses in between.
-    points = max(33, math.ceil(40 * LAWS["texture_hz"].high * radar.dwell_s))
+    fastest_hz = max(LAWS["texture_hz"].high, float(rate_hz.max(initial=0)))
+    points = max(33, math.ceil(40 * fastest_hz * radar.dwell_s))
     coarse_s = np.linspace(0, radar.dwell_s, points)
     turns = TWO_PI * rate_hz[:, :, None] * coarse_s
     gaussian = (weights[:, :_SWELLS, None] * np.cos(turns) + weights[:, _SWELLS:, None] * np.sin(turns)).sum(axis=1)

@@ -23,8 +23,8 @@ LEAST_CARRIER_HZ = 1e6
 #: Scatterers of a blade that is a row of them, at most.
 MOST_POINTS = 1000
 
-#: What a parameter of clutter can be where its law does not tell: how many of a thing are rendered, and what still
-#: has a spectrum (Billingsley's has none in still air) or a gait.
+#: What a parameter can be where its law does not tell: how many of a thing are rendered, what still has a spectrum
+#: (Billingsley's has none in still air), a gait or a texture, and what float32 holds.
 BOUNDS = {
     "wheels": (1, 4),
     "spokes": (1, 10),
@@ -33,6 +33,10 @@ BOUNDS = {
     "insect_count": (1, 20),
     "wind_mph": (0.5, 200),
     "gait_hz": (0.05, 20),
+    "texture_hz": (1e-6, 1000),
+    "fading_db": (-200, 200),
+    "flicker_db": (-200, 200),
+    "adc_bits": (1, 24),
 }
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-MOST, le=MOST)]
@@ -98,7 +102,7 @@ class RotorPart(Part):
     edge_asymmetry: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1, le=1)] = 0.0
     drift_hz_per_s: Number = 0.0
     wander_hz: NotNegative = 0.0
-    wander_rate_hz: Positive = 1.0
+    wander_rate_hz: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-6, le=MOST)] = 1.0
     wander_phase_deg: Number = 0.0
 
     @model_validator(mode="after")
@@ -155,7 +159,7 @@ class UavPart(TargetPart):
         from .catalogue import AIRFRAMES
 
         name = values.get("airframe") if isinstance(values, dict) else None
-        if name is None:
+        if not isinstance(name, str):  # what is no name is told by the field's own type
             return values
         if name not in AIRFRAMES:
             raise ValueError(f"airframe is {name!r}: it must be one of {', '.join(AIRFRAMES)}")
@@ -213,7 +217,7 @@ class BirdPart(TargetPart):
         from .catalogue import BIRDS
 
         name = values.get("species") if isinstance(values, dict) else None
-        if name is None:
+        if not isinstance(name, str):
             return values
         if name not in BIRDS:
             raise ValueError(f"species is {name!r}: it must be one of {', '.join(BIRDS)}")

@@ -80,7 +80,8 @@ class Receiver:
         self.burst_phase = draws.value("phase_rad")
         self.burst_alike = draws.chance(0.5)
         # a rectifier ticks, alike once or twice a period of the mains; what bursts at any other rate is noise
-        self.burst_hz = np.where(of_mains | self.burst_alike, periods * self.mains_hz, any_hz)
+        self.bursts_of_mains = of_mains | self.burst_alike
+        self.burst_hz = np.where(self.bursts_of_mains, periods * self.mains_hz, any_hz)
 
     def receive(
         self,

@@ -25,11 +25,12 @@ def stream(seed: int, name: str) -> Generator:
 
 
 class Chosen(Draws):
-    """Draws of which some parameters are fixed by name."""
+    """Draws of which some parameters are fixed by name; `unused` holds those that nothing has asked for so far."""
 
     def __init__(self, uniforms: NDArray[np.float64], values: dict[str, float]) -> None:
         super().__init__(uniforms)
         self._values = values
+        self.unused = set(values)
 
     def value(
         self, law: str, columns: int | None = None, *, least: NDArray[np.float64] | None = None
@@ -51,6 +52,7 @@ class Chosen(Draws):
 
     def _fixed(self, drawn: NDArray[np.float64], *laws: str) -> NDArray[np.float64]:
         """What was drawn, or the value that the first of these laws is fixed to, of the same shape."""
+        self.unused.difference_update(laws)
         fixed = next((self._values[law] for law in laws if law in self._values), drawn)
         return np.broadcast_to(fixed, drawn.shape).copy()
 
@@ -63,8 +65,8 @@ def pulse_times_s(scene: Setting, seed: int) -> NDArray[np.float64]:
     return times
 
 
-def clutter_echo(part: ClutterPart, radar: Radar, seed: int) -> tuple[NDArray[np.complex64], dict[str, Any]]:
-    """Clutter of mean power `level_db`, and what was drawn of it."""
+def clutter_echo(part: ClutterPart, radar: Radar, seed: int) -> tuple[NDArray[np.complex64], dict[str, Any], list[str]]:
+    """Clutter of mean power `level_db`, what was drawn of it, and which of its `values` it has no use for."""
     rng = stream(seed, part.name)
     draws = Chosen(rng.random((1, WIDTH)), part.values)
     if part.kind == "insects":
@@ -77,7 +79,7 @@ def clutter_echo(part: ClutterPart, radar: Radar, seed: int) -> tuple[NDArray[np
     if target.body is not None and target.body_db is not None:
         iq = _unit(iq) + _unit(target.body) * (10 ** (target.body_db / 20)).astype(np.float32)[:, None]
     drawn = {name: float(values[0]) for name, values in target.truth.items()}
-    return (_unit(iq) * np.float32(10 ** (part.level_db / 20)))[0], drawn
+    return (_unit(iq) * np.float32(10 ** (part.level_db / 20)))[0], drawn, sorted(draws.unused)
 
 
 def _unit(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
@@ -102,6 +104,8 @@ class Reception:
         self.drawn = Receiver(Chosen(stream(seed, "receiver").random((1, WIDTH)), part.values))
         self.drawn.gain_db = np.zeros(1)
         if part.mains_hz is not None:
+            follow = np.where(self.drawn.bursts_of_mains, part.mains_hz / self.drawn.mains_hz, 1.0)
+            self.drawn.burst_hz = self.drawn.burst_hz * follow
             self.drawn.mains_hz = np.array([part.mains_hz])
         if "burst_hz" in part.values:  # in training records most bursts come at their receiver's mains' rate
             self.drawn.burst_hz = np.array([part.values["burst_hz"]])

@@ -72,11 +72,13 @@ def render(scene: Setting, seed: int = 0, *, plan: Plan | None = None) -> Render
         how = plan.fidelity[bird.name] if plan else Fidelity(frozenset(BIRD_EFFECTS), None)
         signal += bird_echo(bird, radar, times, how)
         truth.append(bird_truth(bird))
+    warnings = scene.warnings()
     for part in scene.clutters:
-        iq, drawn = clutter_echo(part, radar, seed)
+        iq, drawn, unused = clutter_echo(part, radar, seed)
         signal += iq
+        warnings += [f"{part.name}.values: {name} changes nothing of a clutter of kind {part.kind}" for name in unused]
         truth.append({"name": part.name, "label": "clutter", "kind": part.kind, "level_db": part.level_db, **drawn})
     reception = Reception(scene, seed)
     kept = plan.receiver & reception.effects if plan else reception.effects
     iq = reception.receive(signal.astype(np.complex64), kept)
-    return Rendering(radar, iq, truth, scene.warnings())
+    return Rendering(radar, iq, truth, warnings)

@@ -73,6 +73,9 @@ class RotorMotion:
 #: Largest 4 pi L cos(beta) / wavelength for float32: beyond it the rounding of an angle shows in the flash.
 LARGEST_GAMMA = 3e4
 
+#: Most points of a blade in float32: the recursion over them loses digits with the square of their number.
+MOST_FLOAT32_POINTS = 64
+
 
 def rotor_echo(
     angle_rad: NDArray[np.float64],
@@ -128,7 +131,7 @@ def rotor_echo(
     blades = Blades.of(lead, wavelength_m, blade_length_m, beta_rad, root_m, blade_amplitudes, edge_asymmetry, points)
     pulses = angle.shape[-1]
     reach_m = np.max(np.asarray(blade_length_m) * np.abs(np.cos(beta_rad)), initial=0)
-    if 2 * TWO_PI / wavelength_m * reach_m > LARGEST_GAMMA:
+    if 2 * TWO_PI / wavelength_m * reach_m > LARGEST_GAMMA or (points or 0) > MOST_FLOAT32_POINTS:
         shapes = np.atleast_1d(blade_length_m), np.atleast_1d(beta_rad), np.atleast_1d(root_m)
         echo = _double_echo(angle, wavelength_m, *shapes, blade_amplitudes, edge_asymmetry, points)
         return echo.reshape(*lead, pulses)
@@ -156,7 +159,7 @@ def _double_echo(
     edge_asymmetry: ArrayLike,
     points: int | None,
 ) -> NDArray[np.complex64]:
-    """The closed form blade by blade in float64, for blades of so many wavelengths that float32 has no digits left."""
+    """The closed form blade by blade in float64, where float32 has no digits left: long blades, rows of many points."""
     amplitudes = np.asarray(blade_amplitudes, np.float64)
     blades = amplitudes.shape[-1]
     asymmetry = np.asarray(edge_asymmetry, np.float64)[..., None]

@@ -70,9 +70,9 @@ class Scene(Setting):
         """
         name = os.fspath(path)
         file: Any = Path(path)
-        if not file.exists() and name in shipped():
-            file = files("bladewing.simulate") / "scenes" / f"{name}.toml"
         try:
+            if not file.exists() and name in shipped():
+                file = files("bladewing.simulate") / "scenes" / f"{name}.toml"
             if isinstance(file, Path) and file.exists() and not (file.is_file() and file.stat().st_size <= _MOST_BYTES):
                 raise ValueError(f"it must be a file of at most {_MOST_BYTES} bytes")
             values = tomllib.loads(file.read_text(encoding="utf-8"))

@@ -1,13 +1,14 @@
 """The plan: every bound holds on random scenes and is not idle, and what is left out stays within the tolerance."""
 
 import re
+from itertools import product
 
 import numpy as np
 import pytest
 from bladewing.simulate.bounds import UavBounds, bird_bound, gauss_error, moment_envelope
 from bladewing.simulate.bounds_receiver import CHAIN
 from bladewing.simulate.exact import blade_points
-from bladewing.simulate.parts import BirdPart, UavPart
+from bladewing.simulate.parts import BirdPart, RotorPart, UavPart
 from bladewing.simulate.plan import make_plan
 from bladewing.simulate.radar import Radar
 from bladewing.simulate.render import render
@@ -89,6 +90,23 @@ def test_every_bound_of_a_uav_holds_and_is_not_idle(effect):
             ratios.append(bound / true)
     assert len(ratios) > SCENES / 3
     assert np.median(ratios) <= 10
+
+
+@pytest.mark.parametrize("points", [None, 6])
+def test_the_bound_of_a_wandering_rate_holds_where_the_sphere_moves_the_flash(points):
+    """Blades as long as a tenth of the range and more, in dwells that a straight blade would not flash in."""
+    for carrier_hz, length_m, range_m, phase_deg in product(
+        (24e9, 94e9), (0.12, 0.4), (1.0, 2.0, 4.0), (60, 70, 76, 80)
+    ):
+        rotor = RotorPart(
+            blade_length_m=length_m, rotation_hz=3.0, phase_deg=phase_deg, flash_db=0.0, points=points,
+            wander_hz=0.01, wander_rate_hz=2.0,
+        )  # fmt: skip
+        part, radar = UavPart(name="near", range_m=range_m, rotors=(rotor,)), Radar(carrier_hz, 20e3, 100)
+        full = full_fidelity(part, radar)
+        steady = Fidelity(full.effects - {"wander"}, full.points)
+        error = energy(uav_echo(part, radar, radar.times_s, full) - uav_echo(part, radar, radar.times_s, steady))
+        assert error <= energy(UavBounds(part, radar).wander()) * (1 + 1e-3) + 1e-9
 
 
 def test_the_bound_of_the_scatterers_spacing_holds_and_is_not_idle():

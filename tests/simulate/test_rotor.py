@@ -163,6 +163,15 @@ def test_a_wandering_rate_is_the_derivative_of_the_angle():
     np.testing.assert_allclose(rate_hz[1:-1], expected[1:-1], atol=1e-3)
 
 
+@pytest.mark.parametrize("points", [65, 300, 1000])
+def test_rows_of_many_points_are_as_exact_as_short_ones(points):
+    angle, length_m, wavelength_m = np.linspace(0, 2 * np.pi, 257), 0.6, 0.03
+    found = rotor_echo(angle, wavelength_m=wavelength_m, blade_length_m=length_m, blade_amplitudes=[1.0], points=points)
+    radius_m = np.linspace(0, length_m, points)
+    exact = np.exp(4j * np.pi / wavelength_m * radius_m[:, None] * np.cos(angle)).mean(axis=0)
+    np.testing.assert_allclose(found, exact, atol=2e-6)
+
+
 def test_a_blade_has_one_point_or_more():
     with pytest.raises(ValueError, match="points is 0: a blade has at least 1"):
         rotor_echo(np.zeros(8), wavelength_m=WAVELENGTH_M, blade_length_m=0.2, points=0)

@@ -7,11 +7,16 @@ import numpy as np
 import pytest
 from bladewing.simulate.bird import wingbeat_hz
 from bladewing.simulate.catalogue import AIRFRAMES, BIRDS
+from bladewing.simulate.clutter import _texture
+from bladewing.simulate.laws import WIDTH
 from bladewing.simulate.parts import BOUNDS
+from bladewing.simulate.radar import Radar
+from bladewing.simulate.reception import Chosen, Reception
 from bladewing.simulate.render_bird import _cycle_rad, heave_range_m, members
 from bladewing.simulate.scene import Scene, SceneError, shipped
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import special
 
 RADAR = {"carrier_hz": 9.85e9, "prf_hz": 25e3, "pulses": 1000}
 ROTOR = {"blade_length_m": 0.15, "rotation_hz": 50.0, "flash_db": 20.0}
@@ -51,6 +56,7 @@ def power_spectrum(iq: np.ndarray) -> np.ndarray:
         (scene(uav=[uav(range_m=1.0, velocity_mps=-90.0, acceleration_mps2=4500.0)]), r"it comes to 0\.1 m"),
         (scene(uav=[uav(name="mains")]), r"a part is named 'mains': that is the receiver's"),
         (scene(uav=[{"name": "x", "airframe": "jumbo"}]), r"airframe is 'jumbo': it must be one of type1"),
+        (scene(uav=[{"name": "x", "airframe": ["type1"]}]), r"airframe is \['type1'\]: it should be a valid string"),
         (scene(uav=[{"name": "empty"}]), r"neither body nor rotors"),
         (scene(uav=[uav(), uav()]), r"two parts are named 'drone'"),
         (scene(off=["swan"]), r"off holds 'swan': it may hold drone, noise"),
@@ -59,6 +65,7 @@ def power_spectrum(iq: np.ndarray) -> np.ndarray:
         (scene(clutter=[{"name": "c", "kind": "sea", "level_db": 0.0, "values": {"salt": 1.0}}]), r"'salt' is unknown"),
         (scene(clutter=[{"name": "c", "kind": "ground", "level_db": 0.0, "values": {"wind_mph": -1.0}}]), r"above 0"),
         (scene(receiver={"effects": ["rust"]}), r"'rust' is unknown: the effects are fading"),
+        (scene(receiver={"values": {"adc_bits": -3.0}}), r"adc_bits is -3\.0: it must be 1 to 24"),
     ],
 )  # fmt: skip
 def test_a_bad_scene_gets_one_line_with_field_value_and_rule(values, said):
@@ -90,6 +97,11 @@ def test_a_file_that_is_no_scene_is_refused_in_one_line(tmp_path, content):
     with pytest.raises(SceneError, match=r"not TOML|cannot be read: No such file") as caught:
         Scene.load(path)
     assert len(caught.value.problems) == 1
+
+
+def test_a_name_that_no_file_system_holds_is_refused_in_one_line():
+    with pytest.raises(SceneError, match=r"cannot be read: File name too long: give a TOML file"):
+        Scene.load("a" * 300)
 
 
 @pytest.mark.parametrize("name", shipped())
@@ -349,6 +361,32 @@ def test_values_that_cannot_be_rendered_are_refused_and_those_at_the_bounds_are_
     for value in (low * 0.9, high * 1.1):
         with pytest.raises(SceneError, match=rf"{name} is .*must be"):
             clutter_of(kind, **{name: value})
+
+
+def test_a_value_that_a_kind_of_clutter_does_not_know_is_warned_of():
+    said = clutter_of("rain", rain_width_mps=2.0, wind_mph=30.0).warnings
+    assert [line.partition(": ")[2] for line in said] == ["wind_mph changes nothing of a clutter of kind rain"]
+
+
+def test_a_texture_swells_at_the_rate_that_is_asked_for():
+    """Beyond the rates that training draws too: a few sinusoids of one rate are one, and its law is undone exactly."""
+    radar, shape = Radar(1e9, 2e3, 4000), np.array([1.5])
+    chosen = Chosen(np.random.default_rng(0).random((1, WIDTH)), {"texture_hz": 60.0})
+    texture = _texture(chosen, radar, shape)[0].astype(float) ** 2
+    gaussian = special.ndtri(special.gammainc(shape, texture * shape))
+    lines = np.abs(np.fft.rfft(gaussian * np.hanning(len(gaussian))))
+    assert lines.argmax() == 60 * radar.dwell_s
+    assert np.sum(lines[118:123] ** 2) > 0.99 * np.sum(lines**2)
+
+
+def test_bursts_come_at_the_mains_that_is_asked_for():
+    """What ticks with the mains of its receiver follows it; others keep their rate."""
+    for seed in range(12):
+        drawn = Reception(empty(effects=("bursts",)), seed).drawn
+        asked = Reception(empty(effects=("bursts",), mains_hz=400.0), seed).drawn
+        turns = drawn.burst_hz / drawn.mains_hz
+        wanted = 400.0 * turns if drawn.bursts_of_mains[0] else drawn.burst_hz
+        np.testing.assert_allclose(asked.burst_hz, wanted)
 
 
 def test_wheels_and_spokes_may_both_be_the_most():
