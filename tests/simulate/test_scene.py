@@ -215,6 +215,12 @@ def test_a_bounding_bird_folds_its_wings_and_a_gliding_one_holds_them():
             np.testing.assert_allclose(iq[1100:], amplitude, atol=1e-3)
 
 
+def test_a_glide_has_no_wingbeat():
+    still = {"name": "gull", "species": "herring_gull", "body_db": -200.0, "stroke_scale": 0.0, "heave_m": 0.0}
+    power = np.abs(Scene.build({"radar": RADAR, "bird": [still], "receiver": {"noise": False}}).render().iq) ** 2
+    assert power.max() / power.min() < 1.0001
+
+
 def test_the_papers_bird_sweeps_its_line_and_flashes_as_measured():
     found = Scene.load("paper_bird").without("noise")
     iq = found.render().iq
