@@ -45,6 +45,10 @@ LEAST_BINS = 100
 #: not have been seen.
 HIDDEN_DEVIATIONS = 1.5
 
+#: What stands past the edge of a lone rotor's family, out to so many times it, speaks of rotors whose outer lines part
+#: where it comes to so many deviations, and to this share of the lines' power.
+PAST_EDGE, PAST_DEVIATIONS, PAST_SHARE = 4.0, 4.0, 0.2
+
 #: Lines are looked for so far past the edge of the line family: what strong ones leave there may pass for more.
 FURTHEST = 1.5
 
@@ -173,6 +177,28 @@ def _left_over(rest: Periodogram, fits: list[CombFit], edge: float) -> tuple[boo
     return clear, most * within.sum() > held
 
 
+def _stands_past(rest: Periodogram, fit: CombFit, edge: float) -> bool:
+    """True where more than noise stands past the edge of a line family: near the noise its inner lines alone are seen.
+
+    Rotors of unlike rates have their lines in one another at the inner orders, and apart at the outer ones.
+    """
+    frequency = fft.fftfreq(rest.pulses)
+    away = np.abs(frequency - fit.centre)
+    away = np.abs(away - np.rint(away))
+    usable = rest.usable(frequency)
+    furthest = min(PAST_EDGE * edge, (edge + 0.5) / 2)
+    past = usable & (away > 1.1 * edge) & (away < furthest)
+    far = usable & (away > furthest)
+    if past.sum() < LEAST_BINS or far.sum() < LEAST_BINS:
+        return False
+    power = squared(fft.fft(rest.samples)) / rest.pulses
+    noise = float(power[far].mean())
+    over = float(power[past].mean()) - noise
+    lines = float((np.abs(fit.amplitudes) ** 2).sum()) * rest.pulses
+    deviation = noise * float(np.sqrt(1 / past.sum() + 1 / far.sum()))
+    return over > PAST_DEVIATIONS * deviation and over * past.sum() > PAST_SHARE * lines
+
+
 def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
     """Separate the rotors of one record.
 
@@ -263,8 +289,9 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float) -> Rotors
     tip = edge / (per_turn * max(fit.spacing for fit in rotors.fits))  # an order is the same for all: blades are alike
     twice = any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
     clear, hidden = _left_over(data.left(rotors.rest), rotors.fits, edge)
+    past = not several and _stands_past(data.left(rotors.rest), rotors.fits[0], edge)
     # a little that a single rotor leaves may be a change of its rate
-    if not (twice or hidden or (several and clear)):
+    if not (twice or hidden or past or (several and clear)):
         return rotors
     reach = max(int(np.abs(rotors.fits[0].orders).max()), 1)
     spread = max(rotors.spread, RESOLVED_BINS / (reach * data.pulses))

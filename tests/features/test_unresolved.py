@@ -6,7 +6,7 @@ from bladewing.features import measure
 from bladewing.features.periodogram import prepare
 from bladewing.simulate import RotorMotion, rotor_echo
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, tone, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
 
 RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 
@@ -66,3 +66,25 @@ def test_the_rates_of_four_rotors_are_known_as_well_as_they_say(snr_db):
     # a fifth of the level between the lines was theirs: with it in, these would be 0.1 to 0.2
     assert 0.33 < np.mean(np.square(errors)) < 1.7
     assert 0.2 < np.mean(np.square(means)) < 2.4
+
+
+def test_what_stands_past_the_edge_of_a_lone_rotors_lines_is_said():
+    """Near the noise four rotors show their inner lines alone: what parts further out is as broad as their band."""
+    rng = np.random.default_rng(11)
+    frequency_hz = np.fft.fftfreq(PULSES, 1 / PRF_HZ)
+    inner = np.abs(frequency_hz) < 1500
+    outer = (np.abs(frequency_hz) > 1800) & (np.abs(frequency_hz) < 3600)
+
+    def shaped(samples, kept):
+        return np.fft.ifft(np.fft.fft(samples) * kept)
+
+    for rate_hz in (52.0, 57.3, 61.1):
+        lines = shaped(rotors([rate_hz], body=0.0), inner)
+        lines *= np.sqrt(0.1 / np.mean(np.abs(lines) ** 2))
+        smear = shaped(white(rng, PULSES), outer)
+        smear *= np.sqrt(0.06 / np.mean(np.abs(smear) ** 2))
+        noise = white(rng, PULSES)
+        alone, past = (measure(3 + lines + more + noise, **RADAR) for more in (0, smear))
+        assert alone.rotor_count == past.rotor_count == 1
+        assert alone.rotors_resolved
+        assert not past.rotors_resolved
