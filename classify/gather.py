@@ -29,7 +29,7 @@ TASK_RECORDS = 10 * RADAR_GROUP
 KEPT_TASKS = 50
 
 #: Inputs kept as float16 until a batch needs them: dB values of at most 120 keep 0.06 dB.
-_COMPACT = ("levels", "spectrum", "cadence", "image")
+_COMPACT = ("levels", "spectrum", "cadence", "combs", "image")
 
 _INPUT, _TRUTH = "input/", "truth/"
 

@@ -126,8 +126,8 @@ def prominence(heights: NDArray[np.float32]) -> NDArray[np.float32]:
     count = heights.shape[-1]
     edges, shares = _surroundings(count)
     before = _sums_before(heights)
-    means = before.take(edges[1], axis=-1)
-    means -= before.take(edges[0], axis=-1)
+    means = before.take(edges[1], axis=-1, mode="wrap")  # all lie within: to wrap is cheapest
+    means -= before.take(edges[0], axis=-1, mode="wrap")
     means *= shares
     out = heights - np.maximum(means[..., 0, :], means[..., 1, :])
     out += before[..., count : count + 1] * np.float32(1 / count)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from .axis import Pooling, pooling
 from .cadence import cadence_db
 from .change import change_db, parts_db
+from .comb_levels import comb_levels_db
 from .joint import joint_vector, stft_image
 from .notch import Body, body_line, notch_mask
 from .schema import AXIS_BINS, INPUT_SHAPES
@@ -37,7 +38,8 @@ def model_inputs(
         Carrier and pulse repetition frequency [Hz].
     names : collection of str
         Which of `INPUT_SHAPES`: "features", "levels" (one FFT of the dwell), "spectrum" (the same and one of its
-        parts), "cadence" (an FFT back and half of one more), "joint_features", "image" (an STFT).
+        parts), "cadence" (an FFT back and half of one more), "combs" (a quarter of one), "joint_features", "image" (an
+        STFT).
 
     Returns
     -------
@@ -114,6 +116,10 @@ class Dwells:
     @cached_property
     def _cadence(self) -> NDArray[np.float32]:
         return cadence_db(self._spectrum_of_dwell, self._mask)
+
+    @cached_property
+    def _combs(self) -> NDArray[np.float32]:
+        return comb_levels_db(self._spectrum_of_dwell, self._mask)
 
     @cached_property
     def _pool(self) -> Pooling:

@@ -24,6 +24,9 @@ SPECTRUM_CHANNELS = LEVEL_CHANNELS + 1
 #: Bins of the shared axis of rates of the "cadence" input.
 CADENCE_BINS = 96
 
+#: Bins of the axis of chopping frequencies of the "combs" input.
+COMB_BINS = 64
+
 #: Velocity bins and frames of the "image" input.
 IMAGE_BINS, IMAGE_FRAMES = 64, 32
 
@@ -142,6 +145,7 @@ INPUT_SHAPES: dict[str, tuple[int, ...]] = {
     "levels": (LEVEL_CHANNELS, AXIS_BINS),
     "spectrum": (SPECTRUM_CHANNELS, AXIS_BINS),
     "cadence": (2, CADENCE_BINS),
+    "combs": (1, COMB_BINS),
     "joint_features": (len(JOINT_FEATURES),),
     "image": (1, IMAGE_BINS, IMAGE_FRAMES),
 }

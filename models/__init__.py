@@ -48,9 +48,9 @@ class Rung:
 LADDER: dict[str, Rung] = {
     "features-linear": Rung("linear", ("features",)),
     "features-boosted": Rung("boosted", ("features",)),
-    "spectrum-cnn-fast": Rung("network", ("levels", "cadence"), teacher="spectrum-cnn-wide"),
-    "spectrum-cnn": Rung("network", ("spectrum", "cadence", "features"), teacher="spectrum-cnn-wide"),
-    "spectrum-cnn-wide": Rung("network", ("spectrum", "cadence", "features"), widen=2),
+    "spectrum-cnn-fast": Rung("network", ("levels", "cadence", "combs"), teacher="spectrum-cnn-wide"),
+    "spectrum-cnn": Rung("network", ("spectrum", "cadence", "combs", "features"), teacher="spectrum-cnn-wide"),
+    "spectrum-cnn-wide": Rung("network", ("spectrum", "cadence", "combs", "features"), widen=2),
     "joint-boosted": Rung("boosted", ("joint_features",)),
     "image-cnn": Rung("network", ("image", "joint_features"), teacher="spectrum-cnn-wide"),
 }

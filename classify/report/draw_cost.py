@@ -102,6 +102,7 @@ def stage_name(row: Mapping[str, Any]) -> str:
         "levels": "level input",
         "spectrum": "spectrum input",
         "cadence": "cadence input",
+        "combs": "comb levels",
         "image": "STFT image",
         "features": "features",
         "joint_features": "joint features",

@@ -9,6 +9,7 @@ import numpy as np
 import onnxruntime
 import torch
 from bladewing.features import INPUT_SHAPES, model_inputs
+from bladewing.models import LADDER
 from bladewing.models.calibration import Calibration, softmax
 from bladewing.models.cnn import EvidenceNet, ImageNet, SpectrumNet
 from bladewing.models.export import export_network, in_eight_bits
@@ -22,8 +23,8 @@ Inputs = dict[str, NDArray[np.float32]]
 
 _CLIP_GUARD = "standardised inputs are clipped at eight deviations"
 _NETS: tuple[tuple[type[EvidenceNet], tuple[str, ...]], ...] = (
-    (SpectrumNet, ("spectrum", "cadence", "features")),
-    (ImageNet, ("image", "joint_features")),
+    (SpectrumNet, LADDER["spectrum-cnn"].inputs),
+    (ImageNet, LADDER["image-cnn"].inputs),
 )
 
 

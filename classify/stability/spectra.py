@@ -8,6 +8,7 @@ from bladewing.features import measure
 from bladewing.features.bandwidth import energy_band_mps, threshold_band_hz
 from bladewing.features.cadence import CLIP, LEAST_MEAN, cadence_db, cadence_plan
 from bladewing.features.chopping import CLIP_DB, cepstrum, noise_shape
+from bladewing.features.comb_levels import comb_heights, comb_plan
 from bladewing.features.inputs import model_inputs
 from bladewing.features.notch import body_line, notch_mask, residual
 from bladewing.features.schema import INPUT_SHAPES
@@ -160,6 +161,18 @@ def _cadence_error(iq: NDArray[np.complex64]) -> float:
     return float(np.abs(found - np.maximum(means, 1e-2)).max(initial=0.0) / max(1.0, means.max(initial=0.0)))
 
 
+def _comb_heights_error(iq: NDArray[np.complex64]) -> float:
+    """`comb_heights` against long double, of the same powers; the deviation of noise is about a half."""
+    spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
+    plan = comb_plan(spectrum.bins, spectrum.pulses, _CARRIER_HZ, _PRF_HZ)
+    if plan is None:
+        return 0.0
+    kept = notch_mask(spectrum, body_line(spectrum))[plan.band]
+    power = spectrum.relative_power[plan.band]
+    exact = comb_heights(power.astype(np.longdouble), kept.astype(np.longdouble), plan)
+    return float(np.abs(comb_heights(power, kept.astype(np.float32), plan) - exact).max() / max(1.0, exact.max()))
+
+
 def _band_error(iq: NDArray[np.complex64]) -> float:
     """Edges of the energy band against long double, in bins."""
     edges = []
@@ -189,6 +202,13 @@ def _shapes(quick: bool) -> Iterator[Cell]:
             1e-3,
             "the window is undone where 3 % of it are left; a lone line's rounding stays under the floor",
             _cadence_error,
+        ),
+        (
+            "comb levels",
+            "largest error over the highest peak, or over 1 [1]",
+            1e-4,
+            "the evidence of a line is capped, and block means are taken off before the transform",
+            _comb_heights_error,
         ),
         (
             "bandwidth",

@@ -10,6 +10,7 @@ from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
 from ..spectrum import LEAST_FLOOR, LEAST_PART, Spectrum, doppler_spectrum
 from ..vector import _BANDS, _SIGNIFICANT, radar_columns
 from .cadence import cadence_db
+from .comb_levels import comb_levels_db
 from .measurements import (
     Body,
     band_levels_db,
@@ -31,7 +32,7 @@ from .operators import Graph, Value
 from .spectrum import centred_power, centred_transform, noise_floor, pooled, pooled_mean, power_of, to_db, unit_scale
 
 #: The model inputs that are made in a graph.
-IN_GRAPH = ("features", "levels", "spectrum", "cadence")
+IN_GRAPH = ("features", "levels", "spectrum", "cadence", "combs")
 
 #: Name of the graph's input: float32, shape (records, pulses, 2), I and Q.
 IQ = "iq"
@@ -85,12 +86,14 @@ def input_graph(
     mean, peak = pooled(relative_power, pooling(radar.bins, radar.carrier_hz, radar.prf_hz, AXIS_BINS))
 
     out = {"levels": graph.concat(*(row.reshape(-1, 1, AXIS_BINS) for row in (mean, peak)), axis=1)}
-    if "features" in names or "cadence" in names:
+    if {"features", "cadence", "combs"} & set(names):
         level_db = to_db(relative_power)
         body = body_line(radar, relative_power, level_db)
         kept = notch_weights(radar, body)
     if "cadence" in names:
         out["cadence"] = cadence_db(radar, transform, safe, kept)
+    if "combs" in names:
+        out["combs"] = comb_levels_db(radar, relative_power, kept)
     if "spectrum" in names or "features" in names:
         length = part_length(pulses)
         starts, _ = _frame_starts(pulses, length, PARTS)

@@ -34,12 +34,14 @@ TRIALS = {
     "levels": ("levels",),
     "levels, change": ("spectrum",),
     "levels, cadence": ("levels", "cadence"),
+    "levels, cadence, combs": ("levels", "cadence", "combs"),
     "levels, change, cadence": ("spectrum", "cadence"),
     "levels, change, measurements": ("spectrum", "features"),
-    "all": ("spectrum", "cadence", "features"),
+    "all without combs": ("spectrum", "cadence", "features"),
+    "all": ("spectrum", "cadence", "combs", "features"),
 }
 
-DRAWN = ("spectrum", "cadence", "features")
+DRAWN = TRIALS["all"]
 
 
 def inputs_of(part: Gathered, names: tuple[str, ...], held: NDArray[np.bool_]) -> dict[str, NDArray]:

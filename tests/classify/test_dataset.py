@@ -73,7 +73,7 @@ def test_training_takes_the_same_bits_from_the_disk_as_from_the_simulator(whole,
     for purpose, count in COUNTS.items():
         one, other = getattr(stored, purpose), getattr(drawn, purpose)
         assert len(one) == count
-        assert list(one.inputs) == list(other.inputs) == ["features", "spectrum", "cadence"]
+        assert list(one.inputs) == list(other.inputs) == ["features", "spectrum", "cadence", "combs"]
         for name, values in other.inputs.items():
             np.testing.assert_array_equal(one.inputs[name], values)
         np.testing.assert_array_equal(one.labels, other.labels)

@@ -99,6 +99,7 @@ def test_the_graph_makes_the_inputs_that_python_makes(radar):
     np.testing.assert_allclose(found["levels"], expected["levels"], atol=2e-3)
     # a weak line of the power over time stands beside strong ones in the same sums
     np.testing.assert_allclose(found["cadence"], expected["cadence"], atol=0.05)
+    np.testing.assert_allclose(found["combs"], expected["combs"], atol=0.01)
     # a threshold or a choice of peaks that rounding decides may fall the other way in a rare record
     scale = FEATURES.high - FEATURES.low
     off = np.abs(found["features"] - expected["features"]) / scale > 1e-4

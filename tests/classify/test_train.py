@@ -109,7 +109,7 @@ def _few_sets(*_):
     def gathered(count):
         labels = np.arange(count) % 3
         inputs = {}
-        for name in ("features", "spectrum", "cadence"):
+        for name in ("features", "spectrum", "cadence", "combs"):
             values = rng.normal(size=(count, *INPUT_SHAPES[name]))
             inputs[name] = (values + 0.3 * labels.reshape(-1, *[1] * (values.ndim - 1))).astype(np.float32)
         return Gathered(inputs, labels, {})

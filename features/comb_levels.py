@@ -1,0 +1,245 @@
+"""Comb levels: how loudly lines that are a chopping frequency apart speak, for every chopping frequency at once.
+
+The cepstrum takes the logarithm of each bin, so that noise without any line weighs most; here a bin counts by what it
+says of a line (`evidence`), and a spacing by its peak and the peaks at multiples of its period together. Rotors are
+told from noise at 2 to 3 dB less than by the cepstral peak alone.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.polynomial import laguerre
+from numpy.typing import NDArray
+from scipy import fft
+
+from .axis import UNSEEN_DB
+from .chopping import CHOPPING_RANGE_HZ, MIN_SPACING_BINS
+from .evidence import LINE_CAP, MISSING_SHARE
+from .notch import Mask, weights
+from .schema import COMB_BINS
+from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, sums, taper, to_db
+
+#: Lines are looked for up to this speed [m/s]: beyond it lie the ends of few rotors' bands, and noise.
+REACH_MPS = 80.0
+
+#: Power over the floor from which on more says nothing more: the evidence is capped long before.
+MOST_POWER = np.float32(20.0)
+
+#: SNR of the weak lines that are looked for, a bin.
+WEAK_SNR = 0.7
+
+#: Peaks at so many multiples of the period are summed; a sum ends after one of these, whichever speaks loudest.
+ENDS = (1, 2, 4, 6)
+
+#: What is alike over this much of the spectrum is no comb [Hz], nor over so few bins.
+BLOCK_HZ, BLOCK_BINS = 800.0, 64
+
+#: Mean and standard deviation of a Rayleigh magnitude of unit mean square.
+MEAN_HEIGHT, HEIGHT_DEVIATION = float(np.sqrt(np.pi) / 2), float(np.sqrt(1 - np.pi / 4))
+
+
+@dataclass(frozen=True)
+class CombPlan:
+    """What the comb levels of one radar's dwell need besides the spectrum.
+
+    Parameters
+    ----------
+    band : slice
+        Bins that are looked at.
+    blocks : int
+        Blocks that these fall into.
+    length : int
+        Length of the transform of these.
+    per_noise : ndarray of float32, shape (length // 2 + 1,)
+        One over the root mean square, in white noise, of that transform for a single bin.
+    lags : ndarray of int, shape (ENDS[-1], spacings)
+        Where the multiples of each period lie in it, the period rising by halves.
+    held : tuple of int
+        Of how many spacings, the first ones, each multiple lies within it.
+    per_deviation : ndarray of float32, shape (len(ENDS), spacings)
+        One over the standard deviation of the sums.
+    spans : tuple of ndarray of int, shape (seen,) each
+        First spacing of each bin of the axis and how many it holds, in falling rate.
+    seen : slice
+        Bins of the axis, in falling rate, that hold any.
+    """
+
+    band: slice
+    blocks: int
+    length: int
+    per_noise: NDArray[np.float32]
+    lags: NDArray[np.intp]
+    held: tuple[int, ...]
+    per_deviation: NDArray[np.float32]
+    spans: tuple[NDArray[np.intp], NDArray[np.intp]]
+    seen: slice
+
+
+def comb_edges_hz(bins: int = COMB_BINS) -> NDArray[np.float64]:
+    """Edges of the axis of chopping frequencies [Hz], rising by equal ratios, shape (bins + 1,)."""
+    return np.geomspace(*CHOPPING_RANGE_HZ, bins + 1)
+
+
+def line_nats(relative_power: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Evidence of a weak line in each bin [nats], as in `evidence.line_evidence` without its neighbourhood."""
+    out = np.minimum(relative_power, MOST_POWER)
+    out *= out.dtype.type(WEAK_SNR / (1 + WEAK_SNR))
+    np.exp(out, out=out)
+    out *= out.dtype.type((1 - MISSING_SHARE) / (1 + WEAK_SNR))
+    out += out.dtype.type(MISSING_SHARE)
+    np.log(out, out=out)
+    return np.minimum(out, out.dtype.type(LINE_CAP), out=out)
+
+
+@lru_cache(maxsize=1)
+def _covariance_series(terms: int = 24) -> NDArray[np.float64]:
+    """Squares of the Laguerre coefficients of `line_nats` under the exponential law, from the first order on.
+
+    Two bins of noise whose amplitudes correlate by r have evidences of covariance sum over k of these times |r|^2k.
+    """
+    power = np.linspace(0, 60, 60_001)
+    weight = np.exp(-power) * (power[1] - power[0])
+    weight[0] /= 2
+    held = line_nats(power.copy()) * weight
+    return np.array([float(held @ laguerre.lagval(power, np.eye(terms + 1)[k])) ** 2 for k in range(1, terms + 1)])
+
+
+def _noise_rms(pulses: int, bins: int, length: int) -> NDArray[np.float64]:
+    """Root mean square of the transform of the evidence of white noise, of a single bin, shape (length // 2 + 1,)."""
+    squared = taper(pulses) ** 2
+    alike = np.minimum(np.abs(fft.fft(squared / squared.sum(), n=bins)) ** 2, 1)[: bins // 2]
+    covariance = np.polynomial.polynomial.polyval(alike, np.concatenate([[0], _covariance_series()]))
+    near = np.arange(1, min(len(covariance), 64))
+    turn = 2 * np.pi * np.arange(length // 2 + 1) / length
+    variance = covariance[0] + 2 * np.cos(np.outer(turn, near)) @ covariance[near]
+    return np.sqrt(np.maximum(variance, 1e-3 * variance.max()))
+
+
+@lru_cache(maxsize=64)
+def comb_plan(bins: int, pulses: int, carrier_hz: float, prf_hz: float) -> CombPlan | None:
+    """Plan for a dwell; None where it holds no range to search.
+
+    Parameters
+    ----------
+    bins, pulses : int
+        Bins of the spectrum, pulses of the dwell.
+    carrier_hz, prf_hz : float
+        Carrier and pulse repetition frequency [Hz].
+    """
+    step_mps = prf_hz / bins * SPEED_OF_LIGHT_MPS / carrier_hz / 2
+    most = 2 * min(int(REACH_MPS / step_mps), (bins - 1) // 2) + 1
+    # an odd number of blocks of an odd number of bins: the same for a mirrored spectrum
+    blocks = (max(1, most // max(BLOCK_BINS, round(BLOCK_HZ * bins / prf_hz))) - 1) // 2 * 2 + 1
+    count = blocks * ((most // blocks - 1) // 2 * 2 + 1)
+    first = bins // 2 - count // 2
+    length = fft.next_fast_len(count, real=True)
+    # a period of so many samples lies at index samples x length / bins
+    shortest = max(prf_hz / CHOPPING_RANGE_HZ[1] * length / bins, 2.0)
+    longest = min(prf_hz / CHOPPING_RANGE_HZ[0] * length / bins, length / MIN_SPACING_BINS, length / 2)
+    places = np.arange(np.ceil(2 * shortest), np.floor(2 * longest) + 1) / 2
+    if len(places) < 4:
+        return None
+    multiple = np.arange(1, ENDS[-1] + 1)[:, None]
+    lags = np.rint(multiple * places).astype(np.intp)
+    within = lags <= length // 2
+    summed = np.minimum(np.array(ENDS)[:, None], within.sum(axis=0))
+    edges = prf_hz * length / bins / comb_edges_hz()[::-1]  # in places, rising
+    middle = np.sqrt(edges[:-1] * edges[1:])
+    told = np.flatnonzero((middle >= places[0]) & (middle <= places[-1]))
+    if not len(told):
+        return None
+    seen = slice(int(told[0]), int(told[-1]) + 1)
+    low, high = (np.searchsorted(places, part) for part in (edges[:-1][seen], edges[1:][seen]))
+    nearest = np.clip(np.rint(2 * (middle[seen] - places[0])), 0, len(places) - 1).astype(np.intp)
+    starts = np.where(high > low, low, nearest)
+    high[-1] = len(places)  # the slowest bin holds what is left of half a bin
+    return CombPlan(
+        slice(first, first + count),
+        blocks,
+        length,
+        (1 / _noise_rms(pulses, bins, length)).astype(np.float32),
+        lags,
+        tuple(within.sum(axis=1).tolist()),
+        (1 / (HEIGHT_DEVIATION * np.sqrt(summed))).astype(np.float32),
+        (starts, np.maximum(high - starts, 1)),
+        seen,
+    )
+
+
+def comb_levels_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
+    """How loudly the lines of each chopping frequency speak.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Spectra, shape (..., bins).
+    mask : ndarray of bool or float32, shape (..., bins)
+        From `notch_mask`, or its `weights`: the body line is no comb.
+
+    Returns
+    -------
+    ndarray of float32, shape (..., 1, COMB_BINS)
+        Largest sum of each bin of the axis, rising in rate, over its standard deviation in noise [dB], not below 0;
+        `UNSEEN_DB` at rates that the dwell does not tell or the PRF does not hold. Multiples of a period are periods
+        as well: a comb shows at the fractions of its chopping frequency too.
+    """
+    out = np.full((*spectrum.relative_power.shape[:-1], 1, COMB_BINS), UNSEEN_DB, np.float32)
+    plan = comb_plan(spectrum.bins, spectrum.pulses, spectrum.carrier_hz, spectrum.prf_hz)
+    if plan is not None:
+        heights = comb_heights(spectrum.relative_power[..., plan.band], weights(mask[..., plan.band]), plan)
+        loudest = np.maximum.reduceat(_loudest_sums(heights, plan), plan.spans[0], axis=-1)
+        out[..., 0, ::-1][..., plan.seen] = to_db(loudest, 0.0)
+    return out
+
+
+def comb_heights(power: NDArray[np.floating], kept: NDArray[np.floating], plan: CombPlan) -> NDArray[np.floating]:
+    """What the evidence repeats at: its transform over that of noise, less the mean of that.
+
+    Parameters
+    ----------
+    power : ndarray, shape (..., bins of the band)
+        Power over the floor.
+    kept : ndarray, same shape
+        1 where a bin counts, else 0.
+    plan : CombPlan
+        Of the radar and the dwell.
+
+    Returns
+    -------
+    ndarray, shape (..., plan.length // 2 + 1)
+        Noise has mean 0 and deviation `HEIGHT_DEVIATION`.
+    """
+    counts = kept.reshape(*power.shape[:-1], plan.blocks, -1)
+    nats = line_nats(power).reshape(counts.shape)
+    nats *= counts
+    number = sums(counts)
+    nats -= (sums(nats) / np.maximum(number, np.float32(1)))[..., None]
+    nats *= counts
+    heights = np.abs(fft.rfft(nats.reshape(power.shape), plan.length, overwrite_x=True))
+    heights *= plan.per_noise
+    heights *= np.reciprocal(np.sqrt(np.maximum(sums(number), np.float32(1))))[..., None]
+    heights -= np.float32(MEAN_HEIGHT)
+    return heights
+
+
+def _loudest_sums(heights: NDArray[np.float32], plan: CombPlan) -> NDArray[np.float32]:
+    """The largest of the sums of each spacing over its deviation in noise, not below 0, shape (..., spacings)."""
+    first = plan.lags[1, 0]
+    total = heights.take(plan.lags[0], axis=-1, mode="wrap")
+    best = total * plan.per_deviation[0]
+    np.maximum(best, np.float32(0), out=best)
+    ended = 1
+    for number in range(2, ENDS[-1] + 1):
+        held = plan.held[number - 1]  # longer periods have no such multiple
+        if number % 2:
+            total[..., :held] += heights.take(plan.lags[number - 1, :held], axis=-1, mode="wrap")
+        else:  # of half places every second multiple falls on whole ones, evenly
+            step = number // 2
+            total[..., :held] += heights[..., step * first : step * (first + held) : step]
+        if number in ENDS:
+            fresh = plan.held[ended]  # what has grown since the last end
+            level = total[..., :fresh] * plan.per_deviation[ENDS.index(number), :fresh]
+            np.maximum(best[..., :fresh], level, out=best[..., :fresh])
+            ended = number
+    return best
