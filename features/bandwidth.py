@@ -93,7 +93,7 @@ def _block_sums(energy: NDArray[np.float32]) -> NDArray[np.float32]:
     records, bins = energy.shape
     whole = bins - bins % _BLOCK
     out = np.empty((records, -(-bins // _BLOCK)), np.float32)
-    blocks = energy[:, :whole].reshape(records, -1, _BLOCK)
+    blocks = energy[:, :whole].reshape(records, whole // _BLOCK, _BLOCK)
     np.matmul(blocks, ones(_BLOCK), out=out[:, : whole // _BLOCK])
     if whole < bins:
         out[:, -1] = sums(energy[:, whole:])

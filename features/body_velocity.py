@@ -62,7 +62,7 @@ def body_velocity(
     if fit is None:
         open_std = _rivals_std(spectrum, own)
     else:
-        offset = abs(own - fit.centre)
+        offset = abs(folded(own - fit.centre))
         # rotors that were taken for one move its comb
         apart = offset if offset > APART_DEVIATIONS * np.hypot(std, fit.centre_std) else 0.0
         if offset * data.pulses > 1.0:
@@ -70,7 +70,12 @@ def body_velocity(
         elif steady and fit.centre_std < std:
             turns, std = fit.centre, float(np.hypot(fit.centre_std, apart))
     scale = data.prf_hz * data.wavelength_m / 2
-    return -turns * scale, float(np.hypot(std, open_std)) * scale
+    return -folded(turns) * scale, float(np.hypot(std, open_std)) * scale
+
+
+def folded(turns: float) -> float:
+    """A frequency within the unambiguous span, -0.5 to 0.5 [cycles a sample]: a comb's centre may be fitted beyond."""
+    return turns - round(turns)
 
 
 def _lobe(bins: NDArray[np.floating]) -> NDArray[np.floating]:

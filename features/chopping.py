@@ -143,10 +143,10 @@ def _sums_before(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """
     count = values.shape[-1]
     padded = np.zeros((*values.shape[:-1], count // _BLOCK + 1, _BLOCK), np.float32)
-    padded.reshape(*values.shape[:-1], -1)[..., :count] = values
+    padded.reshape(*values.shape[:-1], padded.shape[-2] * _BLOCK)[..., :count] = values
     out = padded @ _BEFORE
     out[..., 1:, :] += np.add.accumulate(sums(padded[..., :-1, :]), axis=-1)[..., None]
-    return out.reshape(*values.shape[:-1], -1)
+    return out.reshape(*values.shape[:-1], padded.shape[-2] * _BLOCK)
 
 
 @lru_cache(maxsize=64)

@@ -181,8 +181,9 @@ def comb_levels_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     -------
     ndarray of float32, shape (..., 1, COMB_BINS)
         Largest sum of each bin of the axis, rising in rate, over its standard deviation in noise [dB], not below 0;
-        `UNSEEN_DB` at rates that the dwell does not tell or the PRF does not hold. Multiples of a period are periods
-        as well: a comb shows at the fractions of its chopping frequency too.
+        `UNSEEN_DB` at rates that the dwell does not tell, the PRF does not hold, or of which two lines do not fit
+        within `REACH_MPS`. Multiples of a period are periods as well: a comb shows at the fractions of its chopping
+        frequency too.
     """
     out = np.full((*spectrum.relative_power.shape[:-1], 1, COMB_BINS), UNSEEN_DB, np.float32)
     plan = comb_plan(spectrum.bins, spectrum.pulses, spectrum.carrier_hz, spectrum.prf_hz)
@@ -208,9 +209,10 @@ def comb_heights(power: NDArray[np.floating], kept: NDArray[np.floating], plan: 
     Returns
     -------
     ndarray, shape (..., plan.length // 2 + 1)
-        Noise has mean 0 and deviation `HEIGHT_DEVIATION`.
+        Noise has mean 0 and deviation `HEIGHT_DEVIATION`; somewhat less at rates whose period in the spectrum is that
+        of a block and more (above 1200 Hz), of which the blocks' means take a part.
     """
-    counts = kept.reshape(*power.shape[:-1], plan.blocks, -1)
+    counts = kept.reshape(*power.shape[:-1], plan.blocks, power.shape[-1] // plan.blocks)
     nats = line_nats(power).reshape(counts.shape)
     nats *= counts
     number = sums(counts)

@@ -10,7 +10,7 @@ from scipy import fft
 
 from .notch import body_line
 from .periodogram import LINE_DB
-from .spectrum import SPEED_OF_LIGHT_MPS, as_complex, doppler_spectrum
+from .spectrum import NOT_FINITE, SPEED_OF_LIGHT_MPS, as_complex, doppler_spectrum
 
 #: Dwells by which the body is followed [s].
 BODY_DWELL_S = 0.1
@@ -33,9 +33,11 @@ def by_recording(
     Raises
     ------
     ValueError
-        If the samples are not complex.
+        If the samples are not complex or not finite.
     """
     samples = as_complex(iq)
+    if not np.isfinite(samples).all():
+        raise ValueError(NOT_FINITE)
     lead, pulses = samples.shape[:-1], samples.shape[-1:]
     rows = [one(samples[index]) for index in np.ndindex(lead)] or [one(np.zeros(pulses, np.complex64))]
     return [np.array(column)[: math.prod(lead)].reshape(lead) for column in zip(*rows, strict=True)]

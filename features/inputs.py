@@ -49,7 +49,8 @@ def model_inputs(
     Raises
     ------
     ValueError
-        If a name is unknown, `iq` is not complex or has fewer than `MIN_PULSES` pulses, or a frequency is not positive.
+        If a name is unknown, `iq` is not complex or not finite or has fewer than `MIN_PULSES` pulses, or a frequency is
+        not positive.
     """
     wanted = frozenset(names)
     unknown = wanted - INPUT_SHAPES.keys()

@@ -77,7 +77,7 @@ def joint_vector(image: NDArray[np.float32], spectrum: Spectrum) -> NDArray[np.f
         "joint_bandwidth_mps": width.mean(axis=-1),
         "joint_bandwidth_swing_mps": width.std(axis=-1),
         "joint_centroid_swing_mps": centroid.std(axis=-1),
-        "joint_entropy": entropy(level.reshape(*level.shape[:-2], -1)),
+        "joint_entropy": entropy(level.reshape(*level.shape[:-2], level.shape[-2] * level.shape[-1])),
         "flash_log": np.log10(np.maximum(flash_hz, 1)),
         "flash_strength": flash_strength,
         "frame_swing_db": level.mean(axis=-2).std(axis=-1),

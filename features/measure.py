@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .bandwidth import threshold_band_hz
-from .body_velocity import body_velocity
+from .body_velocity import body_velocity, folded
 from .chopping import Chopping
 from .comb import LEAST_REACH_MPS, find_comb
 from .family_edge import SPAN, edge_around, edge_of_lines, surer_edge
@@ -18,13 +18,16 @@ from .one_thread import one_thread
 from .periodogram import prepared
 from .rotors import MAX_ROTORS
 from .smearing import smearing_index
-from .spectrum import LEAST_PART, Spectrum, as_complex, doppler_spectrum, largest_part
+from .spectrum import LEAST_PART, NOT_FINITE, Spectrum, as_complex, doppler_spectrum, largest_part
 
 #: Threshold of the paper's bandwidth rule over the noise [dB]: it took 20 on measured data, 30 on simulated.
 PAPER_THRESHOLD_DB = 20.0
 
 #: A fitted edge that may be so far out [cycles a sample] by so many of its deviations may be none.
 FURTHEST_EDGE, EDGE_DEVIATIONS = 0.48, 3.0
+
+#: Fitted lines that tell the edge of several rotors to no more than this share of it leave it to all about the orders.
+UNSURE_SHARE = 0.03
 
 #: The fields of the body's velocity and its deviation.
 BODY = ("body_velocity_mps", "body_velocity_mps_std")
@@ -182,7 +185,7 @@ def measure(
         raise ValueError(f"beta_rad is {beta_rad!r}: it must be at least 0 and below pi/2 [rad]")
     samples = as_complex(iq)
     if not np.isfinite(samples).all():
-        raise ValueError("iq holds values that are not finite: cut them out or replace them by 0")
+        raise ValueError(NOT_FINITE)
     shape = samples.shape[:-1]
     some = samples if samples.size else np.zeros((1, *samples.shape[-1:]), np.complex64)  # of none, fields of no length
     spectrum = doppler_spectrum(some, carrier_hz=carrier_hz, prf_hz=prf_hz)
@@ -263,6 +266,9 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     if not rotors.resolved:  # the mean lies anywhere within what the unresolved rates span
         out["chopping_hz_std"] = float(np.hypot(out["chopping_hz_std"], rotors.spread * prf_hz / np.sqrt(12)))
         edge, edge_std = surer_edge((edge, edge_std), edge_around(data, comb, rotors, blades))
+    elif count > 1 and not edge_std < UNSURE_SHARE * edge:  # the lines of rates just resolved hardly part within it
+        around = edge_around(data, comb, rotors, blades)
+        edge, edge_std = around if np.isinf(edge) else surer_edge((edge, edge_std), around)
     for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):
         padded = np.full(MAX_ROTORS, np.nan)
         padded[:count] = values * prf_hz
@@ -292,7 +298,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         out["blade_length_m"] = length
         out["blade_length_m_std"] = length * float(np.hypot(tip_std / tip, comb.chopping_std / comb.chopping))
 
-    centre_mps = np.float32(-comb.fit.centre * prf_hz * wavelength_m / 2)
+    centre_mps = np.float32(-folded(comb.fit.centre) * prf_hz * wavelength_m / 2)
     energy = np.where(spectrum.level_db > 6.0, residual(spectrum, mask), np.float32(0))
     nothing = np.float32(np.nan)
     index = smearing_index(

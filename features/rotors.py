@@ -285,7 +285,7 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float) -> Rotors
     if not rotors.resolved:
         return rotors
     several = len(rotors.fits) > 1
-    per_turn = 1 if several else comb.per_turn
+    per_turn = comb.per_turn if rotors.fits[0] is comb.fit else 1
     tip = edge / (per_turn * max(fit.spacing for fit in rotors.fits))  # an order is the same for all: blades are alike
     twice = any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
     clear, hidden = _left_over(data.left(rotors.rest), rotors.fits, edge)

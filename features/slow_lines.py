@@ -43,7 +43,7 @@ def whole(both: NDArray[np.float64]) -> NDArray[np.complex128]:
     return np.ascontiguousarray(both).view(np.complex128)
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=8)
 def slepian(pulses: int, half_bins: float) -> NDArray[np.float64]:
     """Orthonormal sequences that hold the signals within so many bins of frequency 0, shape (sequences, pulses).
 
@@ -112,7 +112,7 @@ def _odd(pulses: int, half_bins: float) -> NDArray[np.bool_]:
     return np.asarray((basis * basis[:, ::-1]).sum(axis=1) < 0)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)
 def _held(pulses: int, half_bins: float) -> NDArray[np.float32]:
     """Unit lines, and those times time, seen by the sequences, even and odd ones both real.
 

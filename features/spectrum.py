@@ -43,7 +43,8 @@ class Spectrum:
     Parameters
     ----------
     relative_power : ndarray of float32, shape (..., bins)
-        Power over the noise floor [1], centred (fftshift): noise alone has mean 1.
+        Power over the noise floor [1], centred (fftshift): noise alone has mean 1 within 5 % from 500 pulses on; of
+        shorter dwells the floor is too high, by 1 dB at 256 and 64 pulses, by 0.3 dB at 128.
     floor : ndarray of float64, shape (...)
         Noise power a sample, in the square of the input's unit; 0 for an all-zero record. float64, because the square
         of a sample may leave float32.
@@ -141,6 +142,8 @@ def means(values: NDArray[np.float32]) -> NDArray[np.float32]:
 def windows(values: NDArray, shape: tuple[int, ...], steps: tuple[int, ...], first: int = 0) -> NDArray:
     """The last axis from an element on seen as axes of so many elements and steps, shape (..., *shape), to be read."""
     values = np.ascontiguousarray(values)
+    if not values.size:  # no element to begin at
+        return np.empty((*values.shape[:-1], *shape), values.dtype)
     strides = (*values.strides[:-1], *(step * values.itemsize for step in steps))
     # a sixth of the time of `as_strided`
     return np.ndarray((*values.shape[:-1], *shape), values.dtype, values, first * values.itemsize, strides)
@@ -229,6 +232,9 @@ def power_of(transform: NDArray[np.complex64]) -> NDArray[np.float32]:
     return np.multiply(power, power, out=power)
 
 
+#: What is said of samples that are not.
+NOT_FINITE = "iq holds values that are not finite: cut them out or replace them by 0"
+
 #: A record whose largest part is below this has lost its digits among float32's denormal numbers: 9 bits are left here.
 LEAST_PART = 2.0**-140
 
@@ -244,8 +250,16 @@ def unit_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
 
     A power of two changes no digit, so results do not depend on the gain; the square of the scaled samples can neither
     overflow nor vanish.
+
+    Raises
+    ------
+    ValueError
+        If a sample is not finite.
     """
-    _, exponent = np.frexp(largest_part(iq)[..., None])
+    largest = largest_part(iq)
+    if not np.isfinite(largest).all():
+        raise ValueError(NOT_FINITE)
+    _, exponent = np.frexp(largest[..., None])
     return np.ldexp(np.float32(1), -np.minimum(np.maximum(exponent, -126), 126))
 
 
@@ -324,6 +338,13 @@ def as_complex(iq: ArrayLike) -> NDArray[np.complex64]:
     return samples.astype(np.complex64, copy=False)
 
 
+def require_radar(carrier_hz: float, prf_hz: float) -> None:
+    """Refuse frequencies that are none [Hz]."""
+    for name, value in (("carrier_hz", carrier_hz), ("prf_hz", prf_hz)):
+        if not (math.isfinite(value) and value > 0):
+            raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
+
+
 def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spectrum:
     """Doppler spectrum of a dwell, in units of its own noise floor.
 
@@ -342,14 +363,12 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spec
     Raises
     ------
     ValueError
-        If `iq` is not complex, it has fewer than 2 pulses, or the frequencies are not positive.
+        If `iq` is not complex or not finite, it has fewer than 2 pulses, or the frequencies are not positive.
     """
     samples = as_complex(iq)
     if samples.ndim < 1 or samples.shape[-1] < 2:
         raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least 2 pulses")
-    for name, value in (("carrier_hz", carrier_hz), ("prf_hz", prf_hz)):
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
+    require_radar(carrier_hz, prf_hz)
     scale = safe_scale(samples)
     transform = centred_transform(scaled(samples, scale))
     power = power_of(transform)

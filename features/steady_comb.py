@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .body_velocity import folded
 from .comb import find_comb
 from .following import by_recording
 from .one_thread import one_thread
@@ -94,5 +95,5 @@ def _rotor_hz(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> fl
         return None
     per_mps = 2 * carrier_hz / SPEED_OF_LIGHT_MPS
     reach_mps = comb.last * comb.fit.spacing * prf_hz / per_mps
-    body_mps = abs(comb.fit.centre) * prf_hz / per_mps
+    body_mps = abs(folded(comb.fit.centre)) * prf_hz / per_mps
     return comb.chopping * prf_hz if reach_mps > OVER_BODY * body_mps else None

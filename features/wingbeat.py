@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from .following import by_recording, followed, standing
 from .repetition import HARMONICS, LevelSpectrum, Repetition, level_spectrum, repetition
-from .spectrum import LEAST_FLOOR, SPEED_OF_LIGHT_MPS
+from .spectrum import LEAST_FLOOR, SPEED_OF_LIGHT_MPS, require_radar
 from .stft import stft
 
 #: Wingbeats that are sought [Hz]: the slowest is a swan's in a slow beat, the fastest a small songbird's.
@@ -127,7 +127,13 @@ def wingbeat(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: floa
     Returns
     -------
     Wingbeat
+
+    Raises
+    ------
+    ValueError
+        If `iq` is not complex or not finite, or a frequency is not positive.
     """
+    require_radar(carrier_hz, prf_hz)
     return Wingbeat(*by_recording(iq, lambda samples: _one(samples, carrier_hz, prf_hz)))
 
 

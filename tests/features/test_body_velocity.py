@@ -3,6 +3,7 @@ import pytest
 from bladewing.features import measure
 from bladewing.features.body_velocity import NOISE_BINS
 from bladewing.features.spectrum import KAISER_BETA
+from bladewing.simulate import RotorMotion, rotor_echo
 
 from .signals import CARRIER_HZ, PRF_HZ, WAVELENGTH_M, white
 
@@ -69,3 +70,17 @@ def test_without_a_comb_a_line_as_strong_may_be_the_body_as_well():
     # one that is far weaker says nothing
     alone = measure(lines(rng, 20, snr_db=35, beside=((80.0, 0.3),))[0], **RADAR)
     assert np.median(alone.body_velocity_mps_std) < 0.05
+
+
+@pytest.mark.parametrize("velocity_mps", [-88.0, 70.0])
+def test_a_body_weaker_than_its_blades_stays_within_the_unambiguous_span(velocity_mps):
+    """Its comb's centre may be fitted beyond: there it is the same line as on the other side."""
+    prf_hz, times_s = 12e3, np.arange(1500) / 12e3
+    rng = np.random.default_rng(3)
+    span_mps = WAVELENGTH_M * prf_hz / 4
+    turn = np.exp(-4j * np.pi * velocity_mps * times_s / WAVELENGTH_M)
+    for _ in range(8):
+        angle_rad = RotorMotion(rng.uniform(50, 70), rng.uniform(0, 6)).angle_rad(times_s)
+        blades = rotor_echo(angle_rad, wavelength_m=WAVELENGTH_M, blade_length_m=0.12)
+        iq = 2 * (blades / np.sqrt(np.mean(abs(blades) ** 2)) + 0.05) * turn + white(rng, 1500)
+        assert abs(measure(iq, carrier_hz=CARRIER_HZ, prf_hz=prf_hz).body_velocity_mps) <= span_mps

@@ -208,3 +208,19 @@ def test_real_samples_are_refused():
     # they would pass for a spectrum with two like sides
     with pytest.raises(ValueError, match="iq holds float32: its samples must be complex"):
         model_inputs(np.ones(64, np.float32), carrier_hz=10e9, prf_hz=20e3)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_no_records_give_no_rows(name):
+    for lead in ((0,), (2, 0)):
+        found = model_inputs(np.zeros((*lead, 2048), np.complex64), **RADAR, names=(name,))[name]
+        assert found.shape == (*lead, *INPUT_SHAPES[name])
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("value", [np.nan, np.inf, complex(0, -np.inf)])
+def test_samples_that_are_not_finite_are_refused(name, value):
+    iq = white(np.random.default_rng(0), 3, 500).astype(np.complex64)
+    iq[1, 77] = value
+    with pytest.raises(ValueError, match="values that are not finite: cut them out or replace them by 0"):
+        model_inputs(iq, **RADAR, names=(name,))

@@ -88,3 +88,19 @@ def test_what_stands_past_the_edge_of_a_lone_rotors_lines_is_said():
         assert alone.rotor_count == past.rotor_count == 1
         assert alone.rotors_resolved
         assert not past.rotors_resolved
+
+
+@pytest.mark.parametrize("apart_hz", [0.17, 0.18, 0.2])
+def test_rotors_just_told_apart_have_their_tips(apart_hz):
+    """Their lines part past the edge alone: there is nothing of them, and nothing else may be taken for it."""
+    times_s = np.arange(PULSES) / PRF_HZ
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        rates_hz = rng.uniform(45, 60) + np.array([0, apart_hz])
+        angles = [RotorMotion(rate, rng.uniform(0, 6.28)).angle_rad(times_s) for rate in rates_hz]
+        echo = sum(rotor_echo(one, wavelength_m=WAVELENGTH_M, blade_length_m=0.15) for one in angles)
+        iq = 2 * (echo / np.sqrt(np.mean(np.abs(echo) ** 2)) + 3) + 0.4 * white(rng, PULSES)
+        found = measure(iq, **RADAR)
+        tip_mps = 2 * np.pi * 0.15 * rates_hz[1]
+        assert abs(found.tip_speed_mps - tip_mps) < max(0.02 * tip_mps, 3 * found.tip_speed_mps_std)
+        assert found.tip_speed_mps_std < 0.05 * tip_mps
