@@ -4,6 +4,7 @@ import numpy as np
 
 from .. import comb_levels as definition
 from ..axis import UNSEEN_DB
+from ..evidence import LINE_CAP, MISSING_SHARE
 from ..schema import COMB_BINS
 from ..spectrum import Spectrum
 from .operators import Value
@@ -14,8 +15,8 @@ def line_nats(relative_power: Value) -> Value:
     """As `comb_levels.line_nats`."""
     snr = definition.WEAK_SNR
     lifted = (relative_power.at_most(float(definition.MOST_POWER)) * (snr / (1 + snr))).apply("Exp")
-    seen = lifted * ((1 - definition.MISSING_SHARE) / (1 + snr)) + definition.MISSING_SHARE
-    return seen.apply("Log").at_most(definition.LINE_CAP)
+    seen = lifted * ((1 - MISSING_SHARE) / (1 + snr)) + MISSING_SHARE
+    return seen.apply("Log").at_most(LINE_CAP)
 
 
 def comb_levels_db(radar: Spectrum, relative_power: Value, kept: Value) -> Value:
