@@ -145,21 +145,26 @@ def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) 
     return len(shares) == 2 and min(shares) > SECOND_FLASH_SHARE / 2 and sum(shares) > 2 * SECOND_FLASH_SHARE
 
 
+def _power_about(
+    rest: Periodogram, centre: float
+) -> tuple[NDArray[np.float64], NDArray[np.floating], NDArray[np.bool_]]:
+    """Of each bin of what is left: how far from a centre it is [cycles a sample], its power, whether it can be seen."""
+    frequency = fft.fftfreq(rest.pulses)
+    away = np.abs(frequency - centre)
+    return np.abs(away - np.rint(away)), squared(fft.fft(rest.samples)) / rest.pulses, rest.usable(frequency)
+
+
 def _left_over(rest: Periodogram, fits: list[CombFit], edge: float) -> tuple[bool, bool]:
     """What is left within the band against the noise beyond it: whether it is clearly more, whether it may be a rotor.
 
     Fitted lines take noise out with them: each as much as it was let free, those that lie in one another only once.
     """
-    frequency = fft.fftfreq(rest.pulses)
-    away = np.abs(frequency - fits[0].centre)
-    away = np.abs(away - np.rint(away))
-    usable = rest.usable(frequency)
+    away, power, usable = _power_about(rest, fits[0].centre)
     low, high = 2 * fits[0].spacing, 0.9 * edge
     within = usable & (away < high) & (away > low)
     beyond = usable & (away > 1.1 * edge)
     if within.sum() < LEAST_BINS or beyond.sum() < LEAST_BINS:
         return False, False
-    power = squared(fft.fft(rest.samples)) / rest.pulses
     noise = float(power[beyond].mean())
     over = float(power[within].mean()) - noise
     lines = sum(float((np.abs(fit.amplitudes) ** 2).sum()) for fit in fits) * rest.pulses
@@ -182,16 +187,12 @@ def _stands_past(rest: Periodogram, fit: CombFit, edge: float) -> bool:
 
     Rotors of unlike rates have their lines in one another at the inner orders, and apart at the outer ones.
     """
-    frequency = fft.fftfreq(rest.pulses)
-    away = np.abs(frequency - fit.centre)
-    away = np.abs(away - np.rint(away))
-    usable = rest.usable(frequency)
+    away, power, usable = _power_about(rest, fit.centre)
     furthest = min(PAST_EDGE * edge, (edge + 0.5) / 2)
     past = usable & (away > 1.1 * edge) & (away < furthest)
     far = usable & (away > furthest)
     if past.sum() < LEAST_BINS or far.sum() < LEAST_BINS:
         return False
-    power = squared(fft.fft(rest.samples)) / rest.pulses
     noise = float(power[far].mean())
     over = float(power[past].mean()) - noise
     lines = float((np.abs(fit.amplitudes) ** 2).sum()) * rest.pulses
@@ -288,8 +289,9 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float) -> Rotors
     per_turn = comb.per_turn if rotors.fits[0] is comb.fit else 1
     tip = edge / (per_turn * max(fit.spacing for fit in rotors.fits))  # an order is the same for all: blades are alike
     twice = any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
-    clear, hidden = _left_over(data.left(rotors.rest), rotors.fits, edge)
-    past = not several and _stands_past(data.left(rotors.rest), rotors.fits[0], edge)
+    rest = data.left(rotors.rest)
+    clear, hidden = _left_over(rest, rotors.fits, edge)
+    past = not several and _stands_past(rest, rotors.fits[0], edge)
     # a little that a single rotor leaves may be a change of its rate
     if not (twice or hidden or past or (several and clear)):
         return rotors
