@@ -15,7 +15,7 @@ from scipy import fft
 
 from .axis import UNSEEN_DB
 from .chopping import CHOPPING_RANGE_HZ, MIN_SPACING_BINS
-from .evidence import LINE_CAP, MISSING_SHARE
+from .evidence import line_log_ratio
 from .notch import Mask, weights
 from .schema import COMB_BINS
 from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, sums, taper, to_db
@@ -82,14 +82,8 @@ def comb_edges_hz(bins: int = COMB_BINS) -> NDArray[np.float64]:
 
 
 def line_nats(relative_power: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Evidence of a weak line in each bin [nats], as in `evidence.line_evidence` without its neighbourhood."""
-    out = np.minimum(relative_power, MOST_POWER)
-    out *= out.dtype.type(WEAK_SNR / (1 + WEAK_SNR))
-    np.exp(out, out=out)
-    out *= out.dtype.type((1 - MISSING_SHARE) / (1 + WEAK_SNR))
-    out += out.dtype.type(MISSING_SHARE)
-    np.log(out, out=out)
-    return np.minimum(out, out.dtype.type(LINE_CAP), out=out)
+    """Evidence of a weak line in each bin [nats]."""
+    return line_log_ratio(np.minimum(relative_power, MOST_POWER), WEAK_SNR)
 
 
 @lru_cache(maxsize=1)

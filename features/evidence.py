@@ -33,9 +33,22 @@ def line_evidence(power: NDArray[np.floating], block: int) -> NDArray[np.float32
     strongest = maximum_filter1d(power, block, mode="wrap")
     held = power / (1 + np.float32(NEIGHBOUR_SHARE) * np.maximum(strongest - 10, 0))
     held = np.minimum(held, np.float32(60))
-    snr = np.array(LINE_SNRS, np.float32)[:, None]
-    out = np.exp(held * (snr / (1 + snr)))
+    return np.asarray(line_log_ratio(held, np.array(LINE_SNRS, np.float32)[:, None]), np.float32)
+
+
+def line_log_ratio(power: NDArray[np.floating], snr: float | NDArray[np.floating]) -> NDArray[np.floating]:
+    """Log likelihood ratio of a line of an SNR, which may be missing, against noise, at most `LINE_CAP` [nats].
+
+    Parameters
+    ----------
+    power : ndarray
+        Power over noise, of a size whose exponential its type holds.
+    snr : float or ndarray
+        SNR of the line in a bin, broadcast against `power`.
+    """
+    out = power * (snr / (1 + snr))
+    np.exp(out, out=out)
     out *= (1 - MISSING_SHARE) / (1 + snr)
-    out += np.float32(MISSING_SHARE)
+    out += out.dtype.type(MISSING_SHARE)
     np.log(out, out=out)
-    return np.asarray(np.minimum(out, np.float32(LINE_CAP), out=out), np.float32)
+    return np.minimum(out, out.dtype.type(LINE_CAP), out=out)
