@@ -95,7 +95,7 @@ def _covariance_series(terms: int = 24) -> NDArray[np.float64]:
     power = np.linspace(0, 60, 60_001)
     weight = np.exp(-power) * (power[1] - power[0])
     weight[0] /= 2
-    held = line_nats(power.copy()) * weight
+    held = line_nats(power) * weight
     return np.array([float(held @ laguerre.lagval(power, np.eye(terms + 1)[k])) ** 2 for k in range(1, terms + 1)])
 
 

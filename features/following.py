@@ -10,7 +10,7 @@ from scipy import fft
 
 from .notch import body_line
 from .periodogram import LINE_DB
-from .spectrum import NOT_FINITE, SPEED_OF_LIGHT_MPS, as_complex, doppler_spectrum
+from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum, finite_complex
 
 #: Dwells by which the body is followed [s].
 BODY_DWELL_S = 0.1
@@ -35,9 +35,7 @@ def by_recording(
     ValueError
         If the samples are not complex or not finite.
     """
-    samples = as_complex(iq)
-    if not np.isfinite(samples).all():
-        raise ValueError(NOT_FINITE)
+    samples = finite_complex(iq)
     lead, pulses = samples.shape[:-1], samples.shape[-1:]
     rows = [one(samples[index]) for index in np.ndindex(lead)] or [one(np.zeros(pulses, np.complex64))]
     return [np.array(column)[: math.prod(lead)].reshape(lead) for column in zip(*rows, strict=True)]

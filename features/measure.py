@@ -18,7 +18,7 @@ from .one_thread import one_thread
 from .periodogram import prepared
 from .rotors import MAX_ROTORS
 from .smearing import smearing_index
-from .spectrum import LEAST_PART, NOT_FINITE, Spectrum, as_complex, doppler_spectrum, largest_part
+from .spectrum import LEAST_PART, Spectrum, doppler_spectrum, finite_complex, largest_part
 
 #: Threshold of the paper's bandwidth rule over the noise [dB]: it took 20 on measured data, 30 on simulated.
 PAPER_THRESHOLD_DB = 20.0
@@ -183,9 +183,7 @@ def measure(
         raise ValueError(f"blades is {blades!r}: it must be a whole number of at least 1")
     if beta_rad is not None and not 0 <= beta_rad < np.pi / 2:
         raise ValueError(f"beta_rad is {beta_rad!r}: it must be at least 0 and below pi/2 [rad]")
-    samples = as_complex(iq)
-    if not np.isfinite(samples).all():
-        raise ValueError(NOT_FINITE)
+    samples = finite_complex(iq)
     shape = samples.shape[:-1]
     some = samples if samples.size else np.zeros((1, *samples.shape[-1:]), np.complex64)  # of none, fields of no length
     spectrum = doppler_spectrum(some, carrier_hz=carrier_hz, prf_hz=prf_hz)

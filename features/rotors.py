@@ -145,21 +145,24 @@ def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) 
     return len(shares) == 2 and min(shares) > SECOND_FLASH_SHARE / 2 and sum(shares) > 2 * SECOND_FLASH_SHARE
 
 
-def _power_about(
-    rest: Periodogram, centre: float
-) -> tuple[NDArray[np.float64], NDArray[np.floating], NDArray[np.bool_]]:
+#: Of each bin: how far from a centre it is [cycles a sample], its power, whether it can be seen.
+_About = tuple[NDArray[np.float64], NDArray[np.floating], NDArray[np.bool_]]
+
+
+def _power_about(rest: Periodogram, centre: float) -> _About:
     """Of each bin of what is left: how far from a centre it is [cycles a sample], its power, whether it can be seen."""
     frequency = fft.fftfreq(rest.pulses)
     away = np.abs(frequency - centre)
     return np.abs(away - np.rint(away)), squared(fft.fft(rest.samples)) / rest.pulses, rest.usable(frequency)
 
 
-def _left_over(rest: Periodogram, fits: list[CombFit], edge: float) -> tuple[bool, bool]:
+def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[bool, bool]:
     """What is left within the band against the noise beyond it: whether it is clearly more, whether it may be a rotor.
 
     Fitted lines take noise out with them: each as much as it was let free, those that lie in one another only once.
     """
-    away, power, usable = _power_about(rest, fits[0].centre)
+    away, power, usable = about
+    pulses = len(power)
     low, high = 2 * fits[0].spacing, 0.9 * edge
     within = usable & (away < high) & (away > low)
     beyond = usable & (away > 1.1 * edge)
@@ -167,14 +170,14 @@ def _left_over(rest: Periodogram, fits: list[CombFit], edge: float) -> tuple[boo
         return False, False
     noise = float(power[beyond].mean())
     over = float(power[within].mean()) - noise
-    lines = sum(float((np.abs(fit.amplitudes) ** 2).sum()) for fit in fits) * rest.pulses
+    lines = sum(float((np.abs(fit.amplitudes) ** 2).sum()) for fit in fits) * pulses
     clear = over > LEFT_OVER * noise and over * within.sum() > LEFT_SHARE * lines
-    range_bins = float(np.ptp([fit.spacing for fit in fits])) * rest.pulses
+    range_bins = float(np.ptp([fit.spacing for fit in fits])) * pulses
     held, taken = 0.0, 0.0
     for fit in fits:
         order = np.abs(fit.orders)
         inside = (order * fit.spacing < high) & (order * fit.spacing > low)
-        held += float((np.abs(fit.amplitudes[inside]) ** 2).sum()) * rest.pulses / len(fits)
+        held += float((np.abs(fit.amplitudes[inside]) ** 2).sum()) * pulses / len(fits)
         apart = np.minimum(1.0, (1 + order[inside] * range_bins) / len(fits))
         taken += float((apart * fit.snr[inside] / (1 + fit.snr[inside])).sum())
     deviation = noise * float(np.sqrt(1 / within.sum() + 1 / beyond.sum()))
@@ -182,12 +185,12 @@ def _left_over(rest: Periodogram, fits: list[CombFit], edge: float) -> tuple[boo
     return clear, most * within.sum() > held
 
 
-def _stands_past(rest: Periodogram, fit: CombFit, edge: float) -> bool:
+def _stands_past(about: _About, fit: CombFit, edge: float) -> bool:
     """True where more than noise stands past the edge of a line family: near the noise its inner lines alone are seen.
 
     Rotors of unlike rates have their lines in one another at the inner orders, and apart at the outer ones.
     """
-    away, power, usable = _power_about(rest, fit.centre)
+    away, power, usable = about
     furthest = min(PAST_EDGE * edge, (edge + 0.5) / 2)
     past = usable & (away > 1.1 * edge) & (away < furthest)
     far = usable & (away > furthest)
@@ -195,7 +198,7 @@ def _stands_past(rest: Periodogram, fit: CombFit, edge: float) -> bool:
         return False
     noise = float(power[far].mean())
     over = float(power[past].mean()) - noise
-    lines = float((np.abs(fit.amplitudes) ** 2).sum()) * rest.pulses
+    lines = float((np.abs(fit.amplitudes) ** 2).sum()) * len(power)
     deviation = noise * float(np.sqrt(1 / past.sum() + 1 / far.sum()))
     return over > PAST_DEVIATIONS * deviation and over * past.sum() > PAST_SHARE * lines
 
@@ -289,9 +292,9 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float) -> Rotors
     per_turn = comb.per_turn if rotors.fits[0] is comb.fit else 1
     tip = edge / (per_turn * max(fit.spacing for fit in rotors.fits))  # an order is the same for all: blades are alike
     twice = any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
-    rest = data.left(rotors.rest)
-    clear, hidden = _left_over(rest, rotors.fits, edge)
-    past = not several and _stands_past(rest, rotors.fits[0], edge)
+    about = _power_about(data.left(rotors.rest), rotors.fits[0].centre)
+    clear, hidden = _left_over(about, rotors.fits, edge)
+    past = not several and _stands_past(about, rotors.fits[0], edge)
     # a little that a single rotor leaves may be a change of its rate
     if not (twice or hidden or past or (several and clear)):
         return rotors

@@ -338,6 +338,20 @@ def as_complex(iq: ArrayLike) -> NDArray[np.complex64]:
     return samples.astype(np.complex64, copy=False)
 
 
+def finite_complex(iq: ArrayLike) -> NDArray[np.complex64]:
+    """Samples as complex64, all of them finite.
+
+    Raises
+    ------
+    ValueError
+        If they are not complex or not finite, or some are masked.
+    """
+    samples = as_complex(iq)
+    if not np.isfinite(samples).all():
+        raise ValueError(NOT_FINITE)
+    return samples
+
+
 def require_radar(carrier_hz: float, prf_hz: float) -> None:
     """Refuse frequencies that are none [Hz]."""
     for name, value in (("carrier_hz", carrier_hz), ("prf_hz", prf_hz)):
