@@ -66,15 +66,16 @@ def stroke_angles_rad(
     Returns
     -------
     inner, outer, sweep : ndarray of the type of `cycle_rad`, shape (..., pulses)
-        Elevation of the inner and of the outer part, and fore-aft sweep of the outer part [rad].
+        Elevation of the inner and of the outer part, and how far the outer part is swept back [rad]: least in the
+        down-stroke, when the hand is stretched.
 
     References
     ----------
-    Stroke 40 cos + 15, 30 cos + 40, 20 sin + 40 degrees: Journal of Electromagnetic Engineering and Science (2021).
+    Amplitudes 40, 30, 20 and means 15, 40, 40 degrees: Journal of Electromagnetic Engineering and Science (2021).
     """
     scale = np.asarray(stroke_scale, cycle_rad.dtype)[..., None]
     cosine, sine = scale * np.cos(cycle_rad), scale * np.sin(cycle_rad)
-    return np.deg2rad(40 * cosine + 15), np.deg2rad(30 * cosine + 40), np.deg2rad(20 * sine + 40)
+    return np.deg2rad(40 * cosine + 15), np.deg2rad(30 * cosine + 40), np.deg2rad(40 - 20 * sine)
 
 
 def wing_echo(
@@ -86,6 +87,7 @@ def wing_echo(
     stroke_scale: ArrayLike = 1.0,
     down_stroke: ArrayLike = 0.0,
     feather_weight: ArrayLike = 0.3,
+    sweep_scale: ArrayLike = 1.0,
 ) -> NDArray[np.complex64]:
     """Slow-time echo of both wings about the body.
 
@@ -104,9 +106,11 @@ def wing_echo(
     stroke_scale : array_like
         Scale of the stroke, 0 for a glide.
     down_stroke : array_like
-        How much stronger the down-stroke echoes, 0..1.
+        How much stronger the down-stroke echoes, 0..1; less where the stroke is less than the published one.
     feather_weight : array_like
         Amplitude of the wrist and tip scatterers against the whole line.
+    sweep_scale : array_like
+        Scale of the sweep, mean and amplitude: 1 for the published one, 0 for straight wings, negative for forward.
 
     Returns
     -------
@@ -118,8 +122,9 @@ def wing_echo(
     forward, right, up = (k_part * sight[..., axis, None].astype(np.float32) for axis in range(3))
     feather, down = (np.asarray(x, np.float32)[..., None] for x in (feather_weight, down_stroke))
     inner_right, inner_up = right * np.cos(inner), up * np.sin(inner)
-    back, across = forward * np.sin(sweep), np.cos(sweep)
-    outer_right, outer_up = across * right * np.cos(outer), back + across * up * np.sin(outer)
+    sweep = np.asarray(sweep_scale, sweep.dtype)[..., None] * sweep
+    ahead, across = -forward * np.sin(sweep), np.cos(sweep)
+    outer_right, outer_up = across * right * np.cos(outer), ahead + across * up * np.sin(outer)
     out = np.zeros(inner_right.shape, np.complex64)
     for side in (np.float32(1), np.float32(-1)):
         # A displacement towards the radar advances the phase by 2 k per metre, so by 2 x at the wrist and 2 y more at
@@ -132,7 +137,8 @@ def wing_echo(
         outer_line *= to_wrist
         out += inner_line
         out += outer_line
-    out *= 1 + down * np.sin(cycle)
+    # wings held still have no down-stroke
+    out *= 1 + down * np.minimum(np.asarray(stroke_scale, np.float32)[..., None], 1) * np.sin(cycle)
     return out
 
 
@@ -161,7 +167,7 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
     radar : Radar
         The radar that looks.
     kind : {"flapping_bird", "gliding_bird", "flock"}
-        Steady flapping; flap and glide (the pause may fall into the dwell, wholly or in part); 2 to `MAX_FLOCK`
+        Steady flapping; flap and glide, or glide and flap (the turn may fall into the dwell); 2 to `MAX_FLOCK`
         birds.
 
     Returns
@@ -191,7 +197,10 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
     rate = beat[:, None] * (1 + 0.1 * (draws.uniform(MAX_FLOCK) - 0.5))
     phase = draws.value("phase_rad", MAX_FLOCK)
     level = np.exp(0.4 * draws.normal(MAX_FLOCK) + 1j * draws.value("phase_rad", MAX_FLOCK)).astype(np.complex64)
-    pause, still = draws.uniform(), draws.chance(0.4)
+    pause, first = draws.uniform(), draws.chance(0.5)
+    # a glide through the whole dwell hardly moves the wings, or not at all
+    still = np.where(draws.chance(0.4), 0.05 * 1e-4 ** draws.uniform(), 1.0)
+    sweep = draws.value("sweep_scale")
     body_db = draws.value("bird_body_db")
 
     micro = np.zeros((records, radar.pulses), np.complex64)
@@ -203,9 +212,8 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
         cycle = TWO_PI * rate[rows, member, None] * radar.times_s + phase[rows, member, None]
         flap = np.ones(len(rows))
         if kind == "gliding_bird":
-            cycle = _pause(cycle, pause[rows], radar.dwell_s * rate[rows, member])
-            # a glide through the whole dwell hardly moves the wings, or not at all
-            flap = np.where(still[rows], 0.05 * 1e-4 ** pause[rows], 1.0)
+            cycle = _pause(cycle, pause[rows], radar.dwell_s * rate[rows, member], first[rows])
+            flap = still[rows]
         wings = wing_echo(
             cycle,
             wavelength_m=radar.wavelength_m,
@@ -214,9 +222,10 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
             stroke_scale=scale[rows] * flap,
             down_stroke=down[rows],
             feather_weight=feather[rows],
+            sweep_scale=sweep[rows],
         )
         # the body rises and sinks against the wings, at the wingbeat
-        heave = (bob * sight[:, 2])[rows, None] * np.cos(reduce_phase(cycle))
+        heave = (flap * (bob * sight[:, 2])[rows])[:, None] * np.cos(reduce_phase(cycle))
         own = velocity[rows] + (spread[rows, member] if member else 0.0)
         path = straight_path(radar.times_s, own, acceleration[rows]) + heave
         moved = level[rows, member, None] * range_phasor(path, radar.wavelength_m)
@@ -233,7 +242,12 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
     return Target(micro, body, body_db, truth=truth)
 
 
-def _pause(cycle: NDArray[np.float64], when: NDArray[np.float64], beats: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Hold the wings still from one moment on: the flapping ends inside the dwell, or before or after it."""
-    stop = cycle[:, :1] + TWO_PI * beats[:, None] * (1.5 * when[:, None] - 0.25)
-    return np.minimum(cycle, np.maximum(stop, cycle[:, :1]))
+def _pause(
+    cycle: NDArray[np.float64], when: NDArray[np.float64], beats: NDArray[np.float64], first: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Hold the wings still on one side of a moment, before it or (not `first`) after it.
+
+    The moment lies inside the dwell, or up to a quarter of it before or after.
+    """
+    moment = cycle[:, :1] + TWO_PI * beats[:, None] * (1.5 * when[:, None] - 0.25)
+    return np.where(first[:, None], np.maximum(cycle, moment), np.minimum(cycle, np.maximum(moment, cycle[:, :1])))

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 473 of them.
-WIDTH = 474
+#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 474 of them.
+WIDTH = 475
 
 #: What a steady body's acceleration is of a manoeuvring one's. Half of all bodies are steady, whatever they are: if one
 #: class alone accelerated, a line that bends would be all there is to learn of it.
@@ -88,6 +88,7 @@ LAWS: dict[str, Law] = {
     "bird_speed_mps": Law("uniform", 0.0, 22.0, "m/s", "migrants 8-17 m/s; 0 is hovering or crossing"),
     "bird_acceleration_mps2": Law("uniform", -5.0, 5.0, "m/s^2", "the paper's bird: about 4"),
     "stroke_scale": Law("uniform", 0.6, 1.25, "1", "about the stroke of JEES 2021"),
+    "sweep_scale": Law("uniform", -1.0, 1.25, "1", "about the sweep of JEES 2021; models differ in its sign"),
     "bird_body_db": Law("uniform", -12.0, 15.0, "dB", "body over wing power"),
     "down_stroke": Law("uniform", 0.0, 0.7, "1", "down-stroke stronger than up-stroke"),
     "feather_weight": Law("log", 0.05, 2.0, "1", "wrist and tip scatterers against the wing's line"),
@@ -101,7 +102,7 @@ LAWS: dict[str, Law] = {
     "sea_width_mps": Law("log", 0.15, 1.5, "m/s", "measured sea spectra"),
     "texture_shape": Law("log", 0.1, 10.0, "1", "K distribution, nu 0.1-10"),
     "texture_hz": Law("log", 0.2, 2.5, "Hz", "swells and gusts; decorrelation 0.1-1 s"),
-    "person_mps": Law("uniform", -2.5, 2.5, "m/s", "walking to running"),
+    "person_mps": Law("uniform", -3.5, 3.5, "m/s", "walking to jogging"),
     "gait_hz": Law("uniform", 0.8, 2.2, "Hz", "1-2 Hz"),
     "vehicle_mps": Law("log", 1.5, 42.0, "m/s", "along the road, from a crawl over towns to motorways"),
     "engine_hz": Law("log", 10.0, 120.0, "Hz", "four-stroke engines fire at 20-30 Hz idling, to 100 Hz driven"),

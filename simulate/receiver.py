@@ -16,7 +16,7 @@ from .motion import TWO_PI
 from .radar import Radar
 from .target import Normals
 
-#: How often each fault is present.
+#: How often each fault is present where any may be.
 FAULT_CHANCE = {
     "fading": 0.4,
     "impulses": 0.12,
@@ -31,6 +31,9 @@ FAULT_CHANCE = {
     "analytic": 0.14,
     "converter": 0.4,
 }
+
+#: How often there is none of them: simulated records, good radars.
+FAULTLESS_CHANCE = 0.2
 
 #: Humps of a band that is not flat.
 HUMPS = 2
@@ -49,7 +52,7 @@ class Receiver:
     """
 
     def __init__(self, draws: Draws) -> None:
-        self.on = {name: draws.chance(chance) for name, chance in FAULT_CHANCE.items()}
+        on = {name: draws.chance(chance) for name, chance in FAULT_CHANCE.items()}
         self.fading_db = draws.value("fading_db")
         self.fading_hz = draws.value("fading_hz", 2)
         self.fading_phase = draws.value("phase_rad", 2)
@@ -82,6 +85,8 @@ class Receiver:
         # a rectifier ticks, alike once or twice a period of the mains; what bursts at any other rate is noise
         self.bursts_of_mains = of_mains | self.burst_alike
         self.burst_hz = np.where(self.bursts_of_mains, periods * self.mains_hz, any_hz)
+        faulty = ~draws.chance(FAULTLESS_CHANCE)
+        self.on = {name: chosen & faulty for name, chosen in on.items()}
 
     def receive(
         self,

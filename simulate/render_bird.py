@@ -86,17 +86,16 @@ def bird_parts_echo(part: BirdPart, radar: Radar, times_s: NDArray[np.float64], 
     heading, elevation = np.deg2rad(part.heading_deg), np.deg2rad(part.elevation_deg)
     sight = np.array([np.cos(heading) * np.cos(elevation), np.sin(heading) * np.cos(elevation), -np.sin(elevation)])
     span = part.span_m or float(wing_size(part.mass_kg)[0])
-    down_stroke = part.down_stroke * min(part.stroke_scale, 1.0)  # wings held still have none
     wings = wing_echo(
         cycle,
         wavelength_m=radar.wavelength_m,
         half_span_m=span / 2,
         sight=sight,
         stroke_scale=part.stroke_scale,
-        down_stroke=down_stroke,
+        down_stroke=part.down_stroke,
         feather_weight=part.feather_weight,
     )
-    full = (4 + 4 * part.feather_weight) * (1 + down_stroke)
+    full = (4 + 4 * part.feather_weight) * (1 + part.down_stroke * min(part.stroke_scale, 1.0))
     echo = 10 ** (part.wing_db / 20) / full * wings * wings_out + 10 ** (part.body_db / 20)
     return np.asarray(echo, np.complex128)
 

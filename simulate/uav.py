@@ -1,6 +1,6 @@
 """Small UAVs: fixed wing, multirotors, and the helicopter with its geared tail rotor."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from itertools import product
 
 import numpy as np
@@ -81,7 +81,7 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
     }
     tail = []
     if kind == "helicopter":
-        rotor, truth["tail_rotation_hz"] = _tail_rotor(draws, length, rotation, radar)
+        rotor, truth["tail_rotation_hz"] = _tail_rotor(draws, length, lifting[0].motion)
         tail.append(rotor)
     vibration, phase, rest = (draws.value(law) for law in ("vibration_rad", "phase_rad", "phase_rad"))
     path = {
@@ -122,15 +122,23 @@ def _blade_amplitudes(draws: Draws) -> NDArray[np.float64]:
 
 
 def _tail_rotor(
-    draws: Draws, main_length_m: NDArray[np.float64], main_rotation_hz: NDArray[np.float64], radar: Radar
+    draws: Draws, main_length_m: NDArray[np.float64], main: RotorMotion
 ) -> tuple[Rotor, NDArray[np.float64]]:
     """A two-blade tail rotor, geared to the main one, in an upright plane: its aspect is another angle.
 
-    Tip speed is held below 200 m/s, as on real airframes.
+    Tip speed is held below 200 m/s, as on real airframes. What the main rotor drifts and wanders, it does times the
+    ratio.
     """
     length = main_length_m * draws.value("tail_ratio")
-    rate = np.minimum(main_rotation_hz * draws.value("gear_ratio"), 200.0 / (TWO_PI * length))
-    motion = _motion(draws, rate, radar)
+    main_hz = np.abs(main.rotation_hz)
+    rate = np.minimum(main_hz * draws.value("gear_ratio"), 200.0 / (TWO_PI * length))
+    motion = replace(
+        main,
+        rotation_hz=rate * draws.sign(),
+        phase_rad=draws.value("phase_rad"),
+        drift_hz_per_s=main.drift_hz_per_s * rate / main_hz,
+        wander_hz=main.wander_hz * rate / main_hz,
+    )
     beta = LAWS["uav_beta_rad"](draws.uniform())
     hub = 0.4 * np.exp(0.5 * draws.normal() + 1j * draws.value("phase_rad"))
     amplitudes = np.ones((len(draws), 2))

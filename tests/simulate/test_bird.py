@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 from bladewing.simulate import Radar, draw_records
-from bladewing.simulate.bird import MAX_WINGBEAT_HZ, stroke_angles_rad, wing_echo, wing_size, wingbeat_hz
+from bladewing.simulate.bird import MAX_WINGBEAT_HZ, draw_bird, stroke_angles_rad, wing_echo, wing_size, wingbeat_hz
+from bladewing.simulate.laws import WIDTH, Draws
 
 
 @pytest.mark.parametrize(
@@ -39,7 +40,7 @@ def test_wing_echo_equals_a_dense_row_of_scatterers():
     brute = np.zeros(len(cycle), complex)
     for side in (1, -1):
         first = np.stack([0 * inner, side * np.cos(inner), np.sin(inner)], -1)
-        second = np.stack([np.sin(sweep), side * np.cos(sweep) * np.cos(outer), np.cos(sweep) * np.sin(outer)], -1)
+        second = np.stack([-np.sin(sweep), side * np.cos(sweep) * np.cos(outer), np.cos(sweep) * np.sin(outer)], -1)
         towards_inner = half_span_m / 2 * (first @ SIGHT)[:, None] * shares
         towards_outer = half_span_m / 2 * ((first @ SIGHT)[:, None] + (second @ SIGHT)[:, None] * shares)
         for towards in (towards_inner, towards_outer):
@@ -54,7 +55,7 @@ def test_wings_repeat_at_the_wingbeat_and_stand_still_in_a_glide():
     flapping = wing_echo(cycle, **kwargs)
     np.testing.assert_allclose(flapping[:period], flapping[period : 2 * period], atol=2e-3)
     assert np.ptp(abs(flapping)) > 0.1
-    glide = wing_echo(cycle, **(kwargs | {"stroke_scale": 0.0, "down_stroke": 0.0}))
+    glide = wing_echo(cycle, **(kwargs | {"stroke_scale": 0.0}))
     np.testing.assert_allclose(glide, glide[0], atol=1e-6)
 
 
@@ -67,3 +68,45 @@ def test_wing_tip_doppler_is_far_above_the_wingbeat():
     frequency_hz = abs(np.fft.fftfreq(4000, 1 / prf_hz))
     significant = frequency_hz[power > 1e-3 * power.max()].max()
     assert 315 < significant < 1230
+
+
+def test_wings_are_swept_back_and_least_so_in_the_down_stroke():
+    *_, sweep = stroke_angles_rad(np.linspace(0, 2 * np.pi, 100))
+    assert (sweep > 0).all()
+    assert sweep[:50].mean() < sweep[50:].mean()  # highest at 0: the first half goes down
+    ahead = np.array([1.0, 0.0, 0.0])
+    kwargs = {"wavelength_m": 1.0, "half_span_m": 0.1, "sight": ahead, "stroke_scale": 0.0, "feather_weight": 0.0}
+    still = np.zeros(1)
+    # of wings swept back the radar ahead sees the further parts later: their phase lags that of straight ones
+    assert np.angle(wing_echo(still, **kwargs)) < np.angle(wing_echo(still, **kwargs, sweep_scale=0.0))
+    assert np.angle(wing_echo(still, **kwargs, sweep_scale=-1.0)) > np.angle(wing_echo(still, **kwargs))
+
+
+def gliders(count):
+    """Gliding birds as training draws them, 0.5 s at 4 kHz."""
+    return draw_bird(Draws(np.random.default_rng(4).random((count, WIDTH))), Radar(9.85e9, 4e3, 2000), "gliding_bird")
+
+
+def test_a_glider_that_holds_its_wings_still_shows_no_wingbeat():
+    birds = gliders(400)
+    still = np.ptp(np.abs(birds.micro), axis=1) < 0.02 * np.abs(birds.micro).mean(axis=1)
+    assert 0.1 < still.mean() < 0.5  # of the 40 % that glide all along some still move a little
+    # nor does its body heave: the phase is that of a straight path
+    phase = np.unwrap(np.angle(birds.body[still].astype(complex)), axis=1)
+    times = np.arange(phase.shape[1])
+    left = (
+        phase.T
+        - np.polynomial.polynomial.polyvander(times, 2)
+        @ np.linalg.lstsq(np.polynomial.polynomial.polyvander(times, 2), phase.T, rcond=None)[0]
+    )
+    assert np.median(np.ptp(left, axis=0)) < 0.05
+
+
+def test_gliders_begin_to_flap_as_often_as_they_end():
+    level = np.abs(gliders(600).micro)
+    first, last = (np.ptp(part, axis=1) / level.mean(axis=1) for part in (level[:, :400], level[:, -400:]))
+    turning = np.maximum(first, last) > 0.3
+    begins, ends = (turning & (one < 0.01) for one in (first, last))
+    assert begins.sum() > 10
+    assert ends.sum() > 10
+    assert 0.4 < begins.sum() / ends.sum() < 2.5

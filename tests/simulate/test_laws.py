@@ -8,8 +8,8 @@ from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.bird import wing_size, wingbeat_hz
 from bladewing.simulate.dataset import QUIET
 from bladewing.simulate.laws import LAWS, Draws
-from bladewing.simulate.receiver import Receiver
-from bladewing.simulate.uav import LEAST_ROTATION_HZ
+from bladewing.simulate.receiver import FAULT_CHANCE, FAULTLESS_CHANCE, Receiver
+from bladewing.simulate.uav import LEAST_ROTATION_HZ, _motion, _tail_rotor
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -103,3 +103,26 @@ def test_what_ticks_keeps_the_time_of_its_mains_and_a_quarter_of_all_bursts_come
     assert abs(once.mean() - 0.3) < 5 * np.sqrt(0.21 / len(once))
     values = np.sort(drawn.burst_hz[~steady])
     assert distance(values, distribution(LAWS["burst_hz"], values)) < 3
+
+
+def test_a_fifth_of_all_receivers_have_no_fault_and_each_fault_its_share_of_the_others():
+    records = 20_000
+    drawn = Receiver(Draws(np.random.default_rng(2).random((records, 200))))
+    on = np.stack(list(drawn.on.values()))
+    none = FAULTLESS_CHANCE + (1 - FAULTLESS_CHANCE) * np.prod([1 - chance for chance in FAULT_CHANCE.values()])
+    assert (~on.any(axis=0)).mean() == pytest.approx(none, abs=4.5 * np.sqrt(none * (1 - none) / records))
+    for name, chance in FAULT_CHANCE.items():
+        share = (1 - FAULTLESS_CHANCE) * chance
+        assert drawn.on[name].mean() == pytest.approx(share, abs=4.5 * np.sqrt(share * (1 - share) / records))
+
+
+def test_a_tail_rotor_drifts_and_wanders_as_its_gear_makes_it():
+    draws, radar = Draws(np.random.default_rng(3).random((50, 200))), Radar(9.85e9, 25e3, 512)
+    main = _motion(draws, np.full(50, 30.0), radar)
+    rotor, rate_hz = _tail_rotor(draws, np.full(50, 0.5), main)
+    ratio = rate_hz / 30.0
+    assert (ratio > 3).all()
+    for name in ("drift_hz_per_s", "wander_hz"):
+        np.testing.assert_allclose(getattr(rotor.motion, name), ratio * getattr(main, name))
+    np.testing.assert_array_equal(rotor.motion.wander_phase_rad, main.wander_phase_rad)
+    np.testing.assert_array_equal(np.abs(rotor.motion.rotation_hz), rate_hz)
