@@ -91,17 +91,15 @@ def noise_floor(power: Value, bins: int) -> Value:
     half, lower = bins // 2, (bins + 1) % 2
     size = max(1, half // definition._FLOOR_BLOCKS)
     blocks = half // size
-    rank = round(definition._FLOOR_QUANTILE * (blocks - 1))
+    rank = definition.quartile_rank(blocks)
     sides = [
-        side.reshape(-1, blocks, size).sum(keep=False) / size
+        side.reshape(-1, blocks, size).sum(keep=False)
         for side in (power.slice(lower, lower + blocks * size), power.slice(bins - blocks * size, bins))
     ]
     one, other = (side.ranked(rank) for side in sides)
     least, most = one.at_most(other), one.at_least(other)
     level = power.graph.where(most > definition._EMPTY_RATIO * least, most, (least + most) / 2)
-    shape_k = max(1.0, size / definition.NOISE_BANDWIDTH_BINS)
-    bias = (1 - 1 / (9 * shape_k) + definition._FLOOR_QUANTILE_NORMAL / (3 * np.sqrt(shape_k))) ** 3
-    return level / bias
+    return level / float(definition.quartile_of_noise(bins, size, blocks))
 
 
 def to_db(relative_power: Value) -> Value:
