@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from bladewing.features import INPUT_SHAPES, schema_hash
 from bladewing.models import LADDER
+from bladewing.simulate.dataset import KIND_CLASS
 from numpy.typing import NDArray
 
 from .dataset import DataSet, Plan, simulator_digest
@@ -310,10 +311,11 @@ def _network(
     shapes = {key: INPUT_SHAPES[key] for key in LADDER[name].inputs}
     signal = LADDER[name].inputs[0]
     image = len(shapes[signal]) == 3
+    kinds = [CLASSES.index(label) for label in KIND_CLASS.values()]
     net: EvidenceNet = (
-        ImageNet(shapes, seed=settings.seed)
+        ImageNet(shapes, seed=settings.seed, kinds=kinds)
         if image
-        else SpectrumNet(shapes, seed=settings.seed, widen=LADDER[name].widen)
+        else SpectrumNet(shapes, seed=settings.seed, widen=LADDER[name].widen, kinds=kinds)
     )
 
     def inputs(part: Gathered) -> dict[str, NDArray]:
@@ -335,6 +337,7 @@ def _network(
             # no measurement is signed, so only the picture is mirrored
             augment=VelocityMirror(axes={signal: -2 if image else -1}, odd={}),
             teacher=taught() if taught else None,
+            kinds=kinds_of(sets.train),
             snapshot=snapshot,
             on_snapshot=partial(parts.keep_arrays, _epochs_of(name)) if parts else None,
             on_epoch=lambda epoch, epochs, _: on_fraction(epoch / epochs),
@@ -356,6 +359,13 @@ def _network(
         lambda calibration: export_network(net, shapes, calibration),
         detail,
     )
+
+
+def kinds_of(part: Gathered) -> NDArray[np.int64]:
+    """Kind of each record, a place in `KIND_CLASS`."""
+    names = np.array(list(KIND_CLASS))
+    order = np.argsort(names)
+    return order[np.searchsorted(names, part.truth["kind"], sorter=order)]
 
 
 def _told(metric: str, value: float) -> float | None:

@@ -1,5 +1,7 @@
 """What every training function demands of its arrays, each demand with one clear line."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -78,6 +80,33 @@ def require_labels(y: NDArray[np.integer], count: int, name: str) -> None:
     if count and (y.min() < 0 or y.max() >= CLASS_COUNT):
         wrong = y[(y < 0) | (y >= CLASS_COUNT)][0]
         raise ValueError(f"{name} holds the label {wrong}; labels must be 0 (uav), 1 (bird) or 2 (clutter)")
+
+
+def require_kinds(kinds: NDArray[np.integer], y: NDArray[np.integer], class_of: Sequence[int]) -> None:
+    """Refuse kinds that are not one a record, of the record's class.
+
+    Parameters
+    ----------
+    kinds
+        Array that should have the shape of `y`, each a place in `class_of`.
+    y
+        Labels, shape (n,), whole numbers 0 to 2.
+    class_of
+        Class of each kind.
+
+    Raises
+    ------
+    ValueError
+        Where the shape, the type or a value is wrong.
+    """
+    if kinds.shape != y.shape or not np.issubdtype(kinds.dtype, np.integer):
+        raise ValueError(f"kinds is {kinds.dtype} of shape {kinds.shape}; it must be whole numbers of shape {y.shape}")
+    outside = (kinds < 0) | (kinds >= len(class_of))
+    if outside.any():
+        raise ValueError(f"kinds holds {kinds[outside][0]}; each must be 0 to {len(class_of) - 1}")
+    other = np.flatnonzero(np.asarray(class_of)[kinds] != y)
+    if len(other):
+        raise ValueError(f"kinds[{other[0]}] is {kinds[other[0]]}; it must be of the class of its label, {y[other[0]]}")
 
 
 def require_every_class(y: NDArray[np.integer], name: str) -> None:

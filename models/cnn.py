@@ -4,9 +4,11 @@ Both have the same anatomy: strided convolutions over the signal, their mean and
 there is of a pattern, and whether it is there at all), a small branch over each other input (a cadence, a vector of
 measurements), and a common head.
 The inputs are standardised inside, by buffers that `EvidenceNet.measure` fills: the exported model eats raw inputs.
+A network may learn kinds, of which each belongs to a class, and tell the classes: what sets a rotor's comb apart from a
+turbine's and from a wheel's is more than three words can teach.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
@@ -21,6 +23,7 @@ _RATES = (16, 24, 32)  # channels of the convolutions over a spectrum of rates
 _HEAD = 128  # 48 were the narrowest place of all (docs/ablation.md)
 _CLIP = 8.0  # standard deviations; beyond them an input says no more than "very much"
 _CHUNK = 1024
+_LEAST_SHARE = 1e-30  # of a class, under its logarithm
 
 
 class Standardise(nn.Module):
@@ -108,6 +111,10 @@ def _branch(shape: tuple[int, ...]) -> nn.Sequential:
     return nn.Sequential(nn.Unflatten(1, (shape[0], 1)), *convolutions, nn.Flatten(), dense, nn.ReLU())
 
 
+CLASSES_ALONE = tuple(range(CLASS_COUNT))
+"""The kinds of a network that knows none but the classes."""
+
+
 class EvidenceNet(nn.Module):
     """A signal and other evidence to three scores; the anatomy that both networks share.
 
@@ -120,11 +127,18 @@ class EvidenceNet(nn.Module):
         From (n, C, H, W) to (n, width, h, w).
     width
         Channels that the trunk ends with.
+    kinds
+        Class of each kind that the network tells apart inside, 0 to 2.
     """
 
-    def __init__(self, shapes: Mapping[str, tuple[int, ...]], trunk: nn.Module, width: int) -> None:
+    class_of_kind: Tensor
+
+    def __init__(
+        self, shapes: Mapping[str, tuple[int, ...]], trunk: nn.Module, width: int, kinds: Sequence[int] = CLASSES_ALONE
+    ) -> None:
         super().__init__()
-        self.input_shapes = dict(shapes)
+        self.input_shapes, self.kinds = dict(shapes), tuple(kinds)
+        self.register_buffer("class_of_kind", torch.eye(CLASS_COUNT)[list(self.kinds)], persistent=False)
         signal, *evidence = self.input_shapes.values()
         self.standardise = nn.ModuleDict(
             {name: Standardise(shape[0], len(shape) - 1) for name, shape in self.input_shapes.items()}
@@ -134,7 +148,7 @@ class EvidenceNet(nn.Module):
         self.branches = nn.ModuleList(_branch(shape) for shape in evidence)
         seen = 2 * width + _BRANCH * len(evidence)
         # no dropout: with drawn records by the hundred thousand nothing is learned by heart, and it costs accuracy
-        self.head = nn.Sequential(nn.Linear(seen, _HEAD), nn.ReLU(), nn.Linear(_HEAD, CLASS_COUNT))
+        self.head = nn.Sequential(nn.Linear(seen, _HEAD), nn.ReLU(), nn.Linear(_HEAD, len(self.kinds)))
 
     def measure(self, inputs: Mapping[str, NDArray[np.floating]]) -> None:
         """Fill the buffers that standardise the inputs from a training set.
@@ -205,7 +219,7 @@ class EvidenceNet(nn.Module):
                 weights.copy_(weights.half().float())
 
     def forward(self, signal: Tensor, *evidence: Tensor) -> Tensor:
-        """Return the scores.
+        """Return the scores of the classes.
 
         Parameters
         ----------
@@ -219,6 +233,16 @@ class EvidenceNet(nn.Module):
         Tensor
             Shape (n, 3), in the order uav, bird, clutter.
         """
+        return self.class_scores(self.kind_scores(signal, *evidence))
+
+    def class_scores(self, kind_scores: Tensor) -> Tensor:
+        """Return the scores of the classes, shape (n, 3): the logarithm of the shares of their kinds together."""
+        if self.kinds == CLASSES_ALONE:
+            return kind_scores
+        return (kind_scores.softmax(1) @ self.class_of_kind + _LEAST_SHARE).log()
+
+    def kind_scores(self, signal: Tensor, *evidence: Tensor) -> Tensor:
+        """Return the scores of the kinds, shape (n, kinds); the inputs as in `forward`."""
         signal_name, *names = self.input_shapes
         planes = self.standardise[signal_name](signal)
         maps = self.trunk(planes.unsqueeze(2) if self.flat else planes)
@@ -243,9 +267,18 @@ class SpectrumNet(EvidenceNet):
         Draws the first weights; the global generator of torch is left as it was.
     widen
         Factor on the channels of the spectrum's layers, 0.5, 1 or 2.
+    kinds
+        As in `EvidenceNet`.
     """
 
-    def __init__(self, shapes: Mapping[str, tuple[int, ...]], *, seed: int, widen: float = 1) -> None:
+    def __init__(
+        self,
+        shapes: Mapping[str, tuple[int, ...]],
+        *,
+        seed: int,
+        widen: float = 1,
+        kinds: Sequence[int] = CLASSES_ALONE,
+    ) -> None:
         first, second, third, last = (round(widen * channels) for channels in (16, 24, 32, 48))
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
@@ -257,7 +290,7 @@ class SpectrumNet(EvidenceNet):
                 _Convolution(third, last, (1, 5), (1, 2)),
                 _Residual(last, (1, 5)),
             )
-            super().__init__(shapes, trunk, last)
+            super().__init__(shapes, trunk, last, kinds)
 
 
 class ImageNet(EvidenceNet):
@@ -272,9 +305,13 @@ class ImageNet(EvidenceNet):
         evidence, if any, as for `EvidenceNet`.
     seed
         Draws the first weights; the global generator of torch is left as it was.
+    kinds
+        As in `EvidenceNet`.
     """
 
-    def __init__(self, shapes: Mapping[str, tuple[int, ...]], *, seed: int) -> None:
+    def __init__(
+        self, shapes: Mapping[str, tuple[int, ...]], *, seed: int, kinds: Sequence[int] = CLASSES_ALONE
+    ) -> None:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             trunk = nn.Sequential(
@@ -285,4 +322,4 @@ class ImageNet(EvidenceNet):
                 _Residual(32, (3, 3)),
                 _Convolution(32, 48, (3, 3), (2, 2)),
             )
-            super().__init__(shapes, trunk, 48)
+            super().__init__(shapes, trunk, 48, kinds)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.optim.lr_scheduler import OneCycleLR
 
-from ._checks import CLASS_COUNT, require_every_class, require_labels, require_shares
+from ._checks import CLASS_COUNT, require_every_class, require_kinds, require_labels, require_shares
 from .cnn import EvidenceNet
 from .muon import Muon
 from .training_state import Snapshot, Work
@@ -78,6 +78,7 @@ def train_network(
     device: str = "auto",
     augment: Augment | None = None,
     teacher: NDArray[np.floating] | None = None,
+    kinds: NDArray[np.integer] | None = None,
     patience: int = 0,
     snapshot: Snapshot | None = None,
     on_snapshot: OnSnapshot | None = None,
@@ -119,6 +120,9 @@ def train_network(
         Probabilities that a better network gives the training records, shape (n, 3), of which the target takes the
         share `TAUGHT`. A label is one draw from what a record leaves open and its teacher's answer near the mean of
         them, so that a step errs less (Hinton, Vinyals and Dean, arXiv:1503.02531).
+    kinds
+        Kind of each training record, shape (n,), a place in the network's `kinds`, of the class that `y` says. Where
+        given, the network is to tell these as well, from the label alone: half of the loss is theirs.
     patience
         Epochs in a row without a lower validation loss after which the training stops; 0: never. The schedule is laid
         out for all epochs: one that stops early has not seen its end.
@@ -149,6 +153,8 @@ def train_network(
     require_labels(validation[1], net.require(validation[0]), "validation labels")
     if teacher is not None:
         require_shares(teacher, count, "teacher")
+    if kinds is not None:
+        require_kinds(kinds, y, net.kinds)
     if epochs < 1 or batch < 2 or patience < 0:
         raise ValueError(f"epochs is {epochs}, batch {batch}, patience {patience}; they must be at least 1, 2 and 0")
     started = time.perf_counter()
@@ -163,6 +169,7 @@ def train_network(
     if teacher is not None:
         said = torch.as_tensor(teacher, dtype=torch.float32).to(place)
         truth = TAUGHT * said + (1 - TAUGHT) * nn.functional.one_hot(truth, CLASS_COUNT)
+    kind_truth = None if kinds is None else torch.as_tensor(kinds, dtype=torch.int64).to(place)
     matrices = [weights for weights in net.parameters() if weights.ndim > 1]
     others = [weights for weights in net.parameters() if weights.ndim <= 1]
     optimisers = (
@@ -189,7 +196,10 @@ def train_network(
             part: Mapping[str, Tensor] = {name: values[rows].float() for name, values in tensors.items()}
             if augment:
                 part = augment(part, rng)
-            loss = criterion(net(*(part[name] for name in net.input_shapes)), truth[rows])
+            kind_scores = net.kind_scores(*(part[name] for name in net.input_shapes))
+            loss = criterion(net.class_scores(kind_scores), truth[rows])
+            if kind_truth is not None:
+                loss = loss + criterion(kind_scores, kind_truth[rows])
             net.zero_grad(set_to_none=True)
             loss.backward()
             rate = optimisers[0].param_groups[0]["lr"]

@@ -54,7 +54,9 @@ def exported():
     return {
         "features-linear": _tabular(train_linear, "features"),
         "features-boosted": _tabular(train_boosted, "joint_features"),
-        "spectrum-cnn-fast": _network(SpectrumNet({"levels": (2, 64), "cadence": (2, 32)}, seed=0)),
+        "spectrum-cnn-fast": _network(
+            SpectrumNet({"levels": (2, 64), "cadence": (2, 32)}, seed=0, kinds=(0, 0, 1, 2, 2))
+        ),
         "spectrum-cnn": _network(
             SpectrumNet({"spectrum": (3, 64), "cadence": (2, 24), "features": (FEATURES,)}, seed=0)
         ),

@@ -92,6 +92,42 @@ def test_a_net_learns_what_its_measurements_tell():
     assert (network_scores(net, inputs).argmax(axis=1) == y).mean() > 0.9
 
 
+KINDS = (0, 0, 0, 1, 2, 2)
+
+
+def _rates(count, seed):
+    """Six kinds, each with a pattern at a rate of its own."""
+    rng = np.random.default_rng(seed)
+    kinds = rng.integers(0, len(KINDS), count)
+    cadence = rng.normal(size=(count, 2, 24))
+    cadence[np.arange(count), :, 2 + 4 * kinds] += 5
+    spectrum = rng.normal(size=(count, 2, BINS))
+    return {"spectrum": spectrum.astype(np.float32), "cadence": cadence.astype(np.float32)}, kinds
+
+
+def test_a_net_that_is_told_kinds_knows_them_and_their_sums_are_the_classes():
+    inputs, kinds = _rates(900, 0)
+    y = np.array(KINDS)[kinds]
+    fresh, told = _rates(300, 1)
+    truth = np.array(KINDS)[told]
+    net = SpectrumNet({name: values.shape[1:] for name, values in inputs.items()}, seed=0, kinds=KINDS)
+    train_network(net, inputs, y, (fresh, truth), seed=0, epochs=8, batch=64, kinds=kinds)
+    with torch.inference_mode():
+        scores = net.kind_scores(*(torch.from_numpy(fresh[name]) for name in net.input_shapes)).double().numpy()
+    assert (scores.argmax(axis=1) == told).mean() > 0.9
+    classes = softmax(network_scores(net, fresh))
+    assert (classes.argmax(axis=1) == truth).mean() > 0.9
+    sums = np.stack([softmax(scores)[:, np.array(KINDS) == label].sum(axis=1) for label in range(3)], axis=1)
+    np.testing.assert_allclose(classes, sums, rtol=1e-4)  # also where a class is next to impossible
+
+
+def test_scores_of_classes_stay_finite_where_one_is_impossible():
+    net = SpectrumNet({"spectrum": (2, BINS)}, seed=0, kinds=KINDS)
+    scores = net.class_scores(torch.tensor([[300.0, 0, 0, 0, 0, 0], [0, 0, 0, -300.0, 0, 0]]))
+    assert torch.isfinite(scores).all()
+    assert scores.argmax(1).tolist() == [0, 0]
+
+
 def test_a_teacher_that_knows_what_a_record_leaves_open_makes_up_for_labels_that_err():
     inputs, truth = _spectra(400, 1)
     rng = np.random.default_rng(4)
@@ -388,6 +424,10 @@ def _refuse_network(change):
         (lambda x, y: {"y": y % 2}, "each needs 2"),
         (lambda x, y: {"validation": (x, y + 1)}, "validation labels holds the label 3"),
         (lambda x, y: {"epochs": 0}, "epochs is 0"),
+        (lambda x, y: {"kinds": y[1:]}, r"kinds is int64 of shape \(59,\)"),
+        (lambda x, y: {"kinds": y + 0.5}, "kinds is float64"),
+        (lambda x, y: {"kinds": y + 1}, "kinds holds 3; each must be 0 to 2"),
+        (lambda x, y: {"kinds": 2 - y}, "it must be of the class of its label"),
         (lambda x, y: {"teacher": np.full((59, 3), 1 / 3)}, r"teacher has shape \(59, 3\); it must be \(60, 3\)"),
         (lambda x, y: {"teacher": np.full((60, 3), np.nan)}, r"teacher\[0, 0\] is nan"),
         (lambda x, y: {"teacher": np.full((60, 3), 0.5)}, r"teacher\[0\] is \[0.5, 0.5, 0.5\]"),
