@@ -35,6 +35,9 @@ from .training_costs import add_costs
 #: Folder of what is trained so far, beside the models while the run is not done.
 PARTS = "train-parts"
 
+CLASS_OF_KIND = tuple(CLASSES.index(label) for label in KIND_CLASS.values())
+"""Class of each kind that networks learn to tell, in the order of `KIND_CLASS`."""
+
 OnFraction = Callable[[float], None]
 
 Taught = Callable[[], NDArray[np.floating]]
@@ -311,11 +314,10 @@ def _network(
     shapes = {key: INPUT_SHAPES[key] for key in LADDER[name].inputs}
     signal = LADDER[name].inputs[0]
     image = len(shapes[signal]) == 3
-    kinds = [CLASSES.index(label) for label in KIND_CLASS.values()]
     net: EvidenceNet = (
-        ImageNet(shapes, seed=settings.seed, kinds=kinds)
+        ImageNet(shapes, seed=settings.seed, kinds=CLASS_OF_KIND)
         if image
-        else SpectrumNet(shapes, seed=settings.seed, widen=LADDER[name].widen, kinds=kinds)
+        else SpectrumNet(shapes, seed=settings.seed, widen=LADDER[name].widen, kinds=CLASS_OF_KIND)
     )
 
     def inputs(part: Gathered) -> dict[str, NDArray]:

@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 from bladewing.classify import Classifier, train
 from bladewing.classify.errors import BadInput
-from bladewing.classify.gather import Gathered
+from bladewing.classify.gather import Gathered, gather
 from bladewing.classify.inference import COVERAGES
-from bladewing.classify.train import run_training
+from bladewing.classify.train import CLASS_OF_KIND, kinds_of, run_training
 from bladewing.classify.training_account import alarm_threshold, figures
 from bladewing.classify.training_config import TrainingConfig, training_config
 from bladewing.features import INPUT_SHAPES
 from bladewing.models import tabular, training
 from bladewing.simulate import Radar, draw_records
+from bladewing.simulate.dataset import KIND_CLASS
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +38,14 @@ def test_training_writes_every_model_and_its_account(trained):
         # chance is 1/3; even this little training is far from it (600 test records: 0.019 standard error)
         assert model["test"]["balanced_accuracy"] > 0.42, name
     assert not list(out.glob(".bladewing*"))
+
+
+def test_every_record_has_the_kind_that_was_drawn_and_its_class():
+    drawn = gather(0, "train", 96, names=("levels",), workers=1)
+    kinds = kinds_of(drawn)
+    np.testing.assert_array_equal(np.array(list(KIND_CLASS))[kinds], drawn.truth["kind"])
+    np.testing.assert_array_equal(np.array(CLASS_OF_KIND)[kinds], drawn.labels)
+    assert len(np.unique(kinds)) > len(CLASS_OF_KIND) / 2
 
 
 def test_the_cascade_goes_from_the_cheapest_model_to_the_best(trained):
