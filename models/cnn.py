@@ -23,7 +23,6 @@ _RATES = (16, 24, 32)  # channels of the convolutions over a spectrum of rates
 _HEAD = 128  # 48 were the narrowest place of all (docs/ablation.md)
 _CLIP = 8.0  # standard deviations; beyond them an input says no more than "very much"
 _CHUNK = 1024
-_LEAST_SHARE = 1e-30  # of a class, under its logarithm
 
 
 class Standardise(nn.Module):
@@ -128,17 +127,16 @@ class EvidenceNet(nn.Module):
     width
         Channels that the trunk ends with.
     kinds
-        Class of each kind that the network tells apart inside, 0 to 2.
+        Class of each kind that the network tells apart inside, 0 to 2, rising.
     """
-
-    class_of_kind: Tensor
 
     def __init__(
         self, shapes: Mapping[str, tuple[int, ...]], trunk: nn.Module, width: int, kinds: Sequence[int] = CLASSES_ALONE
     ) -> None:
         super().__init__()
         self.input_shapes, self.kinds = dict(shapes), tuple(kinds)
-        self.register_buffer("class_of_kind", torch.eye(CLASS_COUNT)[list(self.kinds)], persistent=False)
+        if list(self.kinds) != sorted(self.kinds) or set(self.kinds) != set(CLASSES_ALONE):
+            raise ValueError(f"kinds is {self.kinds}: it must hold every class, 0 to 2, in rising order")
         signal, *evidence = self.input_shapes.values()
         self.standardise = nn.ModuleDict(
             {name: Standardise(shape[0], len(shape) - 1) for name, shape in self.input_shapes.items()}
@@ -236,10 +234,12 @@ class EvidenceNet(nn.Module):
         return self.class_scores(self.kind_scores(signal, *evidence))
 
     def class_scores(self, kind_scores: Tensor) -> Tensor:
-        """Return the scores of the classes, shape (n, 3): the logarithm of the shares of their kinds together."""
+        """Return the scores of the classes, shape (n, 3), whose shares are those of their kinds together."""
         if self.kinds == CLASSES_ALONE:
             return kind_scores
-        return (kind_scores.softmax(1) @ self.class_of_kind + _LEAST_SHARE).log()
+        # record by record: a logarithm of all at once rounds a record by its place in the batch
+        parts = kind_scores.split([self.kinds.count(label) for label in CLASSES_ALONE], 1)
+        return torch.cat([part.logsumexp(1, keepdim=True) for part in parts], 1)
 
     def kind_scores(self, signal: Tensor, *evidence: Tensor) -> Tensor:
         """Return the scores of the kinds, shape (n, kinds); the inputs as in `forward`."""

@@ -12,6 +12,7 @@ from bladewing.classify import Classifier, train
 from bladewing.classify.errors import BadInput
 from bladewing.classify.gather import Gathered, gather
 from bladewing.classify.inference import COVERAGES
+from bladewing.classify.labels import CLASSES
 from bladewing.classify.train import CLASS_OF_KIND, kinds_of, run_training
 from bladewing.classify.training_account import alarm_threshold, figures
 from bladewing.classify.training_config import TrainingConfig, training_config
@@ -52,7 +53,8 @@ def test_the_cascade_goes_from_the_cheapest_model_to_the_best(trained):
     models, cascade = trained[1]["models"], trained[1]["cascade"]
     first, second = (models[name] for name in cascade["stages"])
     assert first["cost_ffts"] == min(model["cost_ffts"] for model in models.values())
-    assert second["test"]["balanced_accuracy"] == max(model["test"]["balanced_accuracy"] for model in models.values())
+    # chosen on the 600 calibration records: three deviations of a difference on as many test records are 0.08
+    assert second["test"]["balanced_accuracy"] > max(m["test"]["balanced_accuracy"] for m in models.values()) - 0.08
     assert 0 < cascade["asked"] <= 1
     assert first["cost_ffts"] * 0.8 < cascade["cost_ffts"]
     # it is never far behind the second, as what the first is sure of is mostly right
@@ -121,7 +123,8 @@ def _few_sets(*_):
         for name in ("features", "spectrum", "cadence", "combs"):
             values = rng.normal(size=(count, *INPUT_SHAPES[name]))
             inputs[name] = (values + 0.3 * labels.reshape(-1, *[1] * (values.ndim - 1))).astype(np.float32)
-        return Gathered(inputs, labels, {})
+        kinds = np.array([next(kind for kind, of in KIND_CLASS.items() if of == CLASSES[label]) for label in labels])
+        return Gathered(inputs, labels, {"kind": kinds})
 
     return train.Sets(gathered(192), gathered(96), gathered(300), gathered(300))
 

@@ -121,6 +121,12 @@ def test_a_net_that_is_told_kinds_knows_them_and_their_sums_are_the_classes():
     np.testing.assert_allclose(classes, sums, rtol=1e-4)  # also where a class is next to impossible
 
 
+@pytest.mark.parametrize("kinds", [(0, 1, 1), (0, 2, 1), (1, 2, 2)])
+def test_kinds_must_hold_every_class_in_order(kinds):
+    with pytest.raises(ValueError, match="every class, 0 to 2, in rising order"):
+        SpectrumNet(SHAPES, seed=0, kinds=kinds)
+
+
 def test_scores_of_classes_stay_finite_where_one_is_impossible():
     net = SpectrumNet({"spectrum": (2, BINS)}, seed=0, kinds=KINDS)
     scores = net.class_scores(torch.tensor([[300.0, 0, 0, 0, 0, 0], [0, 0, 0, -300.0, 0, 0]]))
