@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import fft, special
 
 from .notch import Mask, parabola_offset, weights
-from .spectrum import KAISER_BETA, Spectrum, at_least, sums
+from .spectrum import Spectrum, at_least, bins_alike, sums
 
 #: Range in which a chopping frequency is sought [Hz]: a slow main rotor to a small propeller of four blades.
 CHOPPING_RANGE_HZ = (18.0, 1600.0)
@@ -70,9 +70,7 @@ def noise_shape(pulses: int, bins: int) -> NDArray[np.float32]:
     bins : int
         Length of the spectrum.
     """
-    squared = np.kaiser(pulses, KAISER_BETA) ** 2
-    correlation = np.minimum(np.abs(fft.fft(squared / squared.sum(), n=bins)) ** 2, 1)
-    variance = fft.rfft(special.spence(1 - correlation)).real  # Li2(x) is scipy's spence(1 - x)
+    variance = fft.rfft(special.spence(1 - bins_alike(pulses, bins))).real  # Li2(x) is scipy's spence(1 - x)
     return np.sqrt(np.maximum(variance, 1e-3 * variance.max())).astype(np.float32)
 
 

@@ -18,7 +18,7 @@ from .chopping import CHOPPING_RANGE_HZ, MIN_SPACING_BINS
 from .evidence import line_log_ratio
 from .notch import Mask, weights
 from .schema import COMB_BINS
-from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, sums, taper, to_db
+from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, bins_alike, sums, to_db
 
 #: Lines are looked for up to this speed [m/s]: beyond it lie the ends of few rotors' bands, and noise.
 REACH_MPS = 80.0
@@ -101,8 +101,7 @@ def _covariance_series(terms: int = 24) -> NDArray[np.float64]:
 
 def _noise_rms(pulses: int, bins: int, length: int) -> NDArray[np.float64]:
     """Root mean square of the transform of the evidence of white noise, of a single bin, shape (length // 2 + 1,)."""
-    squared = taper(pulses) ** 2
-    alike = np.minimum(np.abs(fft.fft(squared / squared.sum(), n=bins)) ** 2, 1)[: bins // 2]
+    alike = bins_alike(pulses, bins)[: bins // 2]
     covariance = np.polynomial.polynomial.polyval(alike, np.concatenate([[0], _covariance_series()]))
     near = np.arange(1, min(len(covariance), 64))
     turn = 2 * np.pi * np.arange(length // 2 + 1) / length
@@ -203,8 +202,8 @@ def comb_heights(power: NDArray[np.floating], kept: NDArray[np.floating], plan: 
     Returns
     -------
     ndarray, shape (..., plan.length // 2 + 1)
-        Noise has mean 0 and deviation `HEIGHT_DEVIATION`; somewhat less at rates whose period in the spectrum is that
-        of a block and more (above 1200 Hz), of which the blocks' means take a part.
+        Noise has mean 0 and deviation `HEIGHT_DEVIATION`; less at the first four periods, shorter than any on the axis
+        of rates where there are several blocks, whose means take a part of them.
     """
     counts = kept.reshape(*power.shape[:-1], plan.blocks, power.shape[-1] // plan.blocks)
     nats = line_nats(power).reshape(counts.shape)

@@ -190,6 +190,12 @@ def taper(pulses: int) -> NDArray[np.float64]:
     return window / np.sqrt(np.sum(window**2))
 
 
+def bins_alike(pulses: int, bins: int) -> NDArray[np.float64]:
+    """Squared correlation of white noise in two bins, by how far they are apart, shape (bins,): 1 at 0."""
+    squared = taper(pulses) ** 2
+    return np.asarray(np.minimum(np.abs(fft.fft(squared / squared.sum(), n=bins)) ** 2, 1), np.float64)
+
+
 def scaled(iq: NDArray[np.complex64], scale: NDArray[np.float32]) -> NDArray[np.complex64]:
     """Samples times a real factor a record: part by part, for half the price of a complex product."""
     if np.count_nonzero(scale == _ONE) == scale.size:
@@ -316,8 +322,7 @@ def noise_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
 def quartile_of_noise(bins: int, size: int, blocks: int) -> NDArray[np.float32]:
     """Lower quartile of the sums of so many neighbouring bins in white noise of unit power, of so many sums."""
     # a gamma of as many degrees of freedom as the sum has: the window makes neighbours alike
-    squared = taper(bins) ** 2
-    alike = np.abs(fft.fft(squared)[1:size]) ** 2
+    alike = bins_alike(bins, bins)[1:size]
     shape_k = size**2 / (size + 2 * np.arange(size - 1, 0, -1) @ alike)
     share = (quartile_rank(blocks) + 1) / (blocks + 1)  # mean of the uniform of that rank
     return np.array(size / shape_k * special.gammaincinv(shape_k, share), np.float32)
