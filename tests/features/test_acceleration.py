@@ -78,9 +78,9 @@ def test_blades_and_a_background_beside_the_line_show_in_its_deviation(airframe,
     ground = {"name": "ground", "kind": "ground", "level_db": 10.0}
     uav = {"name": "uav", "airframe": airframe}
     iq = np.stack(
-        [Scene.build({"radar": radar, "uav": [uav], "clutter": [ground]}).render(seed).iq for seed in range(40)]
+        [Scene.build({"radar": radar, "uav": [uav], "clutter": [ground]}).render(seed).iq for seed in range(96)]
     )
     found, std, smeared = body_acceleration(iq, carrier_hz=CARRIER_HZ, prf_hz=25e3)
     assert not smeared.any()
-    # of the fixed wings and quadcopters one in twelve is off by more than that
-    assert (np.abs(found) > 4 * std).sum() <= 8
+    # one in eight at most: of a few draws alone, more or fewer by chance
+    assert (np.abs(found) > 4 * std).mean() <= 1 / 8
