@@ -25,8 +25,8 @@ LIMBS = (
 )
 
 
-#: Scatterers of a vehicle's body, and at most of its wheels together.
-BODY_POINTS, MAX_WHEEL_POINTS = 16, 40
+#: Most scatterers of a vehicle's body, of another's beside it, and of a vehicle's wheels together.
+MAX_BODY_POINTS, MAX_COMPANY_POINTS, MAX_WHEEL_POINTS = 48, 12, 40
 
 #: Width of a vehicle's body [m].
 VEHICLE_WIDTH_M = 1.8
@@ -65,14 +65,15 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
     """Draw a road vehicle that passes: scatterers all over it, each on its own way past the radar, and turning wheels.
 
     From afar it is one line. Beside the road its parts are seen under angles so unlike that it fills all speeds up to
-    its own, and each of them changes as fast as the vehicle passes. Its engine shakes it, as rotors shake an airframe:
+    its own, and each of them changes as fast as the vehicle passes. Few scatterers leave lines, many fill the speeds as
+    a flock or rain does; the beam lets those within it through. Its engine shakes it, as rotors shake an airframe:
     lines beside the body's are no sign of a UAV. Some are not alone in the beam.
     """
-    body, passage = _vehicle_body(draws, radar)
+    body, passage = _vehicle_body(draws, radar, MAX_BODY_POINTS)
     turns = draws.value("engine_hz")[:, None] * radar.times_s
     shaken_m = draws.value("engine_m")[:, None] * np.sin(TWO_PI * turns + draws.value("phase_rad")[:, None])
     body *= range_phasor(shaken_m, radar.wavelength_m)
-    other, _ = _vehicle_body(draws, radar)
+    other, _ = _vehicle_body(draws, radar, MAX_COMPANY_POINTS)
     level = 10 ** (draws.value("company_db") / 20) * draws.chance(0.3)  # another one in the beam
     body += level.astype(np.float32)[:, None] * other
     speed, pull, ahead, aside, sight, gone = passage
@@ -89,8 +90,10 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
     return Target(wheels, body, -draws.value("wheel_db"), snr_of_body=draws.chance(0.5), truth=truth)
 
 
-def _vehicle_body(draws: Draws, radar: Radar) -> tuple[NDArray[np.complex64], tuple[NDArray[np.float64], ...]]:
-    """Echo of a vehicle but for its wheels, of unit power, and how it passes.
+def _vehicle_body(
+    draws: Draws, radar: Radar, most: int
+) -> tuple[NDArray[np.complex64], tuple[NDArray[np.float64], ...]]:
+    """Echo of a vehicle but for its wheels, of unit power and at most so many scatterers, and how it passes.
 
     Returns
     -------
@@ -106,13 +109,19 @@ def _vehicle_body(draws: Draws, radar: Radar) -> tuple[NDArray[np.complex64], tu
     aside, sight = draws.either("road_m", "verge_m", 0.35), draws.value("sight_rad")
     ahead = aside * np.tan(sight)  # at the middle of the dwell
     gone = straight_path(radar.times_s - radar.times_s[radar.pulses // 2], speed, pull)
-    length = draws.value("vehicle_length_m")
+    length, beam = draws.value("vehicle_length_m"), draws.value("beam_rad")
+    axis = sight + beam * (2 * draws.uniform() - 1)
+    points = np.minimum(np.floor(draws.value("body_points")), most)
+    x = ahead[:, None] + length[:, None] * (draws.uniform(most) - 0.5)
+    y = aside[:, None] + VEHICLE_WIDTH_M * draws.uniform(most)
+    near = (np.hypot(aside, ahead)[:, None] / np.hypot(x, y)) ** 2  # near parts are strong
+    within = np.exp(-(((np.arctan2(x, y) - axis[:, None]) / beam[:, None]) ** 2))
+    echo = np.exp(0.6 * draws.normal(most) + 1j * draws.value("phase_rad", most)) * near * within
     body = np.zeros((len(draws), radar.pulses), np.complex64)
-    for _ in range(BODY_POINTS):
-        x, y = ahead + length * (draws.uniform() - 0.5), aside + VEHICLE_WIDTH_M * draws.uniform()
-        level = np.exp(0.6 * draws.normal()) * (aside**2 + ahead**2) / (x**2 + y**2)  # near parts are strong
-        echo = level * np.exp(1j * draws.value("phase_rad"))
-        body += echo.astype(np.complex64)[:, None] * _passing(radar, x, y, gone)
+    for point in range(int(points.max(initial=0))):
+        rows = np.flatnonzero(points > point)
+        passing = _passing(radar, x[rows, point], y[rows, point], gone[rows])
+        body[rows] += echo[rows, point, None].astype(np.complex64) * passing
     body /= np.sqrt(mean_power(body))[:, None]
     return body, (speed, pull, ahead, aside, sight, gone)
 

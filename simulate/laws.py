@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 474 of them.
-WIDTH = 475
+#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 620 of them.
+WIDTH = 621
 
 #: What a steady body's acceleration is of a manoeuvring one's. Half of all bodies are steady, whatever they are: if one
 #: class alone accelerated, a line that bends would be all there is to learn of it.
@@ -112,6 +112,8 @@ LAWS: dict[str, Law] = {
     "verge_m": Law("log", 1.5, 12.0, "m", "as a radar on the verge sees every vehicle pass"),
     "sight_rad": Law("uniform", np.deg2rad(-85.0), np.deg2rad(85.0), "rad", "line of sight off the square of the road"),
     "vehicle_length_m": Law("log", 1.5, 13.0, "m", "motorcycle to bus"),
+    "body_points": Law("log", 4.0, 49.0, "1", "echoes of a body: few corners, or all of a bus near by"),
+    "beam_rad": Law("log", 0.2, 4.0, "rad", "width of the beam that looks along or across a road, to none at all"),
     "company_db": Law("uniform", -25.0, -3.0, "dB", "another vehicle in the beam, under the first"),
     "mover_mps": Law("uniform", -60.0, 60.0, "m/s", "boats, balloons, far vehicles, aircraft on a slant path"),
     "wheel_radius_m": Law("log", 0.2, 0.55, "m", "motorcycle to lorry"),
