@@ -145,7 +145,11 @@ def _steadied(
 def _beside(
     samples: NDArray[np.complex64], acceleration_mps2: float, wavelength_m: float, prf_hz: float, size: int
 ) -> float:
-    """Mean power of the bins beside the strongest line of one dwell, with an acceleration and the line taken out."""
+    """Power of the noise that moves the strongest line of one dwell as what lies beside it does.
+
+    An acceleration and the line are taken out first. What lies k bins off bends the line's phase by the second Legendre
+    polynomial's part of it, which falls with 1 / k^2: the nearest bins count most, all alike where it is noise.
+    """
     pulses = len(samples)
     steady = _steadied(samples, np.asarray(acceleration_mps2), wavelength_m, prf_hz)
     spectrum = fft.fft(steady, n=size)
@@ -154,7 +158,9 @@ def _beside(
     turns = (top + (right - left) / (2 * (2 * middle - left - right))) / size
     still = steady * np.exp(-2j * np.pi * turns * np.arange(pulses))
     rest = fft.fft(still - still.mean())
-    return float(np.mean(np.abs(rest[np.r_[1 : BESIDE_BINS + 1, -BESIDE_BINS:0]]) ** 2))
+    bins = np.arange(1, BESIDE_BINS + 1)
+    power = (np.abs(rest[bins]) ** 2 + np.abs(rest[-bins]) ** 2) / 2
+    return float(max(power.mean(), np.average(power, weights=bins**-4.0)))
 
 
 def _sharpened(
