@@ -91,22 +91,22 @@ class Cascade(Classifier):
         return probabilities.max(axis=1) >= limits[probabilities.argmax(axis=1)]
 
     def _judged(self, records: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> list[NDArray[np.float32]]:
-        """Probabilities of a bounded number of records, in one or more pieces."""
+        """What is told of a bounded number of records, in one or more pieces."""
         out = []
         for block in in_blocks(records):
             dwells = Dwells(block, carrier_hz=carrier_hz, prf_hz=prf_hz)
-            probabilities = self.first.from_inputs(dwells.inputs(self.first.inputs))
-            rows = np.flatnonzero(~self.sure(probabilities))
+            told = self.first._answer(dwells.inputs(self.first.inputs))
+            rows = np.flatnonzero(~self.sure(told[:, :-1]))
             if len(rows):
                 asked = dwells if len(rows) == len(block) else dwells.rows(rows)
-                probabilities[rows] = super().from_inputs(asked.inputs(self._reads))
-            out.append(probabilities)
+                told[rows] = super()._answer(asked.inputs(self._reads))
+            out.append(told)
         return out
 
-    def from_inputs(self, inputs: Mapping[str, NDArray[np.floating]]) -> NDArray[np.float32]:
-        """As `Classifier.from_inputs`: `inputs` are those of both models."""
-        probabilities = self.first.from_inputs(inputs)
-        rows = np.flatnonzero(~self.sure(probabilities))
+    def _answer(self, inputs: Mapping[str, NDArray[np.floating]]) -> NDArray[np.float32]:
+        """As `Classifier._answer`: `inputs` are those of both models."""
+        told = self.first._answer(inputs)
+        rows = np.flatnonzero(~self.sure(told[:, :-1]))
         if len(rows):
-            probabilities[rows] = super().from_inputs({name: inputs[name][rows] for name in self._reads})
-        return probabilities
+            told[rows] = super()._answer({name: inputs[name][rows] for name in self._reads})
+        return told

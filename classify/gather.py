@@ -122,6 +122,16 @@ class Gathered:
             array[at : at + len(run)] = theirs[name]
 
 
+@dataclass(frozen=True)
+class Sets:
+    """Records for each step; they share no stream, so no scene stands in two of them."""
+
+    train: Gathered
+    validate: Gathered
+    calibrate: Gathered
+    test: Gathered
+
+
 def workers_at_hand() -> int:
     """Processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -5,7 +5,7 @@ Imports numpy, scipy.fft (through the features) and onnxruntime, nothing else he
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -16,7 +16,7 @@ import onnxruntime
 from bladewing.features.inputs import model_inputs
 from bladewing.features.schema import INPUT_SHAPES, schema_hash
 from bladewing.features.spectrum import LEAST_PART, largest_part
-from bladewing.models import DEFAULT_MODEL
+from bladewing.models import DEFAULT_MODEL, KIND_SCORES
 from bladewing.models.operating import OperatingCurve, OperatingPoint
 from bladewing.models.seal import read_metadata, verify
 from numpy.typing import ArrayLike, NDArray
@@ -51,7 +51,13 @@ _STEP_INPUTS = 4096
 #: What the metadata of an exported graph call it.
 EXPORTED = "bladewing raw-IQ graph"
 
-_OUTPUTS = ["probabilities"]
+KINDS_KEY = "kinds"
+"""Metadata of the kinds that a network tells apart inside, name to class in their order; some models know none."""
+
+NOISE = "noise"
+"""The kind of a record that holds nothing else."""
+
+_TOLD = len(CLASSES) + 1  # columns of what is told of a record: the classes' probabilities and that of mere noise
 
 
 @dataclass(frozen=True)
@@ -66,11 +72,17 @@ class Prediction:
         Shape (..., 3), float32, order ("uav", "bird", "clutter"); 1/3 each where a record could not be judged.
     reasons
         Shape (...): why a label is "unknown" (rule and cure), "" for the others.
+    noise
+        Shape (...), float32: probability that there is nothing but noise, a part of that of "clutter"; NaN where a
+        record could not be judged, and from models without kinds. Against noise alone the share of "uav" in "uav" and
+        this, `probabilities[..., 0] / (probabilities[..., 0] + noise)`, finds more UAVs than the probability of "uav",
+        which every other thing that might be there lowers.
     """
 
     labels: NDArray[np.str_]
     probabilities: NDArray[np.float32]
     reasons: NDArray[np.str_]
+    noise: NDArray[np.float32]
 
 
 def model_names() -> tuple[str, ...]:
@@ -213,6 +225,8 @@ class Classifier:
         if dict(self._session.get_modelmeta().custom_metadata_map) != dict(self.metadata):
             raise BadInput(f"{source}: damaged metadata: onnxruntime reads others: train it again")
         self.inputs = self._reads = _read_inputs(self._session, source)
+        self._kinds = _read_kinds(self.metadata, self._session, source)
+        self._outputs = ["probabilities", *([KIND_SCORES] if self._kinds else [])]
         self.operating_point = None
         if max_false_alarm is not None:
             self._keep_to(max_false_alarm, source)
@@ -325,40 +339,44 @@ class Classifier:
         if samples.ndim == 0 or samples.shape[-1] == 0:
             raise BadInput(f"iq has shape {samples.shape}: it must be (..., pulses) with one pulse or more")
         *leading, pulses = samples.shape
-        probabilities, labels, reasons = self._answers(samples.reshape(-1, pulses), carrier_hz, prf_hz)
+        told, labels, reasons = self._answers(samples.reshape(-1, pulses), carrier_hz, prf_hz)
         return Prediction(
-            labels.reshape(leading), probabilities.reshape(*leading, len(CLASSES)), reasons.reshape(leading)
+            labels.reshape(leading),
+            np.ascontiguousarray(told[:, :-1]).reshape(*leading, len(CLASSES)),
+            reasons.reshape(leading),
+            told[:, -1].reshape(leading),
         )
 
     def _answers(
         self, records: NDArray[np.complex64], carrier_hz: float, prf_hz: float
     ) -> tuple[NDArray[np.float32], NDArray[np.str_], NDArray[np.str_]]:
-        """Probabilities, labels and reasons of (records, pulses)."""
+        """What is told (see `_TOLD`), labels and reasons of (records, pulses)."""
         outside = self.envelope.reason(carrier_hz, prf_hz, records.shape[-1])
         largest = largest_part(records)
         live = largest >= LEAST_PART
         if outside is None and live.all():
-            probabilities = self._probabilities(records, None, carrier_hz, prf_hz)
-            labels, why = self.decide(probabilities)
-            return probabilities, labels, np.array(why, dtype=np.str_)
-        probabilities = np.full((len(records), len(CLASSES)), 1 / len(CLASSES), dtype=np.float32)
+            told = self._told(records, None, carrier_hz, prf_hz)
+            labels, why = self.decide(told[:, :-1])
+            return told, labels, np.array(why, dtype=np.str_)
+        told = np.full((len(records), _TOLD), 1 / len(CLASSES), dtype=np.float32)
+        told[:, -1] = np.nan
         labels = np.full(len(records), UNKNOWN, dtype="<U7")
         if outside is not None:
-            return probabilities, labels, np.full(len(records), outside)
+            return told, labels, np.full(len(records), outside)
         reasons = np.full(len(records), "no signal: every sample is 0", dtype=object)
         reasons[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
         rows = np.flatnonzero(live)
-        probabilities[rows] = self._probabilities(records, rows, carrier_hz, prf_hz)
-        labels[rows], reasons[rows] = self.decide(probabilities[rows])
-        return probabilities, labels, reasons.astype(np.str_)
+        told[rows] = self._told(records, rows, carrier_hz, prf_hz)
+        labels[rows], reasons[rows] = self.decide(told[rows, :-1])
+        return told, labels, reasons.astype(np.str_)
 
-    def _probabilities(
+    def _told(
         self, records: NDArray[np.complex64], rows: NDArray[np.intp] | None, carrier_hz: float, prf_hz: float
     ) -> NDArray[np.float32]:
         """Run the chosen rows of (records, pulses), or all, through the model, a bounded number at a time."""
         count = len(records) if rows is None else len(rows)
         step = max(1, min(_STEP_RECORDS, _STEP_SAMPLES // records.shape[-1]))
-        out = [np.empty((0, len(CLASSES)), np.float32)]
+        out = [np.empty((0, _TOLD), np.float32)]
         for start in range(0, count, step):
             part = slice(start, start + step)
             chunk = records[part if rows is None else rows[part]]
@@ -366,8 +384,8 @@ class Classifier:
         return out[-1] if len(out) <= 2 else np.concatenate(out)
 
     def _judged(self, records: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> list[NDArray[np.float32]]:
-        """Probabilities of a bounded number of records, in one or more pieces."""
-        return [self.from_inputs(model_inputs(records, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs))]
+        """What is told of a bounded number of records, in one or more pieces."""
+        return [self._answer(model_inputs(records, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs))]
 
     def from_inputs(self, inputs: Mapping[str, NDArray[np.floating]]) -> NDArray[np.float32]:
         """Probabilities of records whose inputs are made; others than the model's are passed over.
@@ -383,15 +401,42 @@ class Classifier:
         ndarray
             Shape (records, 3), order `classes`.
         """
-        count = len(inputs[self._reads[0]])
-        parts = [
-            self._session.run(
-                _OUTPUTS,
-                {name: inputs[name][at : at + _STEP_INPUTS].astype(np.float32, copy=False) for name in self._reads},
-            )[0]
-            for at in range(0, max(count, 1), _STEP_INPUTS)
-        ]
+        return np.ascontiguousarray(self._answer(inputs)[:, :-1])
+
+    def kind_shares(self, inputs: Mapping[str, NDArray[np.floating]]) -> NDArray[np.float32]:
+        """Probabilities of the kinds that a network tells apart inside, uncalibrated, shape (records, kinds).
+
+        The argument is that of `from_inputs`; the kinds are those of the metadata.
+        """
+        return np.concatenate([_shares(scores) for _, scores in self._run(inputs)])
+
+    def _answer(self, inputs: Mapping[str, NDArray[np.floating]]) -> NDArray[np.float32]:
+        """What is told of records whose inputs are made."""
+        parts = []
+        for probabilities, *others in self._run(inputs):
+            told = np.full((len(probabilities), _TOLD), np.nan, np.float32)
+            told[:, :-1] = probabilities
+            if NOISE in self._kinds:
+                of_class = list(self._kinds.values())
+                first, own = of_class.index(self._kinds[NOISE]), list(self._kinds).index(NOISE)
+                kin = slice(first, first + of_class.count(self._kinds[NOISE]))  # kinds of a class stand together
+                share = _shares(others[0][:, kin])[:, own - first]
+                told[:, -1] = probabilities[:, CLASSES.index(self._kinds[NOISE])] * share
+            parts.append(told)
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    def _run(self, inputs: Mapping[str, NDArray[np.floating]]) -> Iterator[list[NDArray[np.float32]]]:
+        """Run the model, a bounded number of records at a time."""
+        count = len(inputs[self._reads[0]])
+        for at in range(0, max(count, 1), _STEP_INPUTS):
+            part = {name: inputs[name][at : at + _STEP_INPUTS].astype(np.float32, copy=False) for name in self._reads}
+            yield self._session.run(self._outputs, part)
+
+
+def _shares(scores: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Softmax of each row."""
+    powers = np.exp(scores - scores.max(axis=1, keepdims=True))
+    return powers / powers.sum(axis=1, keepdims=True)
 
 
 def _rule(max_false_alarm: object, coverage: object) -> tuple[float | None, float | None]:
@@ -487,3 +532,17 @@ def _read_inputs(session: onnxruntime.InferenceSession, source: str) -> tuple[st
     if "probabilities" not in [node.name for node in session.get_outputs()]:
         raise BadInput(f"{source}: no output 'probabilities': not a complete bladewing model, train it again")
     return tuple(node.name for node in session.get_inputs())
+
+
+def _read_kinds(metadata: Mapping[str, str], session: onnxruntime.InferenceSession, source: str) -> Mapping[str, str]:
+    """The kinds that a model tells apart inside, name to class; none where it knows none."""
+    try:
+        kinds = json.loads(metadata.get(KINDS_KEY, "{}"))
+        if not isinstance(kinds, dict) or list(kinds.values()) != sorted(kinds.values(), key=CLASSES.index):
+            raise ValueError(f"each kind must be of a class, in the order {', '.join(CLASSES)}")
+    except (TypeError, ValueError, RecursionError) as error:
+        raise BadInput(f"{source}: damaged kinds: {error}: train it again") from None
+    widths = {node.name: node.shape[1:] for node in session.get_outputs()}
+    if kinds and widths.get(KIND_SCORES) != [len(kinds)]:
+        raise BadInput(f"{source}: no output {KIND_SCORES!r} of its {len(kinds)} kinds: train it again")
+    return kinds

@@ -1,12 +1,10 @@
 """Training: synthetic records in, calibrated ONNX models and the account of the run out."""
 
 import json
-import math
 import os
 import platform
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
@@ -22,36 +20,19 @@ from .dataset import DataSet, Plan, simulator_digest
 from .envelope import Envelope
 from .errors import BadInput
 from .files import result_folder, write_together
-from .gather import Gathered, gather, gather_from, inputs_digest
-from .inference import COVERAGES, CURVE_KEY, SETS_KEY, Classifier
+from .gather import Gathered, Sets, gather, gather_from, inputs_digest
+from .inference import COVERAGES, CURVE_KEY, KINDS_KEY, SETS_KEY, Classifier
 from .labels import CLASSES
 from .ladder import CASCADE
 from .parts import Parts
 from .progress import Progress
+from .train_network import OnFraction, ScoresOf, Taught, parts_of, train_net
 from .training_account import ACCOUNT, alarm_threshold, covered, figures, print_table
 from .training_config import TrainingConfig, training_config
 from .training_costs import add_costs
 
 #: Folder of what is trained so far, beside the models while the run is not done.
 PARTS = "train-parts"
-
-CLASS_OF_KIND = tuple(CLASSES.index(label) for label in KIND_CLASS.values())
-"""Class of each kind that networks learn to tell, in the order of `KIND_CLASS`."""
-
-OnFraction = Callable[[float], None]
-
-Taught = Callable[[], NDArray[np.floating]]
-"""Gives what a network's teacher says of the training records, shape (n, 3); asked only by one that is trained."""
-
-
-@dataclass(frozen=True)
-class Sets:
-    """Records for each step; they share no stream, so no scene stands in two of them."""
-
-    train: Gathered
-    validate: Gathered
-    calibrate: Gathered
-    test: Gathered
 
 
 def run_training(
@@ -115,7 +96,8 @@ def run_training(
     started = time.perf_counter()
     resumed = parts.begun
     for name in settings.models:  # what is damaged is told before any record is drawn
-        parts.arrays(name), parts.arrays(_epochs_of(name))
+        for part in (name, *parts_of(name)):
+            parts.arrays(part)
     with Progress(visible=progress) as bars:
         if resumed:
             bars.say(f"Going on with what an interrupted run left in {out / PARTS}")
@@ -129,7 +111,7 @@ def run_training(
         @cache
         def told_by(teacher: str) -> NDArray[np.float32]:
             """What a trained network says of the training records, once for all of its pupils."""
-            return Classifier(files[f"{teacher}.onnx"], source=teacher).from_inputs(sets.train.inputs)
+            return Classifier(files[f"{teacher}.onnx"], source=teacher).kind_shares(sets.train.inputs)
 
         teachers_first = sorted(settings.models, key=lambda name: bool(LADDER[name].teacher))
         for name in teachers_first:
@@ -178,11 +160,6 @@ def _gather(settings: TrainingConfig, stored: DataSet | None, bars: Progress, pa
     return Sets(**sets)
 
 
-def _epochs_of(name: str) -> str:
-    """Name of the part that holds a network's training up to its last whole epoch."""
-    return f"{name}-epochs"
-
-
 def _take_or_train(
     name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction, parts: Parts, taught: Taught | None
 ) -> tuple[bytes, dict[str, Any]]:
@@ -223,7 +200,7 @@ def train_one(
 
     started = time.perf_counter()
     network = LADDER[name].learner == "network"
-    scores_of, export, detail = (partial(_network, parts=parts, taught=taught) if network else _tabular)(
+    scores_of, export, detail = (partial(train_net, parts=parts, taught=taught) if network else _tabular)(
         name, settings, sets, on_fraction
     )
     calibration = fit_vector_scaling(scores_of(sets.calibrate), sets.calibrate.labels)
@@ -262,14 +239,12 @@ def train_one(
         "calibration": json.dumps(account["calibration"]),
         "accept": json.dumps(account["accept"]),
         CURVE_KEY: curve.to_json(),
+        **({KINDS_KEY: json.dumps(KIND_CLASS)} if network else {}),
         SETS_KEY: json.dumps([[coverage, *row] for coverage, row in zip(COVERAGES, limits.tolist(), strict=True)]),
         "training": settings.model_dump_json(),
     }
     sealed = seal(attach_metadata(onnx_bytes, metadata))
     return sealed, account | {"bytes": len(sealed)}
-
-
-ScoresOf = Callable[[Gathered], NDArray[np.floating]]
 
 
 def _tabular(
@@ -295,85 +270,6 @@ def _tabular(
         return tabular_scores(model, part.inputs[column])
 
     return scores_of, lambda calibration: export_tabular(model, x.shape[1], column, calibration), {}
-
-
-def _network(
-    name: str,
-    settings: TrainingConfig,
-    sets: Sets,
-    on_fraction: OnFraction,
-    parts: Parts | None,
-    taught: Taught | None = None,
-) -> tuple[ScoresOf, Callable[[Any], bytes], dict[str, Any]]:
-    from bladewing.models.augment import VelocityMirror
-    from bladewing.models.cnn import EvidenceNet, ImageNet, SpectrumNet
-    from bladewing.models.export import export_network
-    from bladewing.models.training import network_scores, train_network
-    from bladewing.models.training_state import ForeignSnapshot
-
-    shapes = {key: INPUT_SHAPES[key] for key in LADDER[name].inputs}
-    signal = LADDER[name].inputs[0]
-    image = len(shapes[signal]) == 3
-    net: EvidenceNet = (
-        ImageNet(shapes, seed=settings.seed, kinds=CLASS_OF_KIND)
-        if image
-        else SpectrumNet(shapes, seed=settings.seed, widen=LADDER[name].widen, kinds=CLASS_OF_KIND)
-    )
-
-    def inputs(part: Gathered) -> dict[str, NDArray]:
-        return {key: part.inputs[key] for key in shapes}
-
-    snapshot = parts.arrays(_epochs_of(name)) if parts else None
-    try:
-        result = train_network(
-            net,
-            inputs(sets.train),
-            sets.train.labels,
-            (inputs(sets.validate), sets.validate.labels),
-            seed=settings.seed,
-            epochs=settings.epochs,
-            patience=settings.patience,
-            batch=settings.batch,
-            learning_rate=settings.learning_rate,
-            weight_decay=settings.weight_decay,
-            # no measurement is signed, so only the picture is mirrored
-            augment=VelocityMirror(axes={signal: -2 if image else -1}, odd={}),
-            teacher=taught() if taught else None,
-            kinds=kinds_of(sets.train),
-            snapshot=snapshot,
-            on_snapshot=partial(parts.keep_arrays, _epochs_of(name)) if parts else None,
-            on_epoch=lambda epoch, epochs, _: on_fraction(epoch / epochs),
-        )
-    except ForeignSnapshot as error:
-        assert parts
-        raise parts.refusal(_epochs_of(name), str(error)) from None
-    net.compact()
-    detail = {
-        "device": result.device,
-        "teacher": LADDER[name].teacher if taught else "",
-        "best_epoch": result.best_epoch,
-        "stopped_early": result.stopped_early,
-        "seconds": round(result.seconds, 1),  # of all its epochs, those before an interruption too
-        "epochs": [{key: _told(key, value) for key, value in epoch.items()} for epoch in result.epochs],
-    }
-    return (
-        lambda part: network_scores(net, inputs(part)),
-        lambda calibration: export_network(net, shapes, calibration),
-        detail,
-    )
-
-
-def kinds_of(part: Gathered) -> NDArray[np.int64]:
-    """Kind of each record, a place in `KIND_CLASS`."""
-    place = {kind: number for number, kind in enumerate(KIND_CLASS)}
-    return np.array([place[kind] for kind in part.truth["kind"]], np.int64)
-
-
-def _told(metric: str, value: float) -> float | None:
-    """A metric of an epoch as the account holds it; JSON has no word for one that is not finite."""
-    if not math.isfinite(value):
-        return None
-    return float(f"{value:.3g}") if metric == "learning_rate" else round(value, 4)
 
 
 def _versions() -> dict[str, str]:

@@ -129,15 +129,15 @@ def require_every_class(y: NDArray[np.integer], name: str) -> None:
         raise ValueError(f"{name} has {counts.tolist()} records of uav, bird, clutter; each needs 2: give more records")
 
 
-def require_shares(values: NDArray[np.floating], count: int, name: str) -> None:
-    """Refuse probabilities that are not one of each class a record.
+def require_shares(values: NDArray[np.floating], count: int, kinds: int, name: str) -> None:
+    """Refuse probabilities that are not one of each kind a record.
 
     Parameters
     ----------
     values
-        Array that should have the shape (n, 3), its rows 1 in sum.
-    count
-        Number of records n.
+        Array that should have the shape (n, kinds), its rows 1 in sum.
+    count, kinds
+        Number of records n, and of kinds.
     name
         What the array is called in the message.
 
@@ -146,8 +146,8 @@ def require_shares(values: NDArray[np.floating], count: int, name: str) -> None:
     ValueError
         Where the shape or a value is wrong.
     """
-    if values.shape != (count, CLASS_COUNT):
-        raise ValueError(f"{name} has shape {values.shape}; it must be ({count}, {CLASS_COUNT}), one row a record")
+    if values.shape != (count, kinds):
+        raise ValueError(f"{name} has shape {values.shape}; it must be ({count}, {kinds}), one row a record")
     require_finite(values, name)
     off = np.flatnonzero((values < 0).any(axis=1) | (np.abs(values.sum(axis=1) - 1) > 1e-3))
     if len(off):

@@ -1,7 +1,8 @@
 """ONNX models that need nothing beside them: raw inputs in, raw scores and calibrated probabilities out.
 
 Every graph reads float32 inputs whose first axis is the batch, the only one that may vary, and gives "scores" and
-"probabilities", both (batch, 3). The calibration is three nodes at the end: Mul, Add, Softmax.
+"probabilities", both (batch, 3); that of a network that knows kinds gives their raw "kind_scores" too, (batch, kinds).
+The calibration is three nodes at the end: Mul, Add, Softmax.
 """
 
 import logging
@@ -10,6 +11,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +19,7 @@ import onnx
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
+from . import KIND_SCORES
 from ._checks import CLASS_COUNT
 from .calibration import Calibration
 from .seal import PLACEHOLDER, SEAL_KEY
@@ -65,26 +68,41 @@ def export_network(net: "EvidenceNet", input_shapes: Mapping[str, tuple[int, ...
     """
     import torch
 
+    from .cnn import CLASSES_ALONE
+
     if dict(input_shapes) != net.input_shapes:
         raise ValueError(f"input_shapes is {dict(input_shapes)}; the network was made for {net.input_shapes}")
+    told = net.kinds != CLASSES_ALONE
+
+    class _Answers(torch.nn.Module):
+        """A network that gives all its scores at once."""
+
+        def __init__(self, net: "EvidenceNet") -> None:
+            super().__init__()
+            self.net = net
+
+        def forward(self, signal: torch.Tensor, *evidence: torch.Tensor) -> tuple[torch.Tensor, ...]:
+            kind_scores = self.net.kind_scores(signal, *evidence)
+            return (self.net.class_scores(kind_scores), kind_scores)[: 1 + told]
+
     batch = torch.export.Dim("batch")
     example = tuple(torch.zeros(2, *shape) for shape in net.input_shapes.values())
     with _quiet_converters():
         program = torch.onnx.export(
-            net.eval(),
+            _Answers(net).eval(),
             example,
             dynamo=True,
             external_data=False,
             verbose=False,
             opset_version=_OPSET,
             input_names=list(net.input_shapes),
-            output_names=["scores"],
+            output_names=["scores", KIND_SCORES][: 1 + told],
             dynamic_shapes=({0: batch}, tuple({0: batch} for _ in example[1:])),
         )
     assert program is not None
     model = program.model_proto  # made anew at each asking
     _store_in_half(model.graph)
-    return _finish(model, net.input_shapes, calibration)
+    return _finish(model, net.input_shapes, calibration, {KIND_SCORES: len(net.kinds)} if told else {})
 
 
 def export_tabular(
@@ -248,7 +266,12 @@ def check_export(
     return worst
 
 
-def _finish(model: onnx.ModelProto, input_shapes: Mapping[str, tuple[int, ...]], calibration: Calibration) -> bytes:
+def _finish(
+    model: onnx.ModelProto,
+    input_shapes: Mapping[str, tuple[int, ...]],
+    calibration: Calibration,
+    others: Mapping[str, int] = MappingProxyType({}),
+) -> bytes:
     """Append the calibration, remove what inference does not need, check, serialise."""
     graph = model.graph
     _require_free_batch(graph, input_shapes)
@@ -272,8 +295,8 @@ def _finish(model: onnx.ModelProto, input_shapes: Mapping[str, tuple[int, ...]],
         for name, shape in input_shapes.items()
     )
     graph.output.extend(
-        helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", CLASS_COUNT])
-        for name in ("scores", "probabilities")
+        helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", width])
+        for name, width in {"scores": CLASS_COUNT, "probabilities": CLASS_COUNT, **others}.items()
     )
     # Converters leave call stacks with the paths of the machine they ran on.
     for part in [model, graph, *graph.node, *graph.initializer]:

@@ -1,7 +1,7 @@
 """The loop that trains a network: one seed, one schedule, the best state kept."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.optim.lr_scheduler import OneCycleLR
 
-from ._checks import CLASS_COUNT, require_every_class, require_kinds, require_labels, require_shares
+from ._checks import require_every_class, require_kinds, require_labels, require_shares
 from .cnn import EvidenceNet
 from .muon import Muon
 from .training_state import Snapshot, Work
@@ -117,12 +117,13 @@ def train_network(
     augment
         Changes each training batch.
     teacher
-        Probabilities that a better network gives the training records, shape (n, 3), of which the target takes the
-        share `TAUGHT`. A label is one draw from what a record leaves open and its teacher's answer near the mean of
-        them, so that a step errs less (Hinton, Vinyals and Dean, arXiv:1503.02531).
+        Probabilities that another network gives each kind of the training records, shape (n, kinds), as from
+        `network_shares`; the targets take the share `TAUGHT` of them. A label is one draw from what a record leaves
+        open and its teacher's answer near the mean of them, so that a step errs less (Hinton, Vinyals and Dean,
+        arXiv:1503.02531), also where the teacher is as small as its pupil (Furlanello and others, arXiv:1805.04770).
     kinds
         Kind of each training record, shape (n,), a place in the network's `kinds`, of the class that `y` says. Where
-        given, the network is to tell these as well, from the label alone: half of the loss is theirs.
+        given, the network is to tell these as well: half of the loss is theirs.
     patience
         Epochs in a row without a lower validation loss after which the training stops; 0: never. The schedule is laid
         out for all epochs: one that stops early has not seen its end.
@@ -152,7 +153,7 @@ def train_network(
     require_every_class(y, "y")
     require_labels(validation[1], net.require(validation[0]), "validation labels")
     if teacher is not None:
-        require_shares(teacher, count, "teacher")
+        require_shares(teacher, count, len(net.kinds), "teacher")
     if kinds is not None:
         require_kinds(kinds, y, net.kinds)
     if epochs < 1 or batch < 2 or patience < 0:
@@ -165,11 +166,9 @@ def train_network(
     # the stubs do not know this argument; channels last, a step takes a fifth less time on a CPU
     net.to(place, memory_format=torch.channels_last)  # type: ignore[call-overload]
     tensors = {name: _tensor(inputs[name]).to(place) for name in net.input_shapes}
-    truth = torch.as_tensor(y, dtype=torch.int64).to(place)
-    if teacher is not None:
-        said = torch.as_tensor(teacher, dtype=torch.float32).to(place)
-        truth = TAUGHT * said + (1 - TAUGHT) * nn.functional.one_hot(truth, CLASS_COUNT)
-    kind_truth = None if kinds is None else torch.as_tensor(kinds, dtype=torch.int64).to(place)
+    said = None if teacher is None else torch.as_tensor(teacher, dtype=torch.float32)
+    truth = _target(y, said if said is None else said @ nn.functional.one_hot(torch.tensor(net.kinds)).float(), place)
+    kind_truth = None if kinds is None else _target(kinds, said, place)
     matrices = [weights for weights in net.parameters() if weights.ndim > 1]
     others = [weights for weights in net.parameters() if weights.ndim <= 1]
     optimisers = (
@@ -251,15 +250,34 @@ def network_scores(net: EvidenceNet, inputs: Inputs, batch: int = 1024) -> NDArr
     ValueError
         Where an input is missing, has another shape, or holds NaN or infinity.
     """
+    return torch.cat(list(_each(net, net, inputs, batch))).numpy()
+
+
+def network_shares(net: EvidenceNet, inputs: Inputs, batch: int = 1024) -> NDArray[np.float32]:
+    """Return the probability that a network gives each of its kinds, uncalibrated, shape (n, kinds).
+
+    The arguments and what is raised are those of `network_scores`.
+    """
+    return torch.cat([scores.softmax(1) for scores in _each(net, net.kind_scores, inputs, batch)]).numpy()
+
+
+def _each(net: EvidenceNet, asked: Callable[..., Tensor], inputs: Inputs, batch: int) -> Iterator[Tensor]:
+    """What a network is asked for, a batch of records at a time."""
     count = net.require(inputs)
     place = next(net.parameters()).device
     net.eval()
-    with torch.inference_mode():
-        parts = [
-            net(*(_tensor(inputs[name][start : start + batch]).to(place).float() for name in net.input_shapes)).cpu()
-            for start in range(0, count, batch)
-        ]
-    return torch.cat(parts).numpy()
+    for start in range(0, count, batch):
+        with torch.inference_mode():
+            part = (_tensor(inputs[name][start : start + batch]).to(place).float() for name in net.input_shapes)
+            yield asked(*part).cpu()
+
+
+def _target(labels: NDArray[np.integer], said: Tensor | None, place: torch.device) -> Tensor:
+    """Labels, or with what a teacher says their mean with that."""
+    truth = torch.as_tensor(labels, dtype=torch.int64)
+    if said is not None:
+        truth = TAUGHT * said + (1 - TAUGHT) * nn.functional.one_hot(truth, said.shape[1])
+    return truth.to(place)
 
 
 def _tensor(values: NDArray[np.floating]) -> Tensor:

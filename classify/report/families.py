@@ -99,7 +99,8 @@ def _part(records: Gathered, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Gath
 
 def _trained(model: str, settings: TrainingConfig, sets: Mapping[str, Gathered]) -> Answer:
     """Train, and give what answers records: their probabilities and labels."""
-    from ..train import Sets, train_one
+    from ..gather import Sets
+    from ..train import train_one
 
     # the account's own figures are not used here, so any records do
     few = _part(sets["validate"], np.arange(min(600, len(sets["validate"]))))

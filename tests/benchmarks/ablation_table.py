@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 from bladewing.classify.gather import Gathered, gather
-from bladewing.classify.train import CLASS_OF_KIND, kinds_of
+from bladewing.classify.train_network import CLASS_OF_KIND, kinds_of
 from bladewing.features import INPUT_SHAPES
 from bladewing.features.schema import FEATURES, LEVEL_CHANNELS
 from bladewing.models.augment import VelocityMirror

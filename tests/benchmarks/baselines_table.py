@@ -12,8 +12,8 @@ from functools import partial
 
 import numpy as np
 from bladewing.classify import Classifier
-from bladewing.classify.gather import Gathered
-from bladewing.classify.train import Sets, train_one
+from bladewing.classify.gather import Gathered, Sets
+from bladewing.classify.train import train_one
 from bladewing.classify.training_config import TrainingConfig
 from bladewing.features import model_inputs
 from bladewing.models import LADDER

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from bladewing.classify import Classifier
 from bladewing.classify.fusion import ODDS
-from bladewing.classify.inference import COVERAGES
+from bladewing.classify.inference import COVERAGES, Prediction
 from bladewing.classify.labels import CLASSES, decide, decide_by_sets
 from bladewing.classify.ladder import COST_KEY, by_place, shipped_account
 from bladewing.classify.predict import answer
@@ -54,8 +54,14 @@ def scored(
     parts = []
     for radar, (iq, truth) in zip(radars, drawn(radars, count, kind, purpose), strict=True):
         given = classifier.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
-        parts.append({"p": given.probabilities, "answer": given.labels, **truth})
+        parts.append({"p": given.probabilities, "over_noise": over(given), "answer": given.labels, **truth})
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def over(given: Prediction) -> np.ndarray:
+    """What tells a UAV from noise alone; of models that tell of no noise, the probability of "uav"."""
+    uav = given.probabilities[..., 0]
+    return np.where(np.isnan(given.noise), uav, uav / (uav + given.noise))
 
 
 def ideal(radar: Radar, count: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
@@ -79,18 +85,23 @@ def ideal(radar: Radar, count: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
 def ideal_detection(classifier: Classifier, count: int) -> None:
     """Detection of UAVs in white noise alone, receivers without faults, at a false-alarm rate of 1 %."""
 
-    def p_uav(iq: np.ndarray) -> np.ndarray:
-        return classifier.predict(iq, carrier_hz=PAPER_RADAR.carrier_hz, prf_hz=PAPER_RADAR.prf_hz).probabilities[:, 0]
-
     found = {kind: ideal(PAPER_RADAR, count, kind) for kind in KIND_CLASS}
-    p = {kind: p_uav(iq) for kind, (iq, _) in found.items()}
-    others = [np.concatenate([p[kind] for kind in KINDS[name] if kind != "noise"]) for name in ("bird", "clutter")]
-    thresholds = [np.quantile(p["noise"], 0.99), np.quantile(np.concatenate(others), 0.99)]
+    radar = {"carrier_hz": PAPER_RADAR.carrier_hz, "prf_hz": PAPER_RADAR.prf_hz}
+    given = {kind: classifier.predict(iq, **radar) for kind, (iq, _) in found.items()}
+    uav = {kind: one.probabilities[:, 0] for kind, one in given.items()}
+    over_noise = {kind: over(one) for kind, one in given.items()}
+    others = [kind for name in ("bird", "clutter") for kind in KINDS[name] if kind != "noise"]
+    tables = {
+        "noise, by uav over uav and noise": (over_noise, ["noise"]),
+        "noise, by uav": (uav, ["noise"]),
+        "birds and clutter": (uav, others),
+    }
     print(
         f"\ndetection at 1 % false alarms, {PAPER_RADAR.pulses} pulses at 9.85 GHz and 25 kHz, receivers without faults"
     )
-    for against, threshold in zip(("noise", "birds and clutter"), thresholds, strict=True):
-        print(f"against {against}, at blades of [dB]: {' '.join(f'{kind:>12s}' for kind in ROTORS)}    all")
+    for against, (p, foes) in tables.items():
+        threshold = np.quantile(np.concatenate([p[kind] for kind in foes]), 0.99)
+        print(f"against {against}\n{'at blades of [dB]':34s} {' '.join(f'{kind:>12s}' for kind in ROTORS)}    all")
         for low, high in pairwise(SNR_EDGES_DB[SNR_EDGES_DB <= 12]):
             hits = [p[kind][(found[kind][1] >= low) & (found[kind][1] < high)] > threshold for kind in ROTORS]
             cells = " ".join(f"{one.mean() if len(one) else np.nan:12.3f}" for one in hits)
@@ -112,12 +123,15 @@ def detection(classifier: Classifier, count: int) -> None:
         clear = uav & np.isnan(everything["background_db"])
         print(f"\ndetection at 1 % false alarms, 2048 pulses, {name}, {uav.sum()} UAVs")
         print(" SNR of the blades [dB] | against noise (no background)   n | against birds and clutter     n")
-        thresholds = [np.quantile(p, 0.99) for p in (noise["p"][empty, 0], everything["p"][~uav, 0])]
+        against = [
+            (clear, everything["over_noise"], np.quantile(noise["over_noise"][empty], 0.99)),
+            (uav, everything["p"][:, 0], np.quantile(everything["p"][~uav, 0], 0.99)),
+        ]
         for low, high in pairwise(SNR_EDGES_DB):
             cells = []
-            for among, threshold in zip((clear, uav), thresholds, strict=True):
+            for among, score, threshold in against:
                 rows = among & (everything["snr_db"] >= low) & (everything["snr_db"] < high)
-                hits = everything["p"][rows, 0] > threshold
+                hits = score[rows] > threshold
                 cells.append(f"{hits.mean() if len(hits) else np.nan:13.3f} {len(hits):18d}")
             print(f" {low:9d} .. {high:<9d} | " + " | ".join(cells))
 

@@ -306,7 +306,7 @@ class Asked:
     def predict(self, iq, *, carrier_hz, prf_hz):
         self.shapes.append(iq.shape)
         p = np.tile(np.float32([0.4, 0.3, 0.3]), (len(iq), 1))
-        return Prediction(decide(p, ACCEPT)[0], p, np.full(len(iq), ""))
+        return Prediction(decide(p, ACCEPT)[0], p, np.full(len(iq), ""), np.zeros(len(iq)))
 
 
 @pytest.mark.parametrize(("count", "lengths"), [(1, [1]), (2, [1, 2]), (13, [1, 2, 5, 12]), (31, [1, 2, 5, 12, 31])])

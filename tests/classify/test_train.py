@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from bladewing.classify import Classifier, train
 from bladewing.classify.errors import BadInput
-from bladewing.classify.gather import Gathered, gather
+from bladewing.classify.gather import Gathered, Sets, gather
 from bladewing.classify.inference import COVERAGES
 from bladewing.classify.labels import CLASSES
-from bladewing.classify.train import CLASS_OF_KIND, kinds_of, run_training
+from bladewing.classify.train import run_training
+from bladewing.classify.train_network import CLASS_OF_KIND, kinds_of, train_net
 from bladewing.classify.training_account import alarm_threshold, figures
 from bladewing.classify.training_config import TrainingConfig, training_config
 from bladewing.features import INPUT_SHAPES
@@ -136,7 +137,7 @@ def _few_sets(*_):
         kinds = np.array([next(kind for kind, of in KIND_CLASS.items() if of == CLASSES[label]) for label in labels])
         return Gathered(inputs, labels, {"kind": kinds})
 
-    return train.Sets(gathered(192), gathered(96), gathered(300), gathered(300))
+    return Sets(gathered(192), gathered(96), gathered(300), gathered(300))
 
 
 def _run(out, *, after=None, then=None, **changed):
@@ -174,7 +175,7 @@ def test_a_killed_and_interrupted_training_goes_on_to_the_same_files(whole, tmp_
     )
     root = Path(__file__).parents[2]
     with subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], cwd=root) as process:
-        while process.poll() is None and not list(tmp_path.glob("train-parts/*/spectrum-cnn-epochs.npz")):
+        while process.poll() is None and not list(tmp_path.glob("train-parts/*/spectrum-cnn-0-epochs.npz")):
             time.sleep(0.01)
         process.kill()
     assert process.returncode == -signal.SIGKILL
@@ -206,7 +207,7 @@ def test_a_pupil_learns_from_its_teacher_after_it_and_an_interruption_changes_no
     assert taught != (whole / "spectrum-cnn.onnx").read_bytes()
 
     def once_the_teacher_is_done():
-        if list((tmp_path / "interrupted").glob("train-parts/*/spectrum-cnn-epochs.npz")):
+        if list((tmp_path / "interrupted").glob("train-parts/*/spectrum-cnn-0-epochs.npz")):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -218,10 +219,56 @@ def test_a_pupil_learns_from_its_teacher_after_it_and_an_interruption_changes_no
         assert files[0].read_bytes() == files[1].read_bytes(), name
 
 
+def test_a_network_of_two_generations_goes_on_between_them_to_the_same_bytes(tmp_path, monkeypatch):
+    names = ("spectrum-cnn-wide",)
+    taught = []
+    real = training.train_network
+
+    def train_network(*given, teacher, **options):
+        taught.append(teacher)
+        return real(*given, teacher=teacher, **options)
+
+    monkeypatch.setattr(training, "train_network", train_network)
+    for out in (tmp_path / "straight", tmp_path / "interrupted"):
+        out.mkdir()
+    account = _run(tmp_path / "straight", models=names)["models"][names[0]]
+    assert account["generations"] == len(taught) == 2
+    assert taught[0] is None
+    assert taught[1].shape == (192, len(CLASS_OF_KIND))
+    np.testing.assert_allclose(taught[1].sum(axis=1), 1, atol=1e-6)
+
+    def once_the_first_is_done():
+        if list((tmp_path / "interrupted").glob("train-parts/*/spectrum-cnn-wide-1-epochs.npz")):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        _run(tmp_path / "interrupted", after=1, then=once_the_first_is_done, models=names)
+    assert list((tmp_path / "interrupted").glob("train-parts/*/spectrum-cnn-wide-0-answers.npz"))
+    _run(tmp_path / "interrupted", models=names)
+    assert len(taught) == 5  # twice whole, the second generation from its first epoch on
+    files = [tmp_path / kind / f"{names[0]}.onnx" for kind in ("straight", "interrupted")]
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_what_a_model_tells_of_kinds_adds_up_to_its_classes_and_noise_is_one_of_them(whole):
+    model = Classifier.load(whole / "spectrum-cnn.onnx")
+    inputs = _few_sets().test.inputs
+    shares, told = model.kind_shares(inputs).astype(float), model._answer(inputs)
+    classes = np.stack([shares[:, np.array(CLASS_OF_KIND) == label].sum(axis=1) for label in range(3)], axis=1)
+    scale, bias = (json.loads(model.metadata["calibration"])[key] for key in ("scale", "bias"))
+    powers = classes**scale * np.exp(bias)
+    np.testing.assert_allclose(told[:, :3], powers / powers.sum(axis=1, keepdims=True), rtol=1e-4)
+    own = list(KIND_CLASS).index("noise")
+    np.testing.assert_allclose(told[:, 3], told[:, 2] * shares[:, own] / classes[:, 2], rtol=1e-4)
+    for row in range(0, 300, 37):
+        alone = model._answer({name: values[row : row + 1] for name, values in inputs.items()})
+        np.testing.assert_array_equal(alone[0, 3], told[row, 3])
+
+
 def test_a_resumed_networks_seconds_hold_those_before_the_interruption(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         _run(tmp_path, after=2, then=_interrupt)
-    (file,) = tmp_path.glob("train-parts/*/spectrum-cnn-epochs.npz")
+    (file,) = tmp_path.glob("train-parts/*/spectrum-cnn-0-epochs.npz")
     with np.load(file) as kept:
         arrays = dict(kept)
     arrays["history/seconds"] += 1000
@@ -235,10 +282,10 @@ def test_other_settings_do_not_take_what_was_kept(tmp_path):
     for after in (1, 2):
         with pytest.raises(KeyboardInterrupt):  # its first epoch comes, so nothing of the other was taken
             _run(tmp_path, after=after, then=_interrupt)
-    assert len(list(tmp_path.glob("train-parts/*/spectrum-cnn-epochs.npz"))) == 2
+    assert len(list(tmp_path.glob("train-parts/*/spectrum-cnn-0-epochs.npz"))) == 2
 
 
-@pytest.mark.parametrize("name", ["features-linear", "spectrum-cnn-epochs"])
+@pytest.mark.parametrize("name", ["features-linear", "spectrum-cnn-0-epochs"])
 def test_what_is_damaged_or_foreign_is_refused_in_one_line(tmp_path, name):
     with pytest.raises(KeyboardInterrupt):
         _run(tmp_path, after=1, then=_interrupt)
@@ -255,7 +302,7 @@ def test_what_is_damaged_or_foreign_is_refused_in_one_line(tmp_path, name):
 
 def test_a_network_that_no_longer_gains_stops_and_says_so():
     settings = SETTINGS.model_copy(update={"epochs": 60, "patience": 1})
-    _, _, detail = train._network("spectrum-cnn", settings, _few_sets(), lambda _: None, None)
+    _, _, detail = train_net("spectrum-cnn", settings, _few_sets(), lambda _: None, None)
     assert detail["stopped_early"]
     assert len(detail["epochs"]) == detail["best_epoch"] + 1 < 60
 
@@ -268,7 +315,7 @@ def test_epochs_without_a_number_are_told_and_do_not_cost_the_network(monkeypatc
         return replace(result, epochs=(*result.epochs, dict.fromkeys(result.epochs[0], float("nan"))))
 
     monkeypatch.setattr(training, "train_network", ruined_at_last)
-    _, _, detail = train._network("spectrum-cnn", SETTINGS, _few_sets(), lambda _: None, None)
+    _, _, detail = train_net("spectrum-cnn", SETTINGS, _few_sets(), lambda _: None, None)
     assert set(detail["epochs"][-1].values()) == {None}
     json.dumps(detail, allow_nan=False)
 

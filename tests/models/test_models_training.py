@@ -7,7 +7,7 @@ from bladewing.models.augment import VelocityMirror
 from bladewing.models.calibration import softmax
 from bladewing.models.cnn import ImageNet, SpectrumNet, Standardise
 from bladewing.models.tabular import tabular_scores, train_boosted, train_linear
-from bladewing.models.training import network_scores, train_network
+from bladewing.models.training import network_scores, network_shares, train_network
 from bladewing.models.training_state import ForeignSnapshot
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -149,6 +149,22 @@ def test_a_teacher_that_knows_what_a_record_leaves_open_makes_up_for_labels_that
         found = softmax(network_scores(net, fresh))
         off.append(np.abs(found[np.arange(300), labels] - 0.5).mean())
     assert off[1] < 0.7 * off[0]
+
+
+def test_a_pupil_learns_kinds_that_its_labels_no_longer_tell():
+    inputs, kinds = _rates(900, 0)
+    y, rng = np.array(KINDS)[kinds], np.random.default_rng(2)
+    mixed = np.array([rng.choice(np.flatnonzero(np.array(KINDS) == label)) for label in y])  # the class is right
+    fresh, told = _rates(300, 1)
+    found = []
+    for teacher in (None, np.eye(len(KINDS))[kinds]):
+        net = SpectrumNet({name: values.shape[1:] for name, values in inputs.items()}, seed=0, kinds=KINDS)
+        options = {"seed": 0, "epochs": 8, "batch": 64, "kinds": mixed, "teacher": teacher}
+        train_network(net, inputs, y, (fresh, np.array(KINDS)[told]), **options)
+        shares = network_shares(net, fresh)
+        np.testing.assert_allclose(shares.sum(axis=1), 1, atol=1e-5)
+        found.append((shares.argmax(axis=1) == told).mean())
+    assert found[1] > 0.9 > 0.75 > found[0]
 
 
 def test_training_is_the_same_to_the_bit_for_a_seed_and_differs_for_another():
