@@ -23,8 +23,8 @@ LEAK_SHARE = 0.002
 #: How unlike the model the powers of the lines may be: variances over the mean's square. The lines decide.
 SHARES = tuple(1e-8 * 4.0**step for step in range(14))
 
-#: Each of these is so likely beforehand beside the one before it; the first, which only the clearest records tell apart,
-#: are all alike.
+#: Each of these is so likely beforehand beside the one before it; the first, which the clearest records alone tell
+#: apart, are all alike.
 SHARE_FALL, SHARES_ALIKE = 0.6, 4
 
 #: Widths of the roll-off, Gamma^(1/3) orders, past the tip that lines are followed.
