@@ -21,11 +21,10 @@ PROFILES = (0.95, 0.05)
 LEAK_SHARE = 0.002
 
 #: How unlike the model the powers of the lines may be: variances over the mean's square. The lines decide.
-SHARES = tuple(1e-8 * 4.0**step for step in range(14))
+SHARES = tuple(1e-6 * 4.0**step for step in range(11))
 
-#: Each of these is so likely beforehand beside the one before it; the first, which the clearest records alone tell
-#: apart, are all alike.
-SHARE_FALL, SHARES_ALIKE = 0.6, 4
+#: Each of these is so likely beforehand beside the one before it.
+SHARE_FALL = 0.6
 
 #: Widths of the roll-off, Gamma^(1/3) orders, past the tip that lines are followed.
 REACH = 3.0
@@ -207,8 +206,7 @@ def fit_edge(
     least = 0.1 * float((noise / bins).mean()) / max(loud, 1e-9)
     every = np.array([share for share in SHARES if share >= least or share == SHARES[-1]])
     scatter = np.broadcast_to(scatter, power.shape)
-    prior = SHARE_FALL ** np.maximum(np.arange(len(SHARES)) - SHARES_ALIKE + 1.0, 0)
-    prior[:SHARES_ALIKE] /= SHARES_ALIKE
+    prior = SHARE_FALL ** np.arange(len(SHARES))
     prior = np.append(prior[: len(SHARES) - len(every) + 1].sum(), prior[len(SHARES) - len(every) + 1 :])
     few = np.arange(len(every))[::-3]
     for search in range(SEARCHES):
