@@ -23,7 +23,7 @@ from bladewing.features.wingbeat import wingbeat
 from bladewing.models.calibration import conformal_thresholds
 from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.dataset import KIND_CLASS, KINDS, _powered, _target, draw_radar
-from bladewing.simulate.laws import WIDTH, Draws
+from bladewing.simulate.laws import LAWS, WIDTH, Draws
 from bladewing.simulate.uav import ROTORS
 
 SURE_LIMITS = [(one, one) for one in (0.0, 0.6, 0.7, 0.8, 0.9, 0.95, 1.01)] + [(0.95, 0.85), (0.97, 0.85), (0.99, 0.9)]
@@ -243,8 +243,11 @@ def tracks(classifier: Classifier, count: int) -> None:
         f"heaves of flapping birds within 0.3 Hz of the wingbeat {(beats <= 0.3).sum() / np.isfinite(beats).sum():.2f}"
     )
     print(f"{'':16s} {'n':>6s} {'best':>8s} " + " ".join(f"{name:>8s}" for name in (*CLASSES, "unknown")))
-    for kind in (kind for group in KINDS.values() for kind in group):
-        rows = every["kind"] == kind
+    groups = {kind: every["kind"] == kind for group in KINDS.values() for kind in group}
+    # a mover no faster than birds is, as one line, what a bird that glides is
+    faster = np.abs(every["velocity_mps"]) > LAWS["bird_speed_mps"].high
+    groups |= {"slow movers": groups["mover"] & ~faster, "fast movers": groups["mover"] & faster}
+    for kind, rows in groups.items():
         shares = [np.mean(every["best"][rows] == truth[rows])]
         shares += [np.mean(every["final"][rows] == name) for name in (*CLASSES, "unknown")]
         print(f"{kind:16s} {rows.sum():6d} " + " ".join(f"{share:8.3f}" for share in shares))

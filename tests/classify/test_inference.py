@@ -7,6 +7,7 @@ import pytest
 from bladewing.classify import BadInput, Classifier, inference
 from bladewing.classify.inference import model_names
 from bladewing.features import model_inputs
+from bladewing.simulate import Radar, draw_records
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -111,6 +112,36 @@ def test_each_class_has_its_own_limit(make_model, probabilities, label, reason):
     answer = model.predict(noise(200), **RADAR)
     assert (answer.labels, answer.reasons) == (label, reason)
     np.testing.assert_allclose(answer.probabilities, probabilities, rtol=1e-4)
+
+
+def test_a_model_without_kinds_tells_of_no_noise(mixed):
+    answer = mixed.predict(noise(200, (2, 3)), **RADAR)
+    assert answer.noise.shape == (2, 3)
+    assert np.isnan(answer.noise).all()
+
+
+@pytest.mark.parametrize("name", [None, "fast", "best", "cascade"])
+def test_shipped_models_tell_of_noise_where_there_is_nothing_else(name):
+    model = Classifier.load(name)
+    radar = Radar(9.85e9, 25e3, 2048)
+    empty, uav = (draw_records(radar, 60, 0, purpose="bench", kind=kind).iq for kind in ("noise", "quadcopter"))
+    iq = np.concatenate([empty, uav, np.zeros((1, 2048), np.complex64)])
+    answer = model.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
+    assert np.isnan(answer.noise[-1])
+    told, rest = answer.noise[:-1], answer.probabilities[:-1]
+    assert np.all((told >= 0) & (told <= rest[:, 2] + 1e-6))
+    assert np.median(told[:60]) > 0.3 > 30 * np.median(told[60:])
+    alone = model.predict(iq[7], carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
+    assert alone.noise.shape == ()
+    np.testing.assert_array_equal(alone.noise, told[7])
+
+
+@pytest.mark.parametrize(
+    "kinds", ["[]", '{"drone": "plane"}', '{"noise": "clutter", "drone": "uav"}', '{"drone": "uav"}', "7", "{"]
+)
+def test_kinds_that_do_not_fit_are_refused(make_model, kinds):
+    with pytest.raises(BadInput, match=r"kinds.*train it again"):
+        Classifier(make_model(kinds=kinds))
 
 
 def test_outside_the_envelope_every_record_is_unknown_with_the_cure(always_uav):
