@@ -17,6 +17,7 @@ from bladewing.features.inputs import model_inputs
 from bladewing.features.schema import INPUT_SHAPES, schema_hash
 from bladewing.features.spectrum import LEAST_PART, largest_part
 from bladewing.models import DEFAULT_MODEL, KIND_SCORES
+from bladewing.models.calibration import softmax
 from bladewing.models.operating import OperatingCurve, OperatingPoint
 from bladewing.models.seal import read_metadata, verify
 from numpy.typing import ArrayLike, NDArray
@@ -225,8 +226,9 @@ class Classifier:
         if dict(self._session.get_modelmeta().custom_metadata_map) != dict(self.metadata):
             raise BadInput(f"{source}: damaged metadata: onnxruntime reads others: train it again")
         self.inputs = self._reads = _read_inputs(self._session, source)
-        self._kinds = _read_kinds(self.metadata, self._session, source)
-        self._outputs = ["probabilities", *([KIND_SCORES] if self._kinds else [])]
+        kinds = _read_kinds(self.metadata, self._session, source)
+        self._outputs = ["probabilities", *([KIND_SCORES] if kinds else [])]
+        self._noise = _place_of_noise(kinds)
         self.operating_point = None
         if max_false_alarm is not None:
             self._keep_to(max_false_alarm, source)
@@ -408,7 +410,7 @@ class Classifier:
 
         The argument is that of `from_inputs`; the kinds are those of the metadata.
         """
-        return np.concatenate([_shares(scores) for _, scores in self._run(inputs)])
+        return np.concatenate([softmax(scores).astype(np.float32) for _, scores in self._run(inputs)])
 
     def _answer(self, inputs: Mapping[str, NDArray[np.floating]]) -> NDArray[np.float32]:
         """What is told of records whose inputs are made."""
@@ -416,12 +418,9 @@ class Classifier:
         for probabilities, *others in self._run(inputs):
             told = np.full((len(probabilities), _TOLD), np.nan, np.float32)
             told[:, :-1] = probabilities
-            if NOISE in self._kinds:
-                of_class = list(self._kinds.values())
-                first, own = of_class.index(self._kinds[NOISE]), list(self._kinds).index(NOISE)
-                kin = slice(first, first + of_class.count(self._kinds[NOISE]))  # kinds of a class stand together
-                share = _shares(others[0][:, kin])[:, own - first]
-                told[:, -1] = probabilities[:, CLASSES.index(self._kinds[NOISE])] * share
+            if self._noise:
+                label, kin, own = self._noise
+                told[:, -1] = probabilities[:, label] * softmax(others[0][:, kin])[:, own]
             parts.append(told)
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
@@ -431,12 +430,6 @@ class Classifier:
         for at in range(0, max(count, 1), _STEP_INPUTS):
             part = {name: inputs[name][at : at + _STEP_INPUTS].astype(np.float32, copy=False) for name in self._reads}
             yield self._session.run(self._outputs, part)
-
-
-def _shares(scores: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Softmax of each row."""
-    powers = np.exp(scores - scores.max(axis=1, keepdims=True))
-    return powers / powers.sum(axis=1, keepdims=True)
 
 
 def _rule(max_false_alarm: object, coverage: object) -> tuple[float | None, float | None]:
@@ -546,3 +539,13 @@ def _read_kinds(metadata: Mapping[str, str], session: onnxruntime.InferenceSessi
     if kinds and widths.get(KIND_SCORES) != [len(kinds)]:
         raise BadInput(f"{source}: no output {KIND_SCORES!r} of its {len(kinds)} kinds: train it again")
     return kinds
+
+
+def _place_of_noise(kinds: Mapping[str, str]) -> tuple[int, slice, int] | None:
+    """The class that noise is of, the columns of that class's kinds, which stand together, and its place among them."""
+    if NOISE not in kinds:
+        return None
+    names, classes = list(kinds), list(kinds.values())
+    first = classes.index(kinds[NOISE])
+    kin = slice(first, first + classes.count(kinds[NOISE]))
+    return CLASSES.index(kinds[NOISE]), kin, names.index(NOISE) - first

@@ -11,7 +11,6 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -102,7 +101,7 @@ def export_network(net: "EvidenceNet", input_shapes: Mapping[str, tuple[int, ...
     assert program is not None
     model = program.model_proto  # made anew at each asking
     _store_in_half(model.graph)
-    return _finish(model, net.input_shapes, calibration, {KIND_SCORES: len(net.kinds)} if told else {})
+    return _finish(model, net.input_shapes, calibration, len(net.kinds) if told else 0)
 
 
 def export_tabular(
@@ -267,12 +266,9 @@ def check_export(
 
 
 def _finish(
-    model: onnx.ModelProto,
-    input_shapes: Mapping[str, tuple[int, ...]],
-    calibration: Calibration,
-    others: Mapping[str, int] = MappingProxyType({}),
+    model: onnx.ModelProto, input_shapes: Mapping[str, tuple[int, ...]], calibration: Calibration, kinds: int = 0
 ) -> bytes:
-    """Append the calibration, remove what inference does not need, check, serialise."""
+    """Append the calibration, remove what inference does not need, check, serialise; so many kinds are told too."""
     graph = model.graph
     _require_free_batch(graph, input_shapes)
     graph.name = "bladewing"
@@ -296,7 +292,8 @@ def _finish(
     )
     graph.output.extend(
         helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", width])
-        for name, width in {"scores": CLASS_COUNT, "probabilities": CLASS_COUNT, **others}.items()
+        for name, width in (("scores", CLASS_COUNT), ("probabilities", CLASS_COUNT), (KIND_SCORES, kinds))
+        if width
     )
     # Converters leave call stacks with the paths of the machine they ran on.
     for part in [model, graph, *graph.node, *graph.initializer]:

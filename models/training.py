@@ -166,8 +166,11 @@ def train_network(
     # the stubs do not know this argument; channels last, a step takes a fifth less time on a CPU
     net.to(place, memory_format=torch.channels_last)  # type: ignore[call-overload]
     tensors = {name: _tensor(inputs[name]).to(place) for name in net.input_shapes}
-    said = None if teacher is None else torch.as_tensor(teacher, dtype=torch.float32)
-    truth = _target(y, said if said is None else said @ nn.functional.one_hot(torch.tensor(net.kinds)).float(), place)
+    said, classes_said = None, None
+    if teacher is not None:
+        said = torch.as_tensor(teacher, dtype=torch.float32)
+        classes_said = said @ nn.functional.one_hot(torch.tensor(net.kinds)).float()
+    truth = _target(y, classes_said, place)
     kind_truth = None if kinds is None else _target(kinds, said, place)
     matrices = [weights for weights in net.parameters() if weights.ndim > 1]
     others = [weights for weights in net.parameters() if weights.ndim <= 1]

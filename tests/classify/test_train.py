@@ -196,27 +196,38 @@ def test_a_killed_and_interrupted_training_goes_on_to_the_same_files(whole, tmp_
     assert [[epoch[name] for name in figures] for epoch in first] == [[e[name] for name in figures] for e in second]
 
 
-def test_a_pupil_learns_from_its_teacher_after_it_and_an_interruption_changes_nothing(whole, tmp_path):
-    names = ("spectrum-cnn", "spectrum-cnn-wide")
-    for out in (tmp_path / "straight", tmp_path / "interrupted"):
-        out.mkdir()
-    straight = _run(tmp_path / "straight", models=names)["models"]
-    assert list(straight) == list(names)
-    assert [straight[name]["teacher"] for name in names] == ["spectrum-cnn-wide", ""]
-    taught = (tmp_path / "straight" / "spectrum-cnn.onnx").read_bytes()
-    assert taught != (whole / "spectrum-cnn.onnx").read_bytes()
+def _stopped_once(out, part, *, after, models):
+    """Train until a network's epoch at which a part lies there, stop, and go on to the end."""
 
-    def once_the_teacher_is_done():
-        if list((tmp_path / "interrupted").glob("train-parts/*/spectrum-cnn-0-epochs.npz")):
+    def once_it_lies_there():
+        if list(out.glob(f"train-parts/*/{part}.npz")):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        _run(tmp_path / "interrupted", after=2, then=once_the_teacher_is_done, models=names)
-    assert list((tmp_path / "interrupted").glob("train-parts/*/spectrum-cnn-wide.npz"))
-    _run(tmp_path / "interrupted", models=names)
+        _run(out, after=after, then=once_it_lies_there, models=models)
+    left = {path.stem for path in out.glob("train-parts/*/*.npz")}
+    _run(out, models=models)
+    return left
+
+
+def _same_models(names, *folders):
     for name in names:
-        files = [tmp_path / kind / f"{name}.onnx" for kind in ("straight", "interrupted")]
+        files = [folder / f"{name}.onnx" for folder in folders]
         assert files[0].read_bytes() == files[1].read_bytes(), name
+
+
+def test_a_pupil_learns_from_its_teacher_after_it_and_an_interruption_changes_nothing(whole, tmp_path):
+    names = ("spectrum-cnn", "spectrum-cnn-wide")
+    outs = tmp_path / "straight", tmp_path / "interrupted"
+    for out in outs:
+        out.mkdir()
+    straight = _run(outs[0], models=names)["models"]
+    assert list(straight) == list(names)
+    assert [straight[name]["teacher"] for name in names] == ["spectrum-cnn-wide", ""]
+    taught = (outs[0] / "spectrum-cnn.onnx").read_bytes()
+    assert taught != (whole / "spectrum-cnn.onnx").read_bytes()
+    assert "spectrum-cnn-wide" in _stopped_once(outs[1], "spectrum-cnn-0-epochs", after=2, models=names)
+    _same_models(names, *outs)
 
 
 def test_a_network_of_two_generations_goes_on_between_them_to_the_same_bytes(tmp_path, monkeypatch):
@@ -229,25 +240,18 @@ def test_a_network_of_two_generations_goes_on_between_them_to_the_same_bytes(tmp
         return real(*given, teacher=teacher, **options)
 
     monkeypatch.setattr(training, "train_network", train_network)
-    for out in (tmp_path / "straight", tmp_path / "interrupted"):
+    outs = tmp_path / "straight", tmp_path / "interrupted"
+    for out in outs:
         out.mkdir()
-    account = _run(tmp_path / "straight", models=names)["models"][names[0]]
+    account = _run(outs[0], models=names)["models"][names[0]]
     assert account["generations"] == len(taught) == 2
     assert taught[0] is None
     assert taught[1].shape == (192, len(CLASS_OF_KIND))
     np.testing.assert_allclose(taught[1].sum(axis=1), 1, atol=1e-6)
-
-    def once_the_first_is_done():
-        if list((tmp_path / "interrupted").glob("train-parts/*/spectrum-cnn-wide-1-epochs.npz")):
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        _run(tmp_path / "interrupted", after=1, then=once_the_first_is_done, models=names)
-    assert list((tmp_path / "interrupted").glob("train-parts/*/spectrum-cnn-wide-0-answers.npz"))
-    _run(tmp_path / "interrupted", models=names)
+    left = _stopped_once(outs[1], "spectrum-cnn-wide-1-epochs", after=1, models=names)
+    assert "spectrum-cnn-wide-0-answers" in left
     assert len(taught) == 5  # twice whole, the second generation from its first epoch on
-    files = [tmp_path / kind / f"{names[0]}.onnx" for kind in ("straight", "interrupted")]
-    assert files[0].read_bytes() == files[1].read_bytes()
+    _same_models(names, *outs)
 
 
 def test_what_a_model_tells_of_kinds_adds_up_to_its_classes_and_noise_is_one_of_them(whole):

@@ -31,6 +31,17 @@ def spectrum(iq, radar=RADAR):
     return power, -np.fft.fftfreq(iq.shape[-1], 1 / radar.prf_hz) * radar.wavelength_m / 2
 
 
+def mean_and_width(power, velocity):
+    mean = (power * velocity).sum(axis=1) / power.sum(axis=1)
+    return mean, np.sqrt((power * (velocity - mean[:, None]) ** 2).sum(axis=1) / power.sum(axis=1))
+
+
+def fix(monkeypatch, **values):
+    """Let laws draw one value each."""
+    for name, value in values.items():
+        monkeypatch.setitem(LAWS, name, replace(LAWS[name], low=value, high=value))
+
+
 @pytest.mark.parametrize("kind", list(ROTORS))
 def test_the_body_line_is_at_the_body_velocity(kind):
     target = draw_uav(draws(20, 1), RADAR, kind)
@@ -88,8 +99,7 @@ def test_far_vehicles_are_a_line_and_near_ones_fill_the_speeds_up_to_their_own()
     target = draw_discrete(draws(400, 8), RADAR, "vehicle")
     truth = target.truth
     power, velocity = spectrum(target.body)
-    mean = (power * velocity).sum(axis=1) / power.sum(axis=1)
-    width = np.sqrt((power * (velocity - mean[:, None]) ** 2).sum(axis=1) / power.sum(axis=1))
+    mean, width = mean_and_width(power, velocity)
     steady = abs(truth["acceleration_mps2"]) < 0.5
     assert 0.25 < steady.mean() < 0.7  # a bend is no sign of a vehicle
     strongest = velocity[power.argmax(axis=1)]
@@ -110,13 +120,11 @@ def test_half_of_the_roads_pass_within_twelve_metres():
 
 def _beside_the_road(monkeypatch, points, beam_rad):
     """Power over speed of cars that pass 6 m off at 20 m/s, seen 0.2 rad off the square of the road at 24 GHz."""
-    fixed = {"body_points": points, "beam_rad": beam_rad, "vehicle_mps": 20.0, "sight_rad": 0.2}
-    fixed |= {"road_m": 6.0, "verge_m": 6.0, "vehicle_length_m": 4.5, "road_acceleration_mps2": 0.0}
-    for name, value in fixed.items():
-        monkeypatch.setitem(LAWS, name, replace(LAWS[name], low=value, high=value))
-    body, _ = _vehicle_body(draws(200, 5), Radar(24e9, 16e3, 800), MAX_BODY_POINTS)
-    power, velocity = spectrum(body, Radar(24e9, 16e3, 800))
-    return power / power.sum(axis=1, keepdims=True), velocity
+    fix(monkeypatch, body_points=points, beam_rad=beam_rad, vehicle_mps=20.0, vehicle_length_m=4.5)
+    fix(monkeypatch, road_m=6.0, verge_m=6.0, sight_rad=0.2, road_acceleration_mps2=0.0)
+    radar = Radar(24e9, 16e3, 800)
+    body, _ = _vehicle_body(draws(200, 5), radar, MAX_BODY_POINTS)
+    return spectrum(body, radar)
 
 
 def test_many_scatterers_fill_the_speeds_between_which_few_leave_gaps(monkeypatch):
@@ -131,10 +139,7 @@ def test_many_scatterers_fill_the_speeds_between_which_few_leave_gaps(monkeypatc
 
 def test_a_narrow_beam_sees_a_part_of_a_car_at_once(monkeypatch):
     wide, narrow = (_beside_the_road(monkeypatch, 48.0, beam) for beam in (4.0, 0.2))
-    widths = []
-    for power, velocity in (wide, narrow):
-        mean = (power * velocity).sum(axis=1)
-        widths.append(np.median(np.sqrt((power * (velocity - mean[:, None]) ** 2).sum(axis=1))))
+    widths = [np.median(mean_and_width(*seen)[1]) for seen in (wide, narrow)]
     assert widths[1] < 0.7 * widths[0]
 
 
@@ -142,8 +147,7 @@ def test_an_engine_shakes_the_whole_vehicle_by_its_displacement(monkeypatch):
     radar, shaken_m, engine_hz = Radar(24e9, 4e3, 4000), 2e-4, 40.0
 
     def bodies(**fixed):
-        for name, value in {"company_db": -300.0, "engine_hz": engine_hz, **fixed}.items():
-            monkeypatch.setitem(LAWS, name, replace(LAWS[name], low=value, high=value))
+        fix(monkeypatch, company_db=-300.0, engine_hz=engine_hz, **fixed)
         return draw_discrete(draws(20, 12), radar, "vehicle").body
 
     turned = np.angle(bodies(engine_m=shaken_m) / bodies(engine_m=1e-15))  # a law of logarithms has no 0
