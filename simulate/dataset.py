@@ -30,13 +30,13 @@ KINDS: dict[str, dict[str, float]] = {
     "bird": {"flapping_bird": 0.68, "gliding_bird": 0.15, "flock": 0.17},
     "clutter": {
         "noise": 0.18,  # most of what a radar looks at; at 0.11 a glimmer in noise was a UAV too often
-        "ground": 0.07,
-        "rain": 0.10,
+        "ground": 0.06,
+        "rain": 0.09,
         "sea": 0.07,
-        "person": 0.10,
-        "vehicle": 0.25,
-        "wind_turbine": 0.12,
-        "mover": 0.11,
+        "person": 0.09,
+        "vehicle": 0.30,
+        "wind_turbine": 0.11,
+        "mover": 0.10,
     },
 }
 

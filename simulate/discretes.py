@@ -26,7 +26,7 @@ LIMBS = (
 
 
 #: Most scatterers of a vehicle's body, of another's beside it, and of a vehicle's wheels together.
-MAX_BODY_POINTS, MAX_COMPANY_POINTS, MAX_WHEEL_POINTS = 48, 12, 40
+MAX_BODY_POINTS, MAX_COMPANY_POINTS, MAX_WHEEL_POINTS = 48, 12, 240
 
 #: Width of a vehicle's body [m].
 VEHICLE_WIDTH_M = 1.8
@@ -106,7 +106,7 @@ def _vehicle_body(
     speed = draws.value("vehicle_mps")
     pull = draws.acceleration_mps2("road_acceleration_mps2", radar.dwell_s)
     # by the logarithm alone, slow cars within a few metres, which roadside radars see all day, were one record in 1000
-    aside, sight = draws.either("road_m", "verge_m", 0.35), draws.value("sight_rad")
+    aside, sight = draws.either("road_m", "verge_m", 0.5), draws.value("sight_rad")
     ahead = aside * np.tan(sight)  # at the middle of the dwell
     gone = straight_path(radar.times_s - radar.times_s[radar.pulses // 2], speed, pull)
     length, beam = draws.value("vehicle_length_m"), draws.value("beam_rad")
@@ -142,14 +142,16 @@ def _wheels(
 
     A point on the rim rolls as far as the vehicle has `gone_m`: its radial speed runs from 0 at the ground to twice the
     vehicle's at the top; `cosine` is that of the angle between the road and the line of sight, a pulse. Half of the
-    wheels have even spokes that echo alike, whose lines are those of a rotor; the others' points lie and echo as they
-    will.
+    wheels have even spokes, whose lines are those of a rotor; the others' points lie and echo as they will, and the
+    many of a tyre close by fill all speeds up to twice the vehicle's as noise does.
     """
     radius = draws.value("wheel_radius_m")
     rolled = gone_m / radius[:, None]
-    wheels, spokes = (np.floor(draws.value(law)).astype(int) for law in ("wheels", "spokes"))
-    points, own_phase = wheels * spokes, draws.value("phase_rad", 4)
-    even, rim_only = draws.chance(0.5), draws.chance(0.5)
+    wheels, spokes, blocks = (np.floor(draws.value(law)).astype(int) for law in ("wheels", "spokes", "tyre_points"))
+    own_phase = draws.value("phase_rad", 4)
+    even, equal, rim_only = draws.chance(0.5), draws.chance(0.5), draws.chance(0.5)
+    spokes = np.where(even, spokes, blocks)
+    points = wheels * spokes
     depth, angle, echo = (draws.uniform(MAX_WHEEL_POINTS) for _ in range(3))
     level = np.exp(0.4 * draws.normal(MAX_WHEEL_POINTS))
     out = np.zeros((len(draws), radar.pulses), np.complex64)
@@ -161,7 +163,7 @@ def _wheels(
         at += own_phase[rows, wheel]
         own = np.where(alike, wheel, point)  # even spokes share what is drawn for their wheel
         deep = np.where(rim_only[rows], 0.03, 0.5) * depth[rows, own]
-        gain = np.where(alike, 1.0, level[rows, point]) * np.exp(1j * TWO_PI * echo[rows, own])
+        gain = np.where(alike & equal[rows], 1.0, level[rows, point]) * np.exp(1j * TWO_PI * echo[rows, own])
         ahead = (radius[rows] * (1 - deep))[:, None] * cosine[rows] * np.sin(rolled[rows] + at[:, None])
         out[rows] += gain.astype(np.complex64)[:, None] * range_phasor(ahead, radar.wavelength_m)
     return out, radius

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 620 of them.
-WIDTH = 621
+#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 1622 of them.
+WIDTH = 1623
 
 #: What a steady body's acceleration is of a manoeuvring one's. Half of all bodies are steady, whatever they are: if one
 #: class alone accelerated, a line that bends would be all there is to learn of it.
@@ -117,9 +117,10 @@ LAWS: dict[str, Law] = {
     "company_db": Law("uniform", -25.0, -3.0, "dB", "another vehicle in the beam, under the first"),
     "mover_mps": Law("uniform", -60.0, 60.0, "m/s", "boats, balloons, far vehicles, aircraft on a slant path"),
     "wheel_radius_m": Law("log", 0.2, 0.55, "m", "motorcycle to lorry"),
-    "wheel_db": Law("uniform", -35.0, -5.0, "dB", "wheels under the body"),
+    "wheel_db": Law("uniform", -35.0, 0.0, "dB", "wheels under the body; measured beside a road: 10 dB"),
     "wheels": Law("uniform", 1.0, 5.0, "1", "wheels that the radar sees"),
-    "spokes": Law("uniform", 1.0, 11.0, "1", "echoes on each: a valve to ten spokes"),
+    "spokes": Law("uniform", 1.0, 11.0, "1", "even echoes on each: a valve to ten spokes"),
+    "tyre_points": Law("log", 1.0, 61.0, "1", "uneven ones: a valve to all blocks of a tyre, which are made not to sing"),
     "turbine_length_m": Law("log", 15.0, 60.0, "m", "small to large wind turbines"),
     "turbine_tip_mps": Law("uniform", 15.0, 90.0, "m/s", "tips 60-90 m/s at rated wind, less below"),
     "cell_m": Law("log", 3.0, 200.0, "m", "part of a blade inside the range cell, often the whole"),

@@ -28,6 +28,7 @@ MOST_POINTS = 1000
 BOUNDS = {
     "wheels": (1, 4),
     "spokes": (1, 10),
+    "tyre_points": (1, 60),
     "turbine_points": (3, 30),
     "turbine_row_points": (2, 1e6),
     "insect_count": (1, 20),

@@ -352,6 +352,7 @@ def clutter_of(kind: str, seed: int = 0, **values: float):
     [
         ("vehicle", "wheels"),
         ("vehicle", "spokes"),
+        ("vehicle", "tyre_points"),
         ("wind_turbine", "turbine_points"),
         ("wind_turbine", "turbine_row_points"),
         ("insects", "insect_count"),
@@ -395,8 +396,9 @@ def test_bursts_come_at_the_mains_that_is_asked_for():
         np.testing.assert_allclose(asked.burst_hz, wanted)
 
 
-def test_wheels_and_spokes_may_both_be_the_most():
-    assert np.isfinite(clutter_of("vehicle", wheels=4, spokes=10).iq).all()
+@pytest.mark.parametrize("seed", range(6))
+def test_wheels_and_their_echoes_may_both_be_the_most(seed):
+    assert np.isfinite(clutter_of("vehicle", seed, wheels=4, spokes=10, tyre_points=60).iq).all()
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -111,10 +111,10 @@ def test_far_vehicles_are_a_line_and_near_ones_fill_the_speeds_up_to_their_own()
     assert max(abs(mean)) < 44
 
 
-def test_half_of_the_roads_pass_within_twelve_metres():
+def test_two_thirds_of_the_roads_pass_within_twelve_metres():
     count = 3000
     _, (_, _, _, aside, _, _) = _vehicle_body(draws(count, 3), Radar(9.85e9, 40e3, 64), 2)
-    near = 0.35 + 0.65 * np.log(12 / 1.5) / np.log(3000 / 1.5)  # on the verge, and of those anywhere
+    near = 0.5 + 0.5 * np.log(12 / 1.5) / np.log(3000 / 1.5)  # on the verge, and of those anywhere
     assert np.mean(aside < 12) == pytest.approx(near, abs=4 * np.sqrt(near * (1 - near) / count))
 
 
@@ -193,7 +193,7 @@ def test_steady_and_manoeuvring_bodies_are_as_frequent_in_every_class():
 
 def test_even_spokes_show_only_lines_of_their_own_rate():
     radar = Radar(3e9, 4e3, 4000)
-    target = draw_discrete(draws(4000, 7), radar, "vehicle")
+    target = draw_discrete(draws(2000, 7), radar, "vehicle")
     turn, speed = target.truth["rotation_hz"], abs(target.truth["velocity_mps"])
     unfolded = 2 * speed < 0.9 * radar.unambiguous_mps
     steady = abs(target.truth["acceleration_mps2"]) < 0.2
@@ -205,9 +205,24 @@ def test_even_spokes_show_only_lines_of_their_own_rate():
         turns = (frequency_hz + 2 * target.truth["velocity_mps"][row] / radar.wavelength_m) / turn[row]
         combs = [abs(turns - n * np.rint(turns / n)) * turn[row] < 7 for n in range(2, 11)]
         shares.append(max(power[row, comb].sum() for comb in combs) / power[row].sum())
-    assert len(chosen) > 30, "too few to tell"
-    # half of those that have two spokes or more
-    assert 0.15 < np.mean(np.array(shares) > 0.98) < 0.75
+    assert len(chosen) > 20, "too few to tell"
+    # half of those that have two spokes or more, of which half echo alike
+    assert 0.08 < np.mean(np.array(shares) > 0.98) < 0.4
+
+
+def test_the_many_blocks_of_a_tyre_fill_its_speeds_at_every_moment(monkeypatch):
+    """As measured beside a road; of few points each shows one speed at a time."""
+    radar = Radar(24e9, 16e3, 320)  # 20 ms: an eighth of a turn
+    gone = 12.0 * (radar.times_s - radar.dwell_s / 2)[None, :] * np.ones((200, 1))
+    filled = []
+    for points in (1.0, 60.0):
+        fix(monkeypatch, spokes=1.0, tyre_points=points, wheels=4.0, wheel_radius_m=0.3)
+        wheels, _ = _wheels(draws(200, 5), radar, gone, np.ones_like(gone))
+        power, velocity = spectrum(wheels, radar)
+        band = power[:, abs(velocity) < 10]  # about the vehicle, which moves at 12 m/s
+        filled.append(np.mean(band > 0.1 * band.mean(axis=1, keepdims=True), axis=1) > 0.75)
+    assert np.mean(filled[1]) == pytest.approx(0.5, abs=4 * np.sqrt(0.25 / 200)), "all but those of even spokes"
+    assert np.mean(filled[0]) < 0.05
 
 
 def test_turbine_blades_stay_below_their_tip_and_the_tower_rests():
