@@ -142,6 +142,7 @@ def _generation(
             batch=settings.batch,
             learning_rate=settings.learning_rate,
             weight_decay=settings.weight_decay,
+            bfloat16=settings.bfloat16,
             # no measurement is signed, so only the picture is mirrored
             augment=VelocityMirror(axes={signal: -2 if image else -1}, odd={}),
             teacher=told() if told else None,

@@ -27,6 +27,8 @@ class TrainingConfig(BaseModel):
     batch: Annotated[int, Field(ge=2, le=8192)] = 256
     learning_rate: Annotated[float, Field(gt=0, le=1)] = 0.02
     weight_decay: Annotated[float, Field(ge=0, le=10)] = 0.3
+    #: Whether networks compute in bfloat16 while they learn: faster where the processor or the GPU has it, slower else.
+    bfloat16: bool = False
     iterations: Annotated[int, Field(ge=1, le=1000)] = 80
     leaves: Annotated[int, Field(ge=2, le=256)] = 15
     precision: Annotated[float, Field(gt=1 / 3, le=1)] = 0.9

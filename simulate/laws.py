@@ -120,7 +120,7 @@ LAWS: dict[str, Law] = {
     "wheel_db": Law("uniform", -35.0, 0.0, "dB", "wheels under the body; measured beside a road: 10 dB"),
     "wheels": Law("uniform", 1.0, 5.0, "1", "wheels that the radar sees"),
     "spokes": Law("uniform", 1.0, 11.0, "1", "even echoes on each: a valve to ten spokes"),
-    "tyre_points": Law("log", 1.0, 61.0, "1", "uneven ones: a valve to all blocks of a tyre, which are made not to sing"),
+    "tyre_points": Law("log", 1.0, 61.0, "1", "uneven ones: a valve to all blocks of a tyre, made not to sing"),
     "turbine_length_m": Law("log", 15.0, 60.0, "m", "small to large wind turbines"),
     "turbine_tip_mps": Law("uniform", 15.0, 90.0, "m/s", "tips 60-90 m/s at rated wind, less below"),
     "cell_m": Law("log", 3.0, 200.0, "m", "part of a blade inside the range cell, often the whole"),

@@ -182,6 +182,22 @@ def test_training_is_the_same_to_the_bit_for_a_seed_and_differs_for_another():
     assert not torch.equal(first.head[0].weight, other.head[0].weight)
 
 
+def test_in_bfloat16_only_the_steps_are_coarser():
+    """The weights keep their precision, and so does what they are judged by."""
+    full, exact = _trained(epochs=4)
+    net, coarse = _trained(epochs=4, bfloat16=True)
+    weights = {name: values for name, values in net.state_dict().items() if values.is_floating_point()}
+    assert {values.dtype for values in weights.values()} == {torch.float32}
+    assert not torch.equal(weights["head.0.weight"], weights["head.0.weight"].bfloat16().float())
+    assert not torch.equal(weights["head.0.weight"], full.state_dict()["head.0.weight"])
+    inputs, y = _spectra(100, 2)
+    scores = torch.from_numpy(network_scores(net, inputs))
+    loss = float(torch.nn.functional.cross_entropy(scores, torch.as_tensor(y)))
+    assert coarse.epochs[coarse.best_epoch - 1]["validation_loss"] == pytest.approx(loss, rel=1e-5)
+    losses = [[epoch["train_loss"] for epoch in result.epochs] for result in (exact, coarse)]
+    np.testing.assert_allclose(losses[1], losses[0], rtol=0.05)
+
+
 def _interrupted(after, **options):
     """Train until an interruption after an epoch; what was kept last."""
     kept = []
@@ -199,9 +215,10 @@ def _without_seconds(result):
     return [{name: value for name, value in epoch.items() if name != "seconds"} for epoch in result.epochs]
 
 
-@pytest.mark.parametrize("after", [1, 2, 3, 4])
-def test_an_interrupted_training_goes_on_to_the_same_bits(after):
+@pytest.mark.parametrize(("after", "bfloat16"), [(1, False), (2, False), (3, False), (4, False), (2, True)])
+def test_an_interrupted_training_goes_on_to_the_same_bits(after, bfloat16):
     options = {"seed": 5, "epochs": 4, "augment": VelocityMirror(axes={"spectrum": 2}, odd={"features": [0]})}
+    options["bfloat16"] = bfloat16
     whole, result = _trained(**options)
     snapshot = _interrupted(after, **options)
     torch.manual_seed(99)
