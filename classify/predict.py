@@ -188,13 +188,9 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
     Raises
     ------
     BadInput
-        The whole recording has fewer pulses than the model needs, or `dwell_s` is not above 0.
+        `dwell_s` is not above 0.
     """
     dwell_s = positive(dwell_s, "dwell_s")
-    needed, given = classifier.envelope.pulses_min, len(recording.iq)
-    if given < needed:
-        said = f"{given} pulses are fewer than the {needed} that the model needs: record more"
-        raise BadInput(f"{recording.name}: {said}")
     iq = recording.dwells(dwell_s)
     count, wanted = iq.shape
     dwells = classifier.predict(iq, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)

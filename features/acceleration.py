@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .inputs import in_blocks
-from .spectrum import LEAST_PART, SPEED_OF_LIGHT_MPS, as_complex
+from .spectrum import LEAST_PART, SPEED_OF_LIGHT_MPS, as_complex, largest_part, scaled, unit_scale
 
 #: Accelerations that are tried [m/s^2]: five times gravity.
 MAX_MPS2 = 50.0
@@ -76,9 +76,8 @@ def body_acceleration(
 
     first, *further = PARTS if reach > MANY_STEPS else (1,)
     tried = np.arange(-(reach // first**2), reach // first**2 + 1) * first**2
-    scale = np.abs(flat).max(axis=-1)
-    held = np.flatnonzero(scale >= LEAST_PART) if pulses >= LEAST_PULSES else np.zeros(0, np.intp)
-    loud = in_blocks(flat[held] / scale[held, None])
+    held = np.flatnonzero(largest_part(flat) >= LEAST_PART) if pulses >= LEAST_PULSES else np.zeros(0, np.intp)
+    loud = in_blocks(scaled(flat[held], unit_scale(flat[held])))
     each = (pair for block in loud for pair in zip(block, heights_at(tried, block, first), strict=True))
     for index, (one, heights) in zip(held, each, strict=True):
         steps, apart = np.append(tried[np.argsort(-heights)[:CANDIDATES]], 0), first**2

@@ -15,6 +15,9 @@ from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum, finite_complex
 #: Dwells by which the body is followed [s].
 BODY_DWELL_S = 0.1
 
+#: Fewest pulses of such a dwell.
+LEAST_PULSES = 16
+
 #: The course is a line through so many dwells at most, spread over all: slopes between all pairs are that many squared.
 MOST_DWELLS = 400
 

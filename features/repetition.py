@@ -122,7 +122,7 @@ def level_spectrum(
     LevelSpectrum or None
         None where no cell is over the noise, or nothing fluctuates.
     """
-    from scipy.ndimage import median_filter  # here, because predicting needs no such import
+    from scipy.ndimage import median_filter  # here, because dwells are judged without
 
     mean = power.mean(axis=0, dtype=np.float64)
     weight = np.maximum(mean / floor - 1.3, 0)  # cells of noise alone say nothing

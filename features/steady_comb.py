@@ -14,7 +14,7 @@ from .comb import find_comb
 from .following import by_recording
 from .one_thread import one_thread
 from .periodogram import prepare
-from .spectrum import SPEED_OF_LIGHT_MPS
+from .spectrum import SPEED_OF_LIGHT_MPS, scaled, unit_scale
 
 #: Length of a dwell [s], short enough for a rate that changes, and its pulses at least and at most: more cost time and
 #: find little more.
@@ -73,11 +73,11 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[f
     """The fields of `SteadyComb` of one recording."""
     pulses = round(min(DWELL_S * prf_hz, PULSES[1]))
     count = min(len(iq) // max(pulses, 1), DWELLS)
-    scale = np.abs(iq).max(initial=0)
-    if pulses < PULSES[0] or count < LEAST or not 0 < scale < np.inf:
+    if pulses < PULSES[0] or count < LEAST or not iq.any():
         return np.nan, 0
+    iq = scaled(iq, unit_scale(iq))
     starts = np.rint(np.linspace(0, len(iq) - pulses, count)).astype(np.intp)
-    found = [_rotor_hz(iq[start : start + pulses] / scale, carrier_hz, prf_hz) for start in starts]
+    found = [_rotor_hz(iq[start : start + pulses], carrier_hz, prf_hz) for start in starts]
     choppings = np.array([chopping_hz for chopping_hz in found if chopping_hz is not None])
     same = np.abs(np.log(choppings[:, None] / choppings)) < SAME
     seen = same.sum(axis=1)

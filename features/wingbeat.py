@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from .following import by_recording, followed, standing
 from .repetition import HARMONICS, LevelSpectrum, Repetition, level_spectrum, repetition
-from .spectrum import LEAST_FLOOR, SPEED_OF_LIGHT_MPS, require_radar
+from .spectrum import LEAST_FLOOR, SPEED_OF_LIGHT_MPS, require_radar, scaled, unit_scale
 from .stft import stft
 
 #: Wingbeats that are sought [Hz]: the slowest is a swan's in a slow beat, the fastest a small songbird's.
@@ -142,14 +142,15 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     nothing = (np.nan,) * 6
     if len(iq) < LEAST_S * prf_hz:
         return (*nothing, f"no wingbeat: {len(iq) / prf_hz:.2g} s, less than {LEAST_S:g} s")
-    scale = np.abs(iq).max()
-    if scale == 0 or round(FRAME_S[0] * prf_hz) < 8:
-        return (*nothing, "no wingbeat: no signal" if scale == 0 else f"no wingbeat: PRF {prf_hz:g} Hz is too low")
+    if not iq.any():
+        return (*nothing, "no wingbeat: no signal")
+    if round(FRAME_S[0] * prf_hz) < 8:
+        return (*nothing, f"no wingbeat: PRF {prf_hz:g} Hz is too low")
     wavelength_m = SPEED_OF_LIGHT_MPS / carrier_hz
     if prf_hz * wavelength_m / 4 < 1.1 * WING_MPS:
         # a rotor folded into the wings' speeds cannot be told from them
         return (*nothing, f"no wingbeat: unambiguous only to {prf_hz * wavelength_m / 4:.1f} m/s")
-    shown, body = followed(iq / scale, carrier_hz, prf_hz)
+    shown, body = followed(scaled(iq, unit_scale(iq)), carrier_hz, prf_hz)
     velocity = body[0]
     if np.isnan(velocity):
         return (*nothing, "no wingbeat: no body line")

@@ -127,7 +127,7 @@ def draw_records(
         Records to draw, >= 0.
     seed : int
         Root seed, >= 0.
-    purpose : {"train", "validate", "calibrate", "test", "bench"}
+    purpose : {"train", "validate", "calibrate", "test", "bench", "report"}
         What the records are for; each purpose has random streams of its own.
     start : int
         Index of the first record: records 10..19 are the same bits whether drawn alone or as part of 0..99.

@@ -27,6 +27,9 @@ from .setting import Setting
 #: Without receiver noise, what is compared with: the digits of complex64, this far under the strongest target.
 DIGITS_DB = -140.0
 
+#: A tolerance from which on anything may be left out; its power is a number still [dB].
+_ANY_DB = 2000.0
+
 #: What each effect is, and what stands in its place.
 WORDS = {
     "blade_curvature": ("range curvature along the blades", "far field, eq. 4: blades in closed form"),
@@ -160,7 +163,7 @@ def make_plan(scene: Setting, seed: int = 0, *, tolerance_db: float = -10.0) -> 
     scale = 1 / np.sqrt(noise)
     errors = {key: scale * error for key, error in errors.items()}
     # half of the amplitude tolerated is for the effects, the rest for the spacing of scatterers where they are needed
-    allowed, used, dropped = np.sqrt(10 ** (tolerance_db / 10)), 0.0, set()
+    allowed, used, dropped = 10 ** (min(tolerance_db, _ANY_DB) / 20), 0.0, set()
     for key, error in sorted(errors.items(), key=lambda item: item[1]):
         if error == 0 or used + error <= allowed / 2:
             used += error

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from numbers import Integral
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,7 @@ class Radar:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
-        if int(self.pulses) != self.pulses or self.pulses < 1:
+        if not isinstance(self.pulses, Integral) or self.pulses < 1:
             raise ValueError(f"pulses is {self.pulses!r}: it must be a whole number of at least 1")
 
     @property

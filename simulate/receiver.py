@@ -232,6 +232,8 @@ class Receiver:
         """Clip and quantise as a converter does whose full scale was set for the record."""
         for row in rows:
             largest = max(np.abs(iq[row].real).max(), np.abs(iq[row].imag).max())
+            if largest == 0:
+                continue
             scale = np.float32(largest * 10 ** (self.full_scale_db[row] / 20))
             step = scale / np.float32(2 ** (self.bits[row] - 1))
             for part in (iq[row].real, iq[row].imag):

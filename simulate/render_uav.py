@@ -151,10 +151,16 @@ def uav_truth(part: UavPart) -> dict[str, Any]:
         "rotation_hz": [rotor.rotation_hz for rotor in part.rotors],
         "blades": [rotor.blades for rotor in part.rotors],
         "blade_length_m": [rotor.blade_length_m for rotor in part.rotors],
-        "chopping_hz": [abs(rotor.rotation_hz) * _repeats(rotor) for rotor in part.rotors],
+        "chopping_hz": [abs(rotor.rotation_hz) * _flashes(rotor) for rotor in part.rotors],
+        "line_spacing_hz": [abs(rotor.rotation_hz) * _repeats(rotor) for rotor in part.rotors],
         "flash_db": [rotor.flash_db for rotor in part.rotors],
         "body_db": [point.level_db for point in part.body],
     }
+
+
+def _flashes(rotor: RotorPart) -> int:
+    """Flashes a turn on each side (the paper's eq. 25): one a blade, or one where a single blade reflects at all."""
+    return rotor.blades if sum(amplitude > 0 for amplitude in rotor.amplitudes) > 1 else 1
 
 
 def _repeats(rotor: RotorPart) -> int:

@@ -44,6 +44,10 @@ class RotorMotion:
     wander_rate_hz: ArrayLike = 1.0
     wander_phase_rad: ArrayLike = 0.0
 
+    def __post_init__(self) -> None:
+        if not np.all(np.asarray(self.wander_rate_hz) > 0):
+            raise ValueError(f"wander_rate_hz is {self.wander_rate_hz!r}: it must be above 0 [Hz]")
+
     def angle_rad(self, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Angle of the first blade at each instant.
 

@@ -52,7 +52,7 @@ class Scene(Setting):
         try:
             return cls.model_validate(values)
         except ValidationError as error:
-            raise SceneError([f"{where}: {_line(dict(problem), values)}" for problem in error.errors()]) from None
+            raise SceneError([f"{where}: {_line(dict(problem))}" for problem in error.errors()]) from None
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> "Scene":
@@ -107,7 +107,7 @@ def shipped() -> list[str]:
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
-def _line(problem: dict[str, Any], values: Any) -> str:
+def _line(problem: dict[str, Any]) -> str:
     """One problem in one line: field, value, rule."""
     field = ""
     model: type[BaseModel] = Scene

@@ -45,7 +45,7 @@ def detection_bound(snr_db: ArrayLike, *, pulses: int, lines: int, false_alarm_r
 
 
 def detection_bounds(pulses: int) -> list[dict[str, Any]]:
-    """Curves for the page: ``lines``, ``snr_db`` and ``found``, up to where everything is found."""
+    """Curves for the page: ``lines``, ``snr_db`` and ``found``, from SNRs at which nothing is found."""
     curves = []
     for lines in LINES:
         found = detection_bound(_SNR_DB, pulses=pulses, lines=lines, false_alarm_rate=FALSE_ALARM_RATE)

@@ -30,7 +30,7 @@ def ask(
     records : int
         How many, >= 1.
     seed : int
-        Root seed; the records are those of the purpose "test", which no training draws from.
+        Root seed; the records are those of the purpose "report", which no training draws from.
     on_records : callable, optional
         Called with the number of records done so far.
 

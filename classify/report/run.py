@@ -279,7 +279,7 @@ def run_report(
     Parameters
     ----------
     out : Path
-        Folder for the two files; made if it is missing.
+        Folder for the three files; made if it is missing.
     models : Path or None
         Folder of .onnx files; None: the shipped ones.
     quick : bool

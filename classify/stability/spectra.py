@@ -40,7 +40,7 @@ def cells(quick: bool) -> Iterator[Cell]:
     """Every cell of these stages; `quick` leaves out the dear ones."""
     yield from _spectra(quick)
     yield from _shapes(quick)
-    yield from _combs(quick)
+    yield from _combs()
     yield from _features(quick)
 
 
@@ -252,7 +252,7 @@ def _comb_error(iq: NDArray[np.complex64], chopping_hz: float, carrier_hz: float
     return np.nan, str(found.reason)
 
 
-def _combs(quick: bool) -> Iterator[Cell]:
+def _combs() -> Iterator[Cell]:
     stage, measured = "comb estimator", "error of the chopping frequency, relative [1]"
     rates = [0.0, 0.1, 600.0, 6000.0, 30_000.0, 1e5, 1e6]
     yield from sweep(

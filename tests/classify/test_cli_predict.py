@@ -117,13 +117,23 @@ def test_a_dwell_too_short_is_unknown(run_json, sigmf_pair):
     assert first["reason"].startswith("20 pulses are fewer than 64: take 100 pulses, 0.005 s, or more")
 
 
-def test_a_recording_with_fewer_pulses_than_the_model_needs_is_bad_input(run, tmp_path):
-    options = ("--carrier-hz", 10e9, "--prf-hz", 10e3)
-    np.save(tmp_path / "short.npy", noise(63))
-    refused(run(tmp_path / "short.npy", *options), "short.npy: 63 pulses are fewer than the 64 that the model needs")
-    np.save(tmp_path / "long.npy", noise(64))
-    code, _, _ = run(tmp_path / "long.npy", *options)
-    assert code == 0
+@pytest.mark.parametrize("pulses", [1, 2, 63])
+def test_a_recording_with_fewer_pulses_than_the_model_needs_is_unknown(run_json, tmp_path, pulses):
+    np.save(tmp_path / "short.npy", noise(pulses))
+    dwell, closing = run_json(tmp_path / "short.npy", "--carrier-hz", 10e9, "--prf-hz", 10e3)
+    assert dwell["label"] == closing["track"]["label"] == "unknown"
+    assert dwell["reason"].startswith(f"{pulses} pulses are fewer than 64: take 64 pulses, 0.0064 s, or more")
+
+
+@pytest.mark.parametrize("largest", [1e-39, 3.3e38])
+def test_a_recording_at_the_ends_of_float32_is_answered_as_any_other(run_json, tmp_path, largest):
+    iq = noise(50_000)
+    answers = {}
+    for name, gain in (("usual", 1.0), ("extreme", largest / max(abs(iq.real).max(), abs(iq.imag).max()))):
+        np.save(tmp_path / f"{name}.npy", (iq * gain).astype(np.complex64))
+        *_, closing = run_json(tmp_path / f"{name}.npy", "--carrier-hz", 10e9, "--prf-hz", 25e3)
+        answers[name] = closing["track"]["label"]
+    assert answers["extreme"] == answers["usual"]
 
 
 def test_a_silent_dwell_is_unknown_and_left_out_of_the_track(run_json, sigmf_pair):

@@ -66,6 +66,9 @@ def test_acceleration_batch_gain_and_scale():
     together = body_acceleration(iq, **RADAR)[0]
     for index in range(2):
         assert body_acceleration(1e3j * iq[index], **RADAR)[0] == pytest.approx(together[index], rel=1e-3)
+        for largest in (1e-40, 3.3e38):
+            extreme = (iq[index] * (largest / abs(iq[index]).max())).astype(np.complex64)
+            assert body_acceleration(extreme, **RADAR)[0] == pytest.approx(together[index], rel=2e-2)
     scaled = body_acceleration(iq, carrier_hz=2 * CARRIER_HZ, prf_hz=2 * PRF_HZ)[0]
     np.testing.assert_allclose(scaled, 2 * together, rtol=1e-3)
 

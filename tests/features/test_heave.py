@@ -68,9 +68,17 @@ def test_a_batch_is_what_its_records_are_and_the_gain_does_not_matter():
     together = heave(batch[:, None], **RADAR)
     assert together.walks.tolist() == [[False], [True], [False]]
     for row, iq in enumerate(batch):
-        one = heave(iq * 2.0**-40, **RADAR)
-        np.testing.assert_array_equal(one.heave_hz, together.heave_hz[row, 0])
-        np.testing.assert_array_equal(one.amplitude_m, together.amplitude_m[row, 0])
+        for gain in (2.0**-40, 2.0**124 / abs(iq).max()):  # at the second, the size of a sample is no float32
+            one = heave(iq * gain, **RADAR)
+            np.testing.assert_allclose(one.heave_hz, together.heave_hz[row, 0], rtol=1e-4)
+            np.testing.assert_allclose(one.amplitude_m, together.amplitude_m[row, 0], rtol=1e-3)
+        weak = heave((iq * 1e-40 / abs(iq).max()).astype(np.complex64), **RADAR)  # 17 bits are left
+        np.testing.assert_allclose(weak.heave_hz, together.heave_hz[row, 0], rtol=1e-2)
+
+
+def test_a_radar_too_slow_to_follow_a_body_sees_no_heave():
+    for prf_hz in (1.0, 4.0, 12.0, 100.0):
+        assert np.isnan(heave(np.ones(600, np.complex64), carrier_hz=10e9, prf_hz=prf_hz).heave_hz)
 
 
 @pytest.mark.parametrize("value", [6.2281365 + 14.947527j, 1.0])

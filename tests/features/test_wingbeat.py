@@ -97,3 +97,6 @@ def test_wingbeat_batch_gain_and_scale():
     together = wingbeat(np.stack([iq, 50j * iq])[:, None], **LONG)
     np.testing.assert_allclose(together.wingbeat_hz[:, 0], alone.wingbeat_hz, rtol=1e-4)
     np.testing.assert_allclose(together.acceleration_mps2[:, 0], alone.acceleration_mps2, rtol=1e-3)
+    for largest in (1e-40, 3.3e38):
+        extreme = wingbeat((iq * (largest / abs(iq).max())).astype(np.complex64), **LONG)
+        assert extreme.wingbeat_hz == pytest.approx(float(alone.wingbeat_hz), rel=1e-2)

@@ -235,6 +235,12 @@ def test_a_plan_says_whether_the_samples_fold():
     assert "the samples fold it" in said(4e3)
 
 
+@pytest.mark.parametrize("tolerance_db", [1999.0, 4000.0, 1e300, float("inf")])
+def test_any_tolerance_above_all_powers_leaves_out_the_same(tolerance_db):
+    scene = Scene.load("type1")
+    assert scene.plan(tolerance_db=tolerance_db).decisions == scene.plan(tolerance_db=500.0).decisions
+
+
 def test_a_tolerance_that_is_no_number_is_refused():
     with pytest.raises(ValueError, match="tolerance_db is nan"):
         Scene.load("type1").plan(tolerance_db=float("nan"))

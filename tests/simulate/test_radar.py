@@ -14,7 +14,15 @@ def test_paper_radar_has_the_dwell_and_the_span_of_table_i():
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("carrier_hz", 0.0), ("carrier_hz", np.nan), ("prf_hz", -1.0), ("prf_hz", np.inf), ("pulses", 0), ("pulses", 1.5)],
+    [
+        ("carrier_hz", 0.0),
+        ("carrier_hz", np.nan),
+        ("prf_hz", -1.0),
+        ("prf_hz", np.inf),
+        ("pulses", 0),
+        ("pulses", 1.5),
+        ("pulses", 64.0),
+    ],
 )
 def test_impossible_radars_are_refused_by_name(field, value):
     good = {"carrier_hz": 1e10, "prf_hz": 1e4, "pulses": 100}

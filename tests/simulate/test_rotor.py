@@ -51,6 +51,12 @@ def test_closed_form_equals_point_scatterers(blades, length_m, root_share, beta_
     np.testing.assert_allclose(closed, brute, atol=blades * max(5e-5, rounding))
 
 
+def test_a_wander_without_a_rate_is_refused():
+    for rate_hz in (0.0, -1.0, np.nan, [1.0, 0.0]):
+        with pytest.raises(ValueError, match="wander_rate_hz is"):
+            RotorMotion(50.0, wander_hz=0.5, wander_rate_hz=rate_hz)
+
+
 @pytest.mark.parametrize("blades", [1, 2, 3, 4, 5])
 def test_point_scatterers_give_the_bessel_lines_of_eq_24(blades):
     # A blade that reflects at its tip alone is the paper's point scatterer.

@@ -370,6 +370,14 @@ def test_values_that_cannot_be_rendered_are_refused_and_those_at_the_bounds_are_
             clutter_of(kind, **{name: value})
 
 
+@pytest.mark.parametrize("pulses", [1, 300])
+def test_a_converter_leaves_silence_silent(pulses):
+    receiver = {"noise": False, "effects": ["high_pass", "converter"]}
+    scene = Scene.build({"radar": {**RADAR, "pulses": pulses}, "receiver": receiver})
+    for full in (False, True):
+        assert not scene.render(full=full).iq.any()
+
+
 def test_a_value_that_a_kind_of_clutter_does_not_know_is_warned_of():
     said = clutter_of("rain", rain_width_mps=2.0, wind_mph=30.0).warnings
     assert [line.partition(": ")[2] for line in said] == ["wind_mph changes nothing of a clutter of kind rain"]
@@ -425,13 +433,14 @@ def test_a_bird_is_lowest_where_its_wings_are_highest():
     ("amplitudes", "repeats"),
     [([1.0] * 4, 4), ([1.0, 0.5, 1.0, 0.5], 2), ([1.0, 0.5, 0.5, 0.5], 1), ([1.0, 1.0, 0.5], 1), ([1.0], 1)],
 )
-def test_the_chopping_frequency_counts_how_often_a_turn_looks_the_same(amplitudes, repeats):
+def test_lines_stand_as_far_apart_as_a_turn_looks_the_same_often(amplitudes, repeats):
     rotor = {**ROTOR, "blades": len(amplitudes), "blade_amplitudes": amplitudes}
     radar = {"carrier_hz": 9.85e9, "prf_hz": 20e3, "pulses": 2000}
     part = uav(body=[], rotors=[rotor])
     rendered = Scene.build({"radar": radar, "uav": [part], "receiver": {"noise": False}}).render()
-    assert rendered.truth[0]["chopping_hz"] == [pytest.approx(ROTOR["rotation_hz"] * repeats)]
-    # one bin in five is a multiple of the rotation rate: lines stand on those of the chopping frequency alone
+    assert rendered.truth[0]["line_spacing_hz"] == [pytest.approx(ROTOR["rotation_hz"] * repeats)]
+    assert rendered.truth[0]["chopping_hz"] == [pytest.approx(ROTOR["rotation_hz"] * len(amplitudes))]
+    # one bin in five is a multiple of the rotation rate: lines stand on some of those alone
     power = power_spectrum(rendered.iq)[:500:5]
     lines = power > 1e-6 * power.max()
     assert set(np.flatnonzero(lines) % repeats) == {0}
