@@ -55,7 +55,8 @@ class Measurements:
     rotor_count : ndarray
         Rotors told apart; NaN without a comb.
     rotors_resolved : ndarray of bool
-        False where rates lie nearer than the dwell tells apart: the count is then a lower bound.
+        False where rates lie nearer than the dwell tells apart, or changed within it: of steady ones the count is then
+        a lower bound.
     rotor_spread_hz : ndarray
         Range of the rotors' chopping frequencies [Hz], also where they are not resolved; 0 where there is one rate.
     smearing_index : ndarray

@@ -18,8 +18,9 @@ from .periodogram import LINE_DB, Periodogram, squared
 #: Rotors looked for at most.
 MAX_ROTORS = 8
 
-#: How far the rates of one airframe's rotors lie from the comb found first, relative.
-RATE_SPREAD = 0.05
+#: How far the rates of one airframe's rotors lie from the comb found first, relative: in hover, and in a manoeuvre or
+#: where rotors are not alike. The latter are sought by their inner orders, which part such rates already.
+RATE_SPREAD, FURTHEST_SPREAD, INNER_ORDERS = 0.05, (-0.25, 0.33), 10
 
 #: A further rotor must have this much evidence [nats], and this share of the strongest one's.
 LEAST_EVIDENCE = 13.0
@@ -145,6 +146,24 @@ def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) 
     return len(shares) == 2 and min(shares) > SECOND_FLASH_SHARE / 2 and sum(shares) > 2 * SECOND_FLASH_SHARE
 
 
+def _strongest_apart(
+    data: Periodogram, centre: float, nominal: float, resolution: float, furthest: float
+) -> tuple[float, int, float]:
+    """The same among rates further from the nominal one than those of rotors in hover.
+
+    Were these not sought, their lines would pass for those of rates in between at which only every third or fourth line
+    is there.
+    """
+    step = RESOLVED_BINS / (4 * INNER_ORDERS * data.pulses)
+    low, high = FURTHEST_SPREAD
+    rates = np.arange(nominal * (1 + low), nominal * (1 + high), max(step, resolution / 4))
+    rates = rates[np.abs(rates / nominal - 1) > RATE_SPREAD]
+    inner, _ = even_scores(data.evidence, rates, np.full(len(rates), centre), min(INNER_ORDERS * nominal, furthest))
+    rate = float(rates[inner.argmax()])
+    near = np.arange(-step, step * 1.01, resolution / 4)
+    return _strongest(data, centre, rate + near, furthest)
+
+
 #: Of each bin: how far from a centre it is [cycles a sample], its power, whether it can be seen.
 _About = tuple[NDArray[np.float64], NDArray[np.floating], NDArray[np.bool_]]
 
@@ -239,6 +258,9 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
     resolved = True
     while len(fits) < MAX_ROTORS:
         rate, far, evidence = _strongest(rest, centre, rates, furthest)
+        if fits:
+            apart = _strongest_apart(rest, centre, nominal, resolution, furthest)
+            rate, far, evidence = max((rate, far, evidence), apart, key=lambda found: found[2])
         first = first or evidence
         if evidence < max(LEAST_EVIDENCE, LEAST_SHARE * first):
             break

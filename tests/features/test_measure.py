@@ -145,6 +145,20 @@ def test_rotors_20_rpm_apart_are_told_apart_and_like_ones_are_not():
     assert two["blade_length_m"] == pytest.approx(told.blade_length_m, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    "chopping_hz", [(137, 174), (128, 140, 144, 156), (124, 126, 154, 156), (130, 133, 135.5, 143, 148.5, 151)]
+)
+def test_rotors_that_are_not_alike_are_told_apart(chopping_hz):
+    """The lines of rates far from the loudest comb pass for those of rates near it: each third or fourth of them."""
+    rates_hz = np.array(chopping_hz) / 2
+    for seed in range(4):
+        found = measure(drone(rates_hz, snr_db=10.0, seed=seed), **RADAR)
+        assert found.rotors_resolved
+        assert found.rotor_count == len(rates_hz)
+        np.testing.assert_allclose(found.rotor_rates_hz[: len(rates_hz)], chopping_hz, rtol=1e-3)
+        assert found.chopping_hz == pytest.approx(2 * rates_hz.mean(), abs=5 * found.chopping_hz_std)
+
+
 def test_strong_lines_of_unequal_blades():
     orders = np.arange(-20, 21)
     power = np.where(orders % 2 == 0, 100.0, 5.0)
