@@ -1,5 +1,6 @@
 """From slow-time IQ to spectra, measurements and model inputs: arrays in, arrays out."""
 
+from .acceleration import body_acceleration, without_acceleration
 from .inputs import model_inputs
 from .measure import Measurements, measure
 from .schema import FEATURES, INPUT_SHAPES, JOINT_FEATURES, Feature, schema_hash
@@ -12,8 +13,10 @@ __all__ = [
     "Feature",
     "Measurements",
     "Spectrum",
+    "body_acceleration",
     "doppler_spectrum",
     "measure",
     "model_inputs",
     "schema_hash",
+    "without_acceleration",
 ]

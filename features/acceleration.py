@@ -55,7 +55,7 @@ def body_acceleration(
     Raises
     ------
     ValueError
-        If `iq` is not complex.
+        If `iq` is not complex, or holds a value that is not finite.
     """
     samples = as_complex(iq)
     pulses = samples.shape[-1]

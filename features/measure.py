@@ -172,7 +172,9 @@ def measure(
     Returns
     -------
     Measurements
-        Standard deviations hold for the model: steady rates within the dwell, white noise about each line.
+        Standard deviations hold for the model: steady rates within the dwell, white noise about each line. A body that
+        accelerates smears all lines; `bladewing measure` takes that out first (`body_acceleration`,
+        `without_acceleration`).
 
     Raises
     ------
