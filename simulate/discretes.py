@@ -181,7 +181,8 @@ def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
     turn = tip / (TWO_PI * length) * draws.sign()
     cell = np.minimum(draws.value("cell_m"), length)
     start = (length - cell) * draws.uniform()
-    cos_beta = np.cos(np.deg2rad(85) * draws.uniform())
+    beta = np.deg2rad(85) * draws.uniform()
+    cos_beta = np.cos(beta)
     first = draws.value("phase_rad")
     points, chord = np.floor(draws.value("turbine_points")), draws.value("chord_m")
     equal, even = draws.chance(0.5)[:, None], draws.chance(0.4)
@@ -213,7 +214,8 @@ def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
     truth = {
         "rotation_hz": np.abs(turn),
         "blade_length_m": length,
-        "tip_mps": tip * cos_beta,
+        "tip_mps": tip,
+        "beta_rad": beta,
         "blades": np.full(records, 3.0),
         "velocity_mps": np.zeros(records),
     }
