@@ -47,8 +47,8 @@ QUIET = 0.12
 #: What a set of records is for; each has streams of its own, so a test record is never a training record.
 PURPOSES = {"train": 0, "validate": 1, "calibrate": 2, "test": 3, "bench": 4, "report": 5}
 
-#: Columns of `Records.truth`: name -> unit. Where a column has no meaning for a record it holds NaN. Velocities are those
-#: at the first pulse, but a vehicle's at the middle of the dwell; tips move that fast, whatever the aspect.
+#: Columns of `Records.truth`: name -> unit. Where a column has no meaning for a record it holds NaN. Velocities are
+#: those at the first pulse, a vehicle's that in the middle of the dwell; tips move that fast, whatever the aspect.
 TRUTH_UNITS = {
     "snr_db": "dB",
     "velocity_mps": "m/s",
