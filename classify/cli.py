@@ -43,6 +43,10 @@ Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all 
 
 # Options that every command over recordings takes.
 DwellS = Annotated[float, typer.Option(metavar="SECONDS", help="Length of a dwell [s].")]
+MeasuredDwellS = Annotated[
+    float,
+    typer.Option(metavar="SECONDS", help="Length of a dwell [s]; rotors keep their rates for about 0.02 to 0.16."),
+]
 CarrierHz = Annotated[float | None, typer.Option(metavar="F", help="Carrier [Hz], where the file does not say.")]
 PrfHz = Annotated[float | None, typer.Option(metavar="F", help="PRF [Hz], where the file does not say.")]
 Variable = Annotated[
@@ -170,7 +174,7 @@ def measure(
             show_default=False,
         ),
     ] = None,
-    dwell: DwellS = 0.08,
+    dwell: MeasuredDwellS = 0.08,
     plot: Annotated[
         Path | None,
         typer.Option(metavar="FILE.svg", help="Draw the clearest dwell: spectrum, comb, band and notch."),
@@ -252,7 +256,12 @@ def export(
     carrier_hz: Annotated[float, typer.Option(metavar="F", help="Carrier [Hz].", show_default=False)],
     prf_hz: Annotated[float, typer.Option(metavar="F", help="PRF [Hz].", show_default=False)],
     pulses: Annotated[int, typer.Option(metavar="N", min=1, help="Pulses of a record.", show_default=False)],
-    model: ModelName = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE", help="A shipped model, an .onnx file, fast or best.", show_default="spectrum-cnn"
+        ),
+    ] = None,
 ) -> None:
     """Write one self-contained ONNX graph for a radar: raw IQ in, probabilities and label out, onnxruntime alone."""
     from .export import export_raw_iq

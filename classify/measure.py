@@ -378,7 +378,7 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     ):
         if not low <= value <= high:
             said = f"the {what} is {value:g} Hz: it must be {low:g} to {high:g} Hz"
-            raise BadInput(f"{recording.name}: {said}: give it in that unit")
+            raise BadInput(f"{recording.name}: {said}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3")
     iq = recording.dwells(settings.dwell_s, least=2)
     count, pulses = iq.shape
     radar = {"carrier_hz": recording.carrier_hz, "prf_hz": recording.prf_hz}

@@ -15,6 +15,9 @@ _LEGEND = (("#dbe9f6", "band"), ("#f3d9b1", "notch"), ("#c0392b", "comb"), ("#1e
 
 _WIDTH, _HEIGHT, _LEFT, _BOTTOM, _TOP = 960, 470, 56, 44, 80
 
+#: Letters of a name that fit above the picture.
+_LONGEST_NAME = 100
+
 #: Width of what is shown over that of the band; all where no band is measured.
 _MARGIN = 1.6
 
@@ -112,7 +115,8 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
             at = x(value * per_unit)
             parts.append(f'<path d="M{at:.1f} {edge:.1f}v{tick}" stroke="#222" stroke-width="0.8"/>')
             parts.append(f'<text x="{at:.1f}" y="{label_y:.1f}" text-anchor="middle">{value + 0.0:.6g}</text>')
-    legend = _LEGEND if np.isfinite(both_hz).all() else _LEGEND[:3]
+    drawn = (np.isfinite(width_hz), True, np.isfinite(chopping_hz), np.isfinite(both_hz).all())
+    legend = [entry for entry, shown in zip(_LEGEND, drawn, strict=True) if shown]
     for number, (colour, words) in enumerate(legend):
         left = _WIDTH - 12 - 76 * (len(legend) - number)
         parts.append(f'<rect x="{left}" y="30" width="12" height="12" fill="{colour}" stroke="#888"/>')
@@ -121,13 +125,17 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
     said = str(values.reason[index]) or f"comb every {chopping_hz:.2f} Hz, {wide}"
     if np.isfinite(both_hz).all():
         said += f"; main {both_hz[0]:.2f} Hz, tail {both_hz[1]:.2f} Hz, ratio {values.gear_ratio[index]:.3f}"
-    # the folder would push the words off the picture
-    title = escape(one_line(f"{Path(recording.name).name} at {start_s:.3f} s: {said}"))
+    # the folder would push the words off the picture, and so would the middle of a long name
+    name = one_line(Path(recording.name).name)
+    if len(name) > _LONGEST_NAME:
+        name = f"{name[: _LONGEST_NAME // 2]}...{name[-_LONGEST_NAME // 2 :]}"
+    title, words = escape(f"{name} at {start_s:.3f} s"), escape(one_line(said))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" width="{_WIDTH}" '
         f'height="{_HEIGHT}" font-family="sans-serif" font-size="11" fill="#222">\n'
         f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="white"/>\n'
         f'<text x="{_LEFT}" y="20" font-size="13">{title}</text>\n'
+        f'<text x="{_LEFT}" y="38" font-size="12">{words}</text>\n'
         + "\n".join(parts)
         + f'\n<text x="{_WIDTH / 2}" y="{_HEIGHT - 6}" text-anchor="middle">Doppler frequency [Hz]</text>\n'
         f'<text x="{_WIDTH / 2}" y="{_TOP - 24}" text-anchor="middle">radial velocity [m/s]</text>\n'

@@ -42,6 +42,9 @@ LEAST_FLASH_LINES = 6
 LEFT_OVER, LEFT_SHARE = 0.3, 0.05
 LEAST_BINS = 100
 
+#: What a lone rotor leaves may be a change of its rate; from this share of its lines' power on they say little of it.
+LEFT_ALONE = 0.25
+
 #: As does what is left where it comes, with so many of its deviations, to the mean rotor found: one more like it would
 #: not have been seen.
 HIDDEN_DEVIATIONS = 1.5
@@ -175,8 +178,10 @@ def _power_about(rest: Periodogram, centre: float) -> _About:
     return np.abs(away - np.rint(away)), squared(fft.fft(rest.samples)) / rest.pulses, rest.usable(frequency)
 
 
-def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[bool, bool]:
-    """What is left within the band against the noise beyond it: whether it is clearly more, whether it may be a rotor.
+def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[float, bool]:
+    """What is left within the band: its share of the lines' power, and whether it may be a rotor.
+
+    The share is 0 where that is not clearly more than the noise beyond the band.
 
     Fitted lines take noise out with them: each as much as it was let free, those that lie in one another only once.
     """
@@ -186,11 +191,11 @@ def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[bool, b
     within = usable & (away < high) & (away > low)
     beyond = usable & (away > 1.1 * edge)
     if within.sum() < LEAST_BINS or beyond.sum() < LEAST_BINS:
-        return False, False
+        return 0.0, False
     noise = float(power[beyond].mean())
     over = float(power[within].mean()) - noise
     lines = sum(float((np.abs(fit.amplitudes) ** 2).sum()) for fit in fits) * pulses
-    clear = over > LEFT_OVER * noise and over * within.sum() > LEFT_SHARE * lines
+    share = over * within.sum() / lines if over > LEFT_OVER * noise else 0.0
     range_bins = float(np.ptp([fit.spacing for fit in fits])) * pulses
     held, taken = 0.0, 0.0
     for fit in fits:
@@ -201,7 +206,7 @@ def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[bool, b
         taken += float((apart * fit.snr[inside] / (1 + fit.snr[inside])).sum())
     deviation = noise * float(np.sqrt(1 / within.sum() + 1 / beyond.sum()))
     most = over + noise * taken / within.sum() + HIDDEN_DEVIATIONS * deviation
-    return clear, most * within.sum() > held
+    return share, most * within.sum() > held
 
 
 def _stands_past(about: _About, fit: CombFit, edge: float) -> bool:
@@ -315,10 +320,9 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float) -> Rotors
     tip = edge / (per_turn * max(fit.spacing for fit in rotors.fits))  # an order is the same for all: blades are alike
     twice = any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
     about = _power_about(data.left(rotors.rest), rotors.fits[0].centre)
-    clear, hidden = _left_over(about, rotors.fits, edge)
+    share, hidden = _left_over(about, rotors.fits, edge)
     past = not several and _stands_past(about, rotors.fits[0], edge)
-    # a little that a single rotor leaves may be a change of its rate
-    if not (twice or hidden or past or (several and clear)):
+    if not (twice or hidden or past or share > (LEFT_SHARE if several else LEFT_ALONE)):
         return rotors
     reach = max(int(np.abs(rotors.fits[0].orders).max()), 1)
     spread = max(rotors.spread, RESOLVED_BINS / (reach * data.pulses))

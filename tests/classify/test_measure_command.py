@@ -92,7 +92,10 @@ def test_the_plot_is_svg_with_the_comb_on_it(folder, tmp_path, capsys):
     titles = [e.text for e in root.iter() if e.tag.endswith("title")]
     assert "notch" in titles
     assert any(t.startswith("band ") for t in titles)
-    assert any(re.match(r"drone\.npy at 0\.0[08]0 s: comb every ", e.text or "") for e in root.iter())
+    words = [e.text or "" for e in root.iter() if e.tag.endswith("text")]
+    assert any(re.fullmatch(r"drone\.npy at 0\.0[08]0 s", text) for text in words)
+    assert any(re.match(r"comb every [0-9.]+ Hz, band ", text) for text in words)
+    assert {"band", "notch", "comb"} <= set(words)
     assert sum(e.get("stroke") == "#c0392b" for e in root.iter()) > 20
 
 
@@ -113,7 +116,18 @@ def test_the_plot_of_silence_is_a_line_at_the_foot(tmp_path, capsys):
     target = tmp_path / "silence.svg"
     assert main(["measure", str(tmp_path / "silence.npy"), *RADAR, "--plot", str(target)]) == 0
     assert "nan" not in target.read_text()
-    ET.fromstring(target.read_text())
+    words = {e.text for e in ET.fromstring(target.read_text()).iter() if e.tag.endswith("text")}
+    assert "notch" in words
+    assert not {"band", "comb", "2nd comb"} & words
+
+
+def test_a_long_name_is_shortened_in_its_middle_so_that_the_words_fit(tmp_path, capsys):
+    name = "2026-11-24T193412Z_" + 10 * "cell_" + 20 * "gate_" + "hover.npy"
+    np.save(tmp_path / name, np.zeros(2000, np.complex64))
+    target = tmp_path / "long.svg"
+    assert main(["measure", str(tmp_path / name), *RADAR, "--plot", str(target)]) == 0
+    words = [e.text or "" for e in ET.fromstring(target.read_text()).iter() if e.tag.endswith("text")]
+    assert [len(text) for text in words if text.endswith("gate_hover.npy at 0.000 s")] == [103 + len(" at 0.000 s")]
 
 
 def test_a_helicopter_shows_both_combs_in_words_json_and_plot(tmp_path, capsys):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bladewing.features import measure
 from bladewing.features.periodogram import prepare
-from bladewing.simulate import RotorMotion, rotor_echo
+from bladewing.simulate import RotorMotion, Scene, rotor_echo
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
 
@@ -50,6 +50,16 @@ def test_the_first_line_of_a_rotor_is_no_skirt_of_a_background():
         noise = white(np.random.default_rng(seed), PULSES)
         hovering = 10 * tone(0.0) + 0.15 * (tone(115.0) + tone(-115.0)) + noise
         assert prepare(hovering.astype(np.complex64), **RADAR).rest_half == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_four_rotors_in_three_flashes_are_not_one(seed):
+    """They flash together and too few lines stand apart: one comb is found, and leaves as much as it explains."""
+    scene = Scene.load("quadcopter")
+    iq = scene.render(seed).iq[550:1100]
+    found = measure(iq, carrier_hz=scene.radar.carrier_hz, prf_hz=scene.radar.prf_hz)
+    assert not found.rotors_resolved
+    assert found.chopping_hz == pytest.approx(140.0, abs=3 * found.chopping_hz_std)
 
 
 @pytest.mark.parametrize("snr_db", [5, 15])
