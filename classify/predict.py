@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 DWELL_S = 0.08
 """Default length of a dwell [s]."""
 
-LONGEST_DWELL_S = 20.0
-"""No dwell is as long [s]; who asks for one means milliseconds."""
-
 LONG_S = 5.0
 """How much of a recording, from its start, what only a long look shows is sought in [s]."""
 
@@ -276,12 +273,9 @@ def checked_dwell_s(dwell_s: float) -> float:
     Raises
     ------
     BadInput
-        It is not a finite number above 0, or so large that milliseconds were meant.
+        It is not a finite number above 0.
     """
-    dwell_s = positive(dwell_s, "--dwell [s]")
-    if dwell_s > LONGEST_DWELL_S:
-        raise BadInput(f"--dwell [s] is {dwell_s:g}: it must be at most {LONGEST_DWELL_S:g}: give 80 ms as 0.08")
-    return dwell_s
+    return positive(dwell_s, "--dwell [s]")
 
 
 def _named(probabilities: np.ndarray) -> dict[str, float]:

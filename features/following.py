@@ -10,7 +10,7 @@ from scipy import fft
 
 from .notch import body_line
 from .periodogram import LINE_DB
-from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum, finite_complex
+from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum, finite_complex, scaled, unit_scale
 
 #: Dwells by which the body is followed [s].
 BODY_DWELL_S = 0.1
@@ -42,6 +42,12 @@ def by_recording(
     lead, pulses = samples.shape[:-1], samples.shape[-1:]
     rows = [one(samples[index]) for index in np.ndindex(lead)] or [one(np.zeros(pulses, np.complex64))]
     return [np.array(column)[: math.prod(lead)].reshape(lead) for column in zip(*rows, strict=True)]
+
+
+def normed(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
+    """Samples, not all zero, over the size of the largest: at the ends of float32 that size itself is none."""
+    unit = scaled(iq, unit_scale(iq))
+    return np.asarray(unit / np.abs(unit).max(), np.complex64)
 
 
 def followed(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[NDArray[np.complex64], Course]:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .following import BODY_DWELL_S, LEAST_PULSES, by_recording, followed, standing
-from .spectrum import SPEED_OF_LIGHT_MPS, scaled, unit_scale
+from .following import BODY_DWELL_S, LEAST_PULSES, by_recording, followed, normed, standing
+from .spectrum import SPEED_OF_LIGHT_MPS
 from .wingbeat import GAIT_HZ, GAIT_MPS, LEAST_S, WING_MPS
 
 #: Rates that count [Hz]: from a slow walker's steps to the fastest wings.
@@ -81,7 +81,7 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[f
     nothing = (np.nan, np.nan, False)
     if len(iq) < LEAST_S * prf_hz or round(BODY_DWELL_S * prf_hz) < LEAST_PULSES or not iq.any():
         return nothing
-    shown, course = followed(scaled(iq, unit_scale(iq)), carrier_hz, prf_hz)
+    shown, course = followed(normed(iq), carrier_hz, prf_hz)
     speed = abs(course[0])
     if not speed <= WING_MPS:  # nor without a body
         return nothing

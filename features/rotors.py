@@ -22,6 +22,9 @@ MAX_ROTORS = 8
 #: where rotors are not alike. The latter are sought by their inner orders, which part such rates already.
 RATE_SPREAD, FURTHEST_SPREAD, INNER_ORDERS = 0.05, (-0.25, 0.33), 10
 
+#: The lines of one of these reach this share of what the others' do: else they are what rotors not told apart leave.
+APART_REACH = 0.5
+
 #: A further rotor must have this much evidence [nats], and this share of the strongest one's.
 LEAST_EVIDENCE = 13.0
 LEAST_SHARE = 0.03
@@ -91,11 +94,11 @@ class Rotors:
 
 
 def _strongest(
-    data: Periodogram, centre: float, rates: NDArray[np.float64], furthest: float
+    data: Periodogram, centre: float, rates: NDArray[np.float64], furthest: float, evidence: NDArray[np.float32]
 ) -> tuple[float, int, float]:
     """Rate whose lines speak loudest by their powers and their flashes, how far they reach, and their evidence."""
     size = len(data.power)
-    powers, reach = even_scores(data.evidence, rates, np.full(len(rates), centre), furthest)
+    powers, reach = even_scores(evidence, rates, np.full(len(rates), centre), furthest)
     order = np.arange(1, reach.max() + 1)
     frequency = centre + np.array([-1, 1])[:, None, None] * rates[:, None] * order
     seen = data.usable(frequency) & (order <= reach[:, None])
@@ -155,16 +158,16 @@ def _strongest_apart(
     """The same among rates further from the nominal one than those of rotors in hover.
 
     Were these not sought, their lines would pass for those of rates in between at which only every third or fourth line
-    is there.
+    is there. Where lines not told apart fill all places, none of these speaks for one.
     """
     step = RESOLVED_BINS / (4 * INNER_ORDERS * data.pulses)
     low, high = FURTHEST_SPREAD
     rates = np.arange(nominal * (1 + low), nominal * (1 + high), max(step, resolution / 4))
     rates = rates[np.abs(rates / nominal - 1) > RATE_SPREAD]
-    inner, _ = even_scores(data.evidence, rates, np.full(len(rates), centre), min(INNER_ORDERS * nominal, furthest))
+    inner, _ = even_scores(data.contrast, rates, np.full(len(rates), centre), min(INNER_ORDERS * nominal, furthest))
     rate = float(rates[inner.argmax()])
     near = np.arange(-step, step * 1.01, resolution / 4)
-    return _strongest(data, centre, rate + near, furthest)
+    return _strongest(data, centre, rate + near, furthest, data.contrast)
 
 
 #: Of each bin: how far from a centre it is [cycles a sample], its power, whether it can be seen.
@@ -262,10 +265,12 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
     first, spread, rate = 0.0, 0.0, nominal
     resolved = True
     while len(fits) < MAX_ROTORS:
-        rate, far, evidence = _strongest(rest, centre, rates, furthest)
+        rate, far, evidence = _strongest(rest, centre, rates, furthest, rest.evidence)
         if fits:
             apart = _strongest_apart(rest, centre, nominal, resolution, furthest)
-            rate, far, evidence = max((rate, far, evidence), apart, key=lambda found: found[2])
+            known = max(r * fit.spacing for r, fit in zip(reaches, fits, strict=True))
+            if apart[0] * apart[1] > APART_REACH * known:
+                rate, far, evidence = max((rate, far, evidence), apart, key=lambda found: found[2])
         first = first or evidence
         if evidence < max(LEAST_EVIDENCE, LEAST_SHARE * first):
             break

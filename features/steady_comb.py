@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from .body_velocity import folded
 from .comb import find_comb
-from .following import by_recording
+from .following import by_recording, normed
 from .one_thread import one_thread
 from .periodogram import prepare
-from .spectrum import SPEED_OF_LIGHT_MPS, scaled, unit_scale
+from .spectrum import SPEED_OF_LIGHT_MPS
 
 #: Length of a dwell [s], short enough for a rate that changes, and its pulses at least and at most: more cost time and
 #: find little more.
@@ -75,7 +75,7 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[f
     count = min(len(iq) // max(pulses, 1), DWELLS)
     if pulses < PULSES[0] or count < LEAST or not iq.any():
         return np.nan, 0
-    iq = scaled(iq, unit_scale(iq))
+    iq = normed(iq)
     starts = np.rint(np.linspace(0, len(iq) - pulses, count)).astype(np.intp)
     found = [_rotor_hz(iq[start : start + pulses], carrier_hz, prf_hz) for start in starts]
     choppings = np.array([chopping_hz for chopping_hz in found if chopping_hz is not None])

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .following import by_recording, followed, standing
+from .following import by_recording, followed, normed, standing
 from .repetition import HARMONICS, LevelSpectrum, Repetition, level_spectrum, repetition
-from .spectrum import LEAST_FLOOR, SPEED_OF_LIGHT_MPS, require_radar, scaled, unit_scale
+from .spectrum import LEAST_FLOOR, SPEED_OF_LIGHT_MPS, require_radar
 from .stft import stft
 
 #: Wingbeats that are sought [Hz]: the slowest is a swan's in a slow beat, the fastest a small songbird's.
@@ -150,7 +150,7 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     if prf_hz * wavelength_m / 4 < 1.1 * WING_MPS:
         # a rotor folded into the wings' speeds cannot be told from them
         return (*nothing, f"no wingbeat: unambiguous only to {prf_hz * wavelength_m / 4:.1f} m/s")
-    shown, body = followed(scaled(iq, unit_scale(iq)), carrier_hz, prf_hz)
+    shown, body = followed(normed(iq), carrier_hz, prf_hz)
     velocity = body[0]
     if np.isnan(velocity):
         return (*nothing, "no wingbeat: no body line")

@@ -211,7 +211,6 @@ def test_names_are_never_taken_for_markup_or_escape_codes(run, sigmf_pair):
         (("{rec}", "--dwell", "0"), "--dwell [s] is 0: it must be a finite number above 0"),
         (("{rec}", "--dwell", "-0.1"), "--dwell [s] is -0.1"),
         (("{rec}", "--dwell", "nan"), "--dwell [s] is nan"),
-        (("{rec}", "--dwell", "80"), "--dwell [s] is 80: it must be at most 20: give 80 ms as 0.08"),
         (("{rec}", "--dwell", "long"), "--dwell is 'long': it must be a number"),
         (("{rec}", "--carrier-hz", "9e9"), "carrier 9000000000 Hz given, but the file says 10000000000 Hz"),
         (("{rec}", "--carrier-hz", "0"), "carrier given is 0"),
