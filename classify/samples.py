@@ -36,7 +36,8 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
         raise BadInput(f"{name}: an array of Python objects: store complex samples (complex64)")
     if given.dtype.kind in "fiub":
         raise BadInput(
-            f"{name}: real samples ({given.dtype}): IQ must be complex, I + jQ: of one channel scipy.signal.hilbert"
+            f"{name}: real samples ({given.dtype}): IQ must be complex, I + jQ (complex64): "
+            "of one channel scipy.signal.hilbert makes it"
         )
     if given.dtype.kind != "c":
         raise BadInput(f"{name}: samples of type {given.dtype}: IQ must be complex, I + jQ (complex64)")

@@ -15,7 +15,7 @@ from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum, finite_complex, scal
 #: Dwells by which the body is followed [s].
 BODY_DWELL_S = 0.1
 
-#: Fewest pulses of such a dwell.
+#: Fewest pulses of such a dwell: a radar slower than that sees no body.
 LEAST_PULSES = 16
 
 #: The course is a line through so many dwells at most, spread over all: slopes between all pairs are that many squared.
@@ -87,6 +87,8 @@ def standing(iq: NDArray[np.complex64], course: Course, carrier_hz: float, prf_h
 def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> Course:
     """Velocity in the middle, acceleration and its deviation, from a line through the velocities of the dwells."""
     length = round(BODY_DWELL_S * prf_hz)
+    if length < LEAST_PULSES:
+        return np.nan, np.nan, np.nan
     count = len(iq) // length
     spectrum = doppler_spectrum(iq[: count * length].reshape(count, length), carrier_hz=carrier_hz, prf_hz=prf_hz)
     body = body_line(spectrum)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .following import BODY_DWELL_S, LEAST_PULSES, by_recording, followed, normed, standing
+from .following import by_recording, followed, normed, standing
 from .spectrum import SPEED_OF_LIGHT_MPS
 from .wingbeat import GAIT_HZ, GAIT_MPS, LEAST_S, WING_MPS
 
@@ -79,7 +79,7 @@ def heave(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float) 
 def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[float, float, bool]:
     """The fields of `Heave` of one recording."""
     nothing = (np.nan, np.nan, False)
-    if len(iq) < LEAST_S * prf_hz or round(BODY_DWELL_S * prf_hz) < LEAST_PULSES or not iq.any():
+    if len(iq) < LEAST_S * prf_hz or not iq.any():
         return nothing
     shown, course = followed(normed(iq), carrier_hz, prf_hz)
     speed = abs(course[0])

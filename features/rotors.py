@@ -160,9 +160,9 @@ def _strongest_apart(
     Were these not sought, their lines would pass for those of rates in between at which only every third or fourth line
     is there. Where lines not told apart fill all places, none of these speaks for one.
     """
-    step = RESOLVED_BINS / (4 * INNER_ORDERS * data.pulses)
+    step = max(RESOLVED_BINS / (4 * INNER_ORDERS * data.pulses), resolution / 4)
     low, high = FURTHEST_SPREAD
-    rates = np.arange(nominal * (1 + low), nominal * (1 + high), max(step, resolution / 4))
+    rates = np.arange(nominal * (1 + low), nominal * (1 + high), step)
     rates = rates[np.abs(rates / nominal - 1) > RATE_SPREAD]
     inner, _ = even_scores(data.contrast, rates, np.full(len(rates), centre), min(INNER_ORDERS * nominal, furthest))
     rate = float(rates[inner.argmax()])

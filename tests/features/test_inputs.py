@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from bladewing.features import FEATURES, INPUT_SHAPES, JOINT_FEATURES, doppler_spectrum, model_inputs
+from bladewing.features import FEATURES, INPUT_SHAPES, JOINT_FEATURES, doppler_spectrum, model_inputs, schema_hash
 from bladewing.features import inputs as inputs_module
 from bladewing.features.change import frames
 from bladewing.features.joint import frame_length, stft_image
@@ -196,10 +196,11 @@ def test_lay_out_holds_values_in_their_ranges():
         assert out[2, number] == np.float32(feature.low)
 
 
-def test_schema_names_are_unique():
+def test_schema_names_are_unique_and_have_a_hash():
     names = [f.name for f in FEATURES + JOINT_FEATURES]
     radar = {"velocity_step_log", "unambiguous_log", "dwell_log", "pulses_log"}
     assert len([n for n in names if n not in radar]) == len(set(names) - radar)
+    assert len(schema_hash()) == 64
 
 
 def test_real_samples_are_refused():
