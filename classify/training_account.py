@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bladewing.models.operating import first_out
 from numpy.typing import NDArray
 
 from .labels import CLASSES
@@ -15,9 +16,8 @@ ACCOUNT = "train.json"
 
 def alarm_threshold(probabilities: NDArray[np.floating], labels: NDArray[np.integer], false_alarm: float) -> float:
     """UAV probability that at most this share of the birds and the clutter reaches."""
-    falling = np.sort(probabilities[labels != 0, 0].astype(np.float64))[::-1]
-    first_out = falling[min(int(false_alarm * len(falling)), len(falling) - 1)]
-    return float(first_out) + 1e-6  # probabilities are float32 where they are compared with it
+    # 1e-6 above: probabilities are float32 where they are compared with it
+    return first_out(probabilities[labels != 0, 0], false_alarm) + 1e-6
 
 
 def covered(

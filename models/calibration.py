@@ -1,8 +1,8 @@
 """From scores to probabilities that mean what they say, and to the thresholds of an honest "unknown".
 
 Vector scaling: probabilities = softmax(scale * scores + bias), with one scale and one bias a class, fitted on records
-that the model did not train on. Temperature scaling (Guo et al. 2017) is the case without biases,
-scale = 1 / temperature.
+that the model did not train on. Temperature scaling (Guo et al. 2017), scale = 1 / temperature, is the case without
+biases.
 """
 
 from dataclasses import dataclass
@@ -101,29 +101,6 @@ def negative_log_likelihood(probabilities: ArrayLike, labels: NDArray[np.integer
     return float(-np.log(np.maximum(truth, np.finfo(np.float64).tiny)).mean())
 
 
-def fit_temperature(scores: NDArray[np.floating], labels: NDArray[np.integer]) -> Calibration:
-    """Fit one temperature by maximum likelihood.
-
-    Parameters
-    ----------
-    scores
-        Raw scores on records that the model did not train on, shape (n, 3).
-    labels
-        Shape (n,), whole numbers 0 to 2.
-
-    Returns
-    -------
-    Calibration
-        With scale = 1 / temperature and no bias.
-
-    Raises
-    ------
-    ValueError
-        Where shapes disagree, there is no record, or a score is not finite.
-    """
-    return _fit(scores, labels, biased=False)
-
-
 def fit_vector_scaling(scores: NDArray[np.floating], labels: NDArray[np.integer]) -> Calibration:
     """Fit one scale and a bias for each class by maximum likelihood, the biases lightly held at 0.
 
@@ -144,10 +121,6 @@ def fit_vector_scaling(scores: NDArray[np.floating], labels: NDArray[np.integer]
     ValueError
         Where shapes disagree, there is no record, or a score is not finite.
     """
-    return _fit(scores, labels, biased=True)
-
-
-def _fit(scores: NDArray[np.floating], labels: NDArray[np.integer], *, biased: bool) -> Calibration:
     from scipy.optimize import minimize
 
     _require_table(scores, labels, "scores")
@@ -159,7 +132,7 @@ def _fit(scores: NDArray[np.floating], labels: NDArray[np.integer], *, biased: b
 
     def loss(parameters: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         """Penalised mean negative log likelihood, and its gradient."""
-        log_scale, bias = parameters[0], parameters[1:] if biased else np.zeros(CLASS_COUNT)
+        log_scale, bias = parameters[0], parameters[1:]
         pull = (log_scale - centre) / _LOG_SCALE_SIGMA
         logits = np.exp(log_scale) * scores + bias
         top = logits.max(axis=1, keepdims=True)
@@ -169,12 +142,12 @@ def _fit(scores: NDArray[np.floating], labels: NDArray[np.integer], *, biased: b
         value += (pull**2 + ((bias / _BIAS_SIGMA) ** 2).sum()) / (2 * count)
         by_scale = np.exp(log_scale) * (slope * scores).sum() + pull / _LOG_SCALE_SIGMA / count
         by_bias = slope.sum(axis=0) + bias / _BIAS_SIGMA**2 / count
-        return value, np.concatenate([[by_scale], by_bias]) if biased else np.array([by_scale])
+        return value, np.concatenate([[by_scale], by_bias])
 
-    start = np.array([centre] + [0.0] * (CLASS_COUNT * biased))
+    start = np.array([centre] + [0.0] * CLASS_COUNT)
     bounds = [(value - 10, value + 10) for value in start]
     best = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-12, "gtol": 1e-8}).x
-    bias = best[1:] - best[1:].mean() if biased else np.zeros(CLASS_COUNT)
+    bias = best[1:] - best[1:].mean()
     return Calibration(scale=float(np.exp(best[0])), bias=tuple(float(b) for b in bias))
 
 

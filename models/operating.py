@@ -18,6 +18,22 @@ _RATES = (5.0, 4.0, 3.15, 2.5, 2.0, 1.6, 1.25, 1.0, 0.8, 0.63)
 _EVERY_WIN = 0.3333333  # the most probable of three reaches it
 
 
+def first_out(scores: NDArray[np.floating], false_alarm: float) -> float:
+    """Give the highest of the non-targets' scores that may no longer pass: what lies above it keeps to the rate.
+
+    Parameters
+    ----------
+    scores
+        Of the non-targets, shape (n,), at least one; larger is more like a target.
+    false_alarm
+        Largest share of them that may pass, at least 0 and below 1. At most that share lies strictly above the score
+        given, ties included, and no lower score keeps to it.
+    """
+    # The margin keeps 0.01 * 300 = 3.0000000000000004 and 2.9999999999999996 alike.
+    passing = min(math.floor(false_alarm * len(scores) + 1e-9), len(scores) - 1)
+    return float(np.sort(np.asarray(scores, np.float64))[::-1][passing])
+
+
 @dataclass(frozen=True)
 class OperatingPoint:
     """One choice between false alarms and misses.

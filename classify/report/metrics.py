@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from bladewing.models.operating import first_out
 from numpy.typing import NDArray
 
 # Two-sided 95 % of the normal distribution.
@@ -153,18 +154,15 @@ def detection_at(
     """
     if not 0.0 <= false_alarm_rate < 1.0:
         raise ValueError(f"false_alarm_rate={false_alarm_rate}: must lie in [0, 1)")
-    others = np.sort(scores[~targets])[::-1]
-    if others.size == 0:
+    if targets.all():
         none = np.zeros(0, bool)
         return {"detection": rate(none), "false_alarm": rate(none), "threshold": None, "allowed": false_alarm_rate}
-    # The first score that may no longer pass: at most floor(rate * n) lie strictly above it, ties included. The margin
-    # keeps 0.01 * 300 = 3.0000000000000004 and 2.9999999999999996 alike.
-    threshold = others[math.floor(false_alarm_rate * others.size + 1e-9)]
+    threshold = first_out(scores[~targets], false_alarm_rate)
     declared = scores > threshold
     return {
         "detection": rate(declared[targets]),
         "false_alarm": rate(declared[~targets]),
-        "threshold": float(threshold),
+        "threshold": threshold,
         "allowed": false_alarm_rate,
     }
 
