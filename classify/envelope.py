@@ -118,7 +118,8 @@ class Envelope:
     def _dwell_reason(self, prf_hz: float, pulses: int) -> str | None:
         dwell_s = pulses / prf_hz
         if pulses < self.pulses_min:
-            return f"{pulses} pulses are fewer than {self.pulses_min}: {self._lengthen(prf_hz)}"
+            few = "1 pulse is" if pulses == 1 else f"{pulses} pulses are"
+            return f"{few} fewer than {self.pulses_min}: {self._lengthen(prf_hz)}"
         if pulses > self.pulses_max:
             return f"{pulses} pulses are more than {self.pulses_max}: {self._shorten(prf_hz)}"
         if dwell_s > self.dwell_max_s * (1 + _ROUNDING):

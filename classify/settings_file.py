@@ -16,29 +16,28 @@ from .files import read_bounded
 Settings = TypeVar("Settings", bound=BaseModel)
 
 
-def given_settings(file: Path | None, **options: Any) -> dict[str, Any]:
-    """What a user gave: the fields of a TOML file, if one is named, then the options that are not None.
-
-    Raises
-    ------
-    BadInput
-        If the file cannot be read or is not TOML.
-    """
-    fields = {} if file is None else _read(file)
-    return fields | {name: value for name, value in options.items() if value is not None}
-
-
-def build_settings(table: type[Settings], values: Mapping[str, Any], *, where: str) -> Settings:
-    """Check values against their table.
+def build_settings(
+    table: type[Settings],
+    file: Path | None,
+    defaults: Mapping[str, Any],
+    *,
+    stored: Mapping[str, Any] | None = None,
+    **options: Any,
+) -> Settings:
+    """Check settings against their table: defaults, then the fields of a file, then the options that are not None.
 
     Parameters
     ----------
     table : type of pydantic model
         The fields, unknown ones forbidden.
-    values : mapping
-        Field to value.
-    where : str
-        Where they come from, for error messages.
+    file : Path, optional
+        TOML file with fields of the table at its top level.
+    defaults : mapping
+        Field to value, in place of the table's own.
+    stored : mapping, optional
+        Field to value of a data set, which the file and the options may only repeat.
+    options
+        Field to value, over the file; None says nothing.
 
     Returns
     -------
@@ -47,18 +46,30 @@ def build_settings(table: type[Settings], values: Mapping[str, Any], *, where: s
     Raises
     ------
     BadInput
-        If a field is unknown or out of its range.
+        If the file cannot be read or is not TOML, or a field is unknown, out of its range or not as stored.
     """
+    given = {name: value for name, value in options.items() if value is not None}
+    values = {**defaults, **(stored or {}), **({} if file is None else _read(file)), **given}
+    for field, value in (stored or {}).items():
+        if values[field] != value:
+            place = named(field, file, given)
+            raise BadInput(f"{place} is {values[field]!r}, but the data set has {value}: leave it out")
     try:
         return table(**values)
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"])
+        place = named(field, file, given)
         if first["type"] == "extra_forbidden":
             known = ", ".join(table.model_fields)
-            raise BadInput(f"{where}: unknown field {field!r}: the fields are {known}") from None
+            raise BadInput(f"{file}: unknown field {field!r}: the fields are {known}") from None
         rule = first["msg"].replace("Input ", "it ", 1).replace("Tuple ", "it ", 1)
-        raise BadInput(f"{where}: {field} is {first['input']!r}: {rule}") from None
+        raise BadInput(f"{place} is {first['input']!r}: {rule}") from None
+
+
+def named(field: str, file: Path | None, options: Mapping[str, Any]) -> str:
+    """Name a field by where its value comes from: the file, unless an option gave it."""
+    return field if file is None or options.get(field) is not None else f"{file}: {field}"
 
 
 def _read(file: Path) -> dict[str, Any]:

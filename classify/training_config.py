@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from .bounds import LEAST_RECORDS, SEEDS
 from .errors import BadInput
-from .settings_file import build_settings, given_settings
+from .settings_file import build_settings, named
 
 #: What `--quick` changes: enough to see every step work, not a model to use.
 QUICK = {"records": 3000, "epochs": 3, "iterations": 20}
@@ -17,7 +17,7 @@ QUICK = {"records": 3000, "epochs": 3, "iterations": 20}
 class TrainingConfig(BaseModel):
     """Settings of a training; every field has a default and unknown fields are refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
     records: Annotated[int, Field(ge=LEAST_RECORDS, le=10_000_000)] = 30_000
     seed: Annotated[int, Field(ge=0, lt=SEEDS)] = 0
@@ -85,15 +85,12 @@ def training_config(
     """
     from bladewing.models import LADDER
 
-    values = given_settings(file, records=records, seed=seed)
-    where = str(file) if file is not None else "training settings"
-    for name, held in (stored or {}).items():
-        if values.setdefault(name, held) != held:
-            raise BadInput(f"{where}: {name} is {values[name]!r}, but the data set has {held}: leave it out")
-    config = build_settings(TrainingConfig, (QUICK if quick else {}) | values, where=where)
+    defaults = QUICK if quick else {}
+    config = build_settings(TrainingConfig, file, defaults, stored=stored, records=records, seed=seed)
+    place = named("models", file, {})
     for name in config.models:
         if name not in LADDER:
-            raise BadInput(f"{where}: models holds {name!r}: it may hold {', '.join(LADDER)}")
+            raise BadInput(f"{place} holds {name!r}: it may hold {', '.join(LADDER)}")
         if config.models.count(name) > 1:
-            raise BadInput(f"{where}: models holds {name!r} twice: name each once")
+            raise BadInput(f"{place} holds {name!r} twice: name each once")
     return config

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..bounds import SEEDS
-from ..settings_file import build_settings, given_settings
+from ..settings_file import build_settings
 
 #: What `--quick` changes: enough to see every figure, with wide intervals.
 QUICK: dict[str, Any] = {
@@ -31,7 +31,7 @@ Seconds = Annotated[float, Field(gt=0, le=3600)]
 class ReportConfig(BaseModel):
     """Settings of a report; every field has a default and unknown fields are refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
     #: Root seed of the test records.
     seed: Annotated[int, Field(ge=0, lt=SEEDS)] = 0
@@ -80,5 +80,4 @@ def report_config(file: Path | None = None, *, seed: int | None = None, quick: b
     BadInput
         If the file cannot be read, is not TOML, or a field is unknown or out of its range.
     """
-    where = str(file) if file is not None else "report settings"
-    return build_settings(ReportConfig, (QUICK if quick else {}) | given_settings(file, seed=seed), where=where)
+    return build_settings(ReportConfig, file, QUICK if quick else {}, seed=seed)
