@@ -20,6 +20,7 @@ BATCHES = (1, 64)
 
 def time_chain(
     models: Mapping[str, bytes],
+    classifiers: Mapping[str, Classifier],
     iq: NDArray[np.complex64],
     *,
     carrier_hz: float,
@@ -33,7 +34,9 @@ def time_chain(
     Parameters
     ----------
     models : mapping of str to bytes
-        Name to sealed ONNX model.
+        Name to sealed ONNX model, timed on inputs that are ready.
+    classifiers : mapping of str to Classifier
+        What answers: these models, and what is made of several of them.
     iq : (64 or more, pulses) complex64
         Records; the batches take them in rotation.
     carrier_hz, prf_hz : float
@@ -50,11 +53,12 @@ def time_chain(
     list of dict
         One a batch size: ``batch`` and ``stages``, a list of ``{"stage", "name", "median_us", "p99_us", "passed_us",
         "rounds", "ratio_to_fft", "ratio_low", "ratio_high"}`` (see `timing.quote` and `timing.ratio`); stage is "fft",
-        "input" (name: the input), "model" or "chain" (name: the model). Times are a record (see `timing.quote`).
+        "input" (name: the input), "model" (name: the model) or "chain" (name: the classifier). Times are a record (see
+        `timing.quote`).
     """
     results = []
     for place, batch in enumerate(BATCHES):
-        works = _works(models, iq, batch, carrier_hz=carrier_hz, prf_hz=prf_hz)
+        works = _works(models, classifiers, iq, batch, carrier_hz=carrier_hz, prf_hz=prf_hz)
 
         def share(done: float, place: int = place) -> None:
             if on_share is not None:
@@ -72,10 +76,15 @@ def time_chain(
 
 
 def _works(
-    models: Mapping[str, bytes], iq: NDArray[np.complex64], batch: int, *, carrier_hz: float, prf_hz: float
+    models: Mapping[str, bytes],
+    classifiers: Mapping[str, Classifier],
+    iq: NDArray[np.complex64],
+    batch: int,
+    *,
+    carrier_hz: float,
+    prf_hz: float,
 ) -> dict[tuple[str, str], Work]:
     """Build the work of each step, keyed (stage, name); every call takes the next batch of the records."""
-    classifiers = {name: Classifier(content, source=name) for name, content in models.items()}
     wanted = tuple(dict.fromkeys(name for classifier in classifiers.values() for name in classifier.inputs))
     batches = [iq[start : start + batch] for start in range(0, iq.shape[0] - batch + 1, batch)]
     ready = [model_inputs(some, carrier_hz=carrier_hz, prf_hz=prf_hz, names=wanted) for some in batches]
@@ -84,8 +93,8 @@ def _works(
     works: dict[tuple[str, str], Work] = {("fft", "fft"): in_turn([partial(scipy.fft.fft, some) for some in batches])}
     for name in wanted:
         works["input", name] = in_turn([partial(make, some, names=(name,)) for some in batches])
-    for name, classifier in classifiers.items():
-        works["model", name] = _network(models[name], classifier.inputs, ready)
+    for name, content in models.items():
+        works["model", name] = _network(content, classifiers[name].inputs, ready)
     for name, classifier in classifiers.items():
         answer = partial(classifier.predict, carrier_hz=carrier_hz, prf_hz=prf_hz)
         works["chain", name] = in_turn([partial(answer, some) for some in batches])

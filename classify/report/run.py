@@ -22,6 +22,7 @@ from bladewing.simulate import Radar, Records, draw_records
 from numpy.typing import NDArray
 
 from ..bounds import MOST_MODEL_BYTES
+from ..cascade import Cascade
 from ..dataset import simulator_digest
 from ..errors import BadInput
 from ..files import read_bounded, result_folder, settle, write_together
@@ -86,10 +87,16 @@ def measure(
     """
     classifiers = {name: Classifier(content, source=name) for name, content in models.items()}
     trained = (account or {}).get("models", {})
+    given = {
+        name: Given((content,), classifiers[name].inputs, trained.get(name, {}).get("seconds"))
+        for name, content in models.items()
+    }
+    cascades = _cascade(given, account)
+    answering = classifiers | {name: Cascade(*((one, name) for one in both.files)) for name, both in cascades.items()}
 
     def scored() -> dict[str, Any]:
         with progress.phase("Scoring records", config.records) as done:
-            truth, answers = evaluate.ask(classifiers, records=config.records, seed=config.seed, on_records=done)
+            truth, answers = evaluate.ask(answering, records=config.records, seed=config.seed, on_records=done)
         found = {name: scores.score(truth, given) for name, given in answers.items()}
         return {"records": scores.describe_records(truth), "scores": found}
 
@@ -97,6 +104,7 @@ def measure(
         with progress.phase("Timing every step", 1.0) as done:
             return cost.time_chain(
                 models,
+                answering,
                 reference.iq,
                 carrier_hz=REFERENCE.carrier_hz,
                 prf_hz=REFERENCE.prf_hz,
@@ -127,18 +135,15 @@ def measure(
     reference = draw_records(REFERENCE, config.reference_records, config.seed, purpose=REFERENCE_PURPOSE)
     chain = parts.take("cost", timed)
     against = parts.take("transforms", transforms)
-    given = {
-        name: Given((content,), classifiers[name].inputs, trained.get(name, {}).get("seconds"))
-        for name, content in models.items()
-    }
-    given |= _in_eight_bits(given) | _cascade(given, account)
-    compared = measure_front(given, config, REFERENCE, parts=parts, phase=progress.phase)
+    compared = measure_front(
+        given | _in_eight_bits(given) | cascades, config, REFERENCE, parts=parts, phase=progress.phase
+    )
     return {
         "config": config.model_dump(mode="json"),
         "machine": machine,
         "classes": list(CLASSES),
         "records": seen["records"],
-        "models": [_describe(name, content, classifiers[name]) for name, content in models.items()],
+        "models": [_describe(name, (given | cascades)[name].files, one) for name, one in answering.items()],
         "scores": seen["scores"],
         "reference": {"carrier_hz": REFERENCE.carrier_hz, "prf_hz": REFERENCE.prf_hz, "pulses": REFERENCE.pulses},
         "cost": {"threads": 1, "batches": chain},
@@ -166,7 +171,7 @@ def _in_eight_bits(given: Mapping[str, Given]) -> dict[str, Given]:
 
 
 def _cascade(given: Mapping[str, Given], account: Mapping[str, Any] | None) -> dict[str, Given]:
-    """The cascade that the training tells of, where its two models are among those given: only for the front."""
+    """The cascade that the training tells of, where its two models are among those given."""
     stages = ((account or {}).get(CASCADE) or {}).get(STAGES_KEY, ())
     if not stages or not given.keys() >= set(stages):
         return {}
@@ -196,12 +201,12 @@ def _training(account: Mapping[str, Any] | None) -> dict[str, Any] | None:
     }
 
 
-def _describe(name: str, content: bytes, classifier: Classifier) -> dict[str, Any]:
-    """Tell what a model file is."""
+def _describe(name: str, files: tuple[bytes, ...], classifier: Classifier) -> dict[str, Any]:
+    """Tell what a model is: one file, or of a cascade the two that others tell of."""
     return {
         "name": name,
-        "bytes": len(content),
-        "sha256": hashlib.sha256(content).hexdigest(),
+        "bytes": sum(map(len, files)),
+        "sha256": hashlib.sha256(files[0]).hexdigest() if len(files) == 1 else None,
         "version": classifier.metadata.get("version"),
         "inputs": list(classifier.inputs),
         "input_bytes": sum(4 * int(np.prod(INPUT_SHAPES[one])) for one in classifier.inputs),

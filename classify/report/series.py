@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from bladewing.models import LADDER as _KNOWN
 
+from ..ladder import CASCADE
 from .svg import MARKERS, SERIES
 
 # From cheap to dear, as the tables list them. A known model keeps its look whatever else is on the page.
-LADDER = tuple(_KNOWN)
+LADDER = (*_KNOWN, CASCADE)
 
 
 @dataclass(frozen=True)
@@ -33,8 +34,8 @@ class Look:
 
 
 def looks(models: Sequence[str]) -> dict[str, Look]:
-    """Give each model its look; strangers take the colours after the known ones in turn, with the last marker, then the
-    one before it.
+    """Give each model its look; strangers take the colours that no known model on the page has, in turn, with the last
+    marker, then the one before it.
 
     Parameters
     ----------
@@ -45,19 +46,18 @@ def looks(models: Sequence[str]) -> dict[str, Look]:
     dict of str to Look
     """
     strangers = [name for name in models if name not in LADDER]
-    spare = len(SERIES) - len(LADDER)
-    number = {
-        name: LADDER.index(name) if name in LADDER else len(LADDER) + strangers.index(name) % spare for name in models
-    }
-    marker = {name: len(MARKERS) - 1 - place // spare for place, name in enumerate(strangers)}
+    number = {name: LADDER.index(name) for name in models if name in LADDER}
+    free = _free(number.values())
+    number |= {name: free[place % len(free)] for place, name in enumerate(strangers)}
+    marker = {name: len(MARKERS) - 1 - place // len(free) for place, name in enumerate(strangers)}
     return {name: Look(number[name], marker.get(name, number[name]) % len(MARKERS)) for name in models}
 
 
 def choice_looks(choices: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], Look]:
     """Give each choice of the front its look, by name and kind.
 
-    Models keep theirs. What was trained here has a colour a family (all STFTs share one), from the last colour
-    backwards, so that neighbours on the page differ from the models; settings of a family differ by their marker.
+    Models keep theirs. What was trained here has a colour a family (all STFTs share one), of those that no model has,
+    from the last backwards; settings of a family, and families of one colour, differ by their marker.
 
     Parameters
     ----------
@@ -72,14 +72,19 @@ def choice_looks(choices: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], 
     others = [row["name"] for row in choices if row["kind"] != "model"]
     families = list(dict.fromkeys(name.split("-")[0] for name in others))
     found = {(name, "model"): look for name, look in given.items()}
+    free = _free(look.number for look in given.values())[::-1]
+    outlines = range(len(MARKERS))
     for row in choices:
         if row["kind"] != "model":
             family = row["name"].split("-")[0]
-            among = [name for name in others if name.split("-")[0] == family]
-            place = families.index(family)
-            number = (len(SERIES) - 1 - place) % len(SERIES)
-            # a lone one takes a marker that no model has: its colour may be a model's
-            spare = len(LADDER) + place % (len(MARKERS) - 1 - len(LADDER))
-            outline = spare if len(among) == 1 else among.index(row["name"]) % len(MARKERS)
-            found[row["name"], row["kind"]] = Look(number, outline)
+            number = free[families.index(family) % len(free)]
+            alone = sum(name.split("-")[0] == family for name in others) == 1
+            possible = (Look(number, outline) for outline in (outlines[::-1] if alone else outlines))
+            found[row["name"], row["kind"]] = next(look for look in possible if look not in found.values())
     return found
+
+
+def _free(taken: Iterable[int]) -> list[int]:
+    """Numbers of the colours that are not taken; all of them where none is left."""
+    numbers, held = range(len(SERIES)), set(taken)
+    return [one for one in numbers if one not in held] or list(numbers)

@@ -37,7 +37,10 @@ def test_report_holds_the_data_of_every_figure(report: dict[str, Any]) -> None:
         *("trade", "front", "fft_against_stft", "time_law", "storage", "examples", "stft_pictures", "tables"),
         *("training", "config", "families"),
     }
-    assert [model["name"] for model in report["models"]] == ["spectrum-cnn", "always-uav"]
+    assert [model["name"] for model in report["models"]] == ["spectrum-cnn", "always-uav", "cascade"]
+    first, second, both = report["models"]
+    assert both["bytes"] == first["bytes"] + second["bytes"]
+    assert (both["sha256"], both["inputs"]) == (None, first["inputs"])
     for found in report["scores"].values():
         assert set(found) == {
             *("refused", "accuracy", "design_effect", "balanced_accuracy", "recall", "confusion", "uav_at_pfa"),
@@ -47,6 +50,7 @@ def test_report_holds_the_data_of_every_figure(report: dict[str, Any]) -> None:
         assert {(row["stage"], row["name"]) for row in part["stages"]} == {
             *(("fft", "fft"), ("input", "features")),
             *((stage, name) for stage in ("model", "chain") for name in ("spectrum-cnn", "always-uav")),
+            ("chain", "cascade"),
         }
         assert all(row["ratio_to_fft"] > 0 for row in part["stages"])
         assert part["stages"][0]["ratio_to_fft"] == 1.0
@@ -231,7 +235,10 @@ def test_an_interrupted_run_goes_on_where_it_stopped(
     with pytest.raises(KeyboardInterrupt):
         run_report(tmp_path, **call)
     (kept,) = (tmp_path / "report-parts").glob("*/scores.json")
-    assert json.loads(kept.read_text())["scores"] == report["scores"]
+    # here no train.json tells of a cascade
+    assert json.loads(kept.read_text())["scores"] == {
+        name: found for name, found in report["scores"].items() if name != "cascade"
+    }
 
 
 def test_no_models_is_one_clear_line(tmp_path: Path) -> None:
