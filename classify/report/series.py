@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,7 +47,7 @@ def looks(models: Sequence[str]) -> dict[str, Look]:
     """
     strangers = [name for name in models if name not in LADDER]
     number = {name: LADDER.index(name) for name in models if name in LADDER}
-    free = _free(number.values())
+    free = [one for one in range(len(SERIES)) if one not in number.values()] or list(range(len(SERIES)))
     number |= {name: free[place % len(free)] for place, name in enumerate(strangers)}
     marker = {name: len(MARKERS) - 1 - place // len(free) for place, name in enumerate(strangers)}
     return {name: Look(number[name], marker.get(name, number[name]) % len(MARKERS)) for name in models}
@@ -56,8 +56,8 @@ def looks(models: Sequence[str]) -> dict[str, Look]:
 def choice_looks(choices: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], Look]:
     """Give each choice of the front its look, by name and kind.
 
-    Models keep theirs. What was trained here has a colour a family (all STFTs share one), of those that no model has,
-    from the last backwards; settings of a family, and families of one colour, differ by their marker.
+    Models keep theirs. What was trained here has a colour a family (all STFTs share one), first those that no model
+    has, from the last backwards; settings of a family, and what shares a colour, differ by their marker.
 
     Parameters
     ----------
@@ -72,19 +72,14 @@ def choice_looks(choices: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], 
     others = [row["name"] for row in choices if row["kind"] != "model"]
     families = list(dict.fromkeys(name.split("-")[0] for name in others))
     found = {(name, "model"): look for name, look in given.items()}
-    free = _free(look.number for look in given.values())[::-1]
+    taken = {look.number for look in given.values()}
+    turn = sorted(range(len(SERIES)), key=lambda number: (number in taken, -number))
     outlines = range(len(MARKERS))
     for row in choices:
         if row["kind"] != "model":
             family = row["name"].split("-")[0]
-            number = free[families.index(family) % len(free)]
+            number = turn[families.index(family) % len(turn)]
             alone = sum(name.split("-")[0] == family for name in others) == 1
             possible = (Look(number, outline) for outline in (outlines[::-1] if alone else outlines))
             found[row["name"], row["kind"]] = next(look for look in possible if look not in found.values())
     return found
-
-
-def _free(taken: Iterable[int]) -> list[int]:
-    """Numbers of the colours that are not taken; all of them where none is left."""
-    numbers, held = range(len(SERIES)), set(taken)
-    return [one for one in numbers if one not in held] or list(numbers)
