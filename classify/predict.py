@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -116,7 +117,7 @@ class Answer:
         yield {"file": self.name, "track": track}
 
     def print(self, console: "Console") -> None:
-        """Write a table, one line a dwell, and the line of the recording."""
+        """Write a table, one line a dwell or a run of dwells refused alike, and the line of the recording."""
         from rich.table import Table
         from rich.text import Text
 
@@ -125,17 +126,16 @@ class Answer:
             table.columns[column].justify = "right"
         for column in range(6):
             table.columns[column].no_wrap = True
-        before = ""
-        for row in list(self.json_objects())[:-1]:
-            reason = row["reason"] or ""
+        for _, alike in groupby(list(self.json_objects())[:-1], _refused_alike):
+            row, *others = alike
+            last, reason = others[-1] if others else row, row["reason"] or ""
             table.add_row(
                 f"{row['start_s']:.3f}",
-                f"{row['stop_s']:.3f}",
+                f"{last['stop_s']:.3f}",
                 Text(row["label"], style=_COLOURS[row["label"]]),
                 *(f"{row['probabilities'][name]:.2f}" for name in CLASSES),
-                Text("as above" if reason and reason == before else reason),
+                Text(f"{len(others) + 1} dwells: {reason}" if others else reason),
             )
-            before = reason
         console.print(Text(one_line(self.name), style="bold"), soft_wrap=True)
         console.print(table)
         shares = "  ".join(f"{name} {share:.2f}" for name, share in zip(CLASSES, self.track.probabilities, strict=True))
@@ -276,6 +276,11 @@ def checked_dwell_s(dwell_s: float) -> float:
         It is not a finite number above 0.
     """
     return positive(dwell_s, "--dwell [s]")
+
+
+def _refused_alike(row: Mapping[str, Any]) -> Any:
+    """What the dwells of one line of the table have in common: the reason and the probabilities, or the start alone."""
+    return (row["reason"], row["probabilities"]) if row["reason"] else row["start_s"]
 
 
 def _named(probabilities: np.ndarray) -> dict[str, float]:
