@@ -176,8 +176,8 @@ def write_dataset(folder: Path, plan: Plan, bars: Progress, *, workers: int | No
         contents = _begun(folder, plan, bars)
         missing = [shard for shard in plan.shards() if shard.name not in contents]
         _require_room(folder, plan, missing)
-        _write_manifest(folder, plan, contents)
         if missing:
+            _write_manifest(folder, plan, contents)
             total, done = sum(shard.records for shard in missing), 0
             with bars.phase(f"write {total} records", total) as on_done:
                 drawn = in_order(partial(_draw, folder, plan.seed), missing, workers)
@@ -216,6 +216,7 @@ def _writable(folder: Path) -> Iterator[None]:
 def _begun(folder: Path, plan: Plan, bars: Progress) -> dict[str, Contents]:
     """The shards that an earlier run left whole."""
     manifest = _read_manifest(folder)
+    ours = True
     if manifest is None:
         if any(not path.name.startswith(".bladewing-") for path in folder.iterdir()):
             raise BadInput(f"{folder}: not empty, and it holds no {MANIFEST}: give a new folder")
@@ -227,8 +228,7 @@ def _begun(folder: Path, plan: Plan, bars: Progress) -> dict[str, Contents]:
                 f"{folder}: holds another data set (seed {found.seed}, records {found.records}; asked for: seed "
                 f"{plan.seed}, records {plan.records}): give another folder"
             )
-        if simulator != simulator_digest() and len(contents) < len(plan.shards()):
-            raise BadInput(f"{folder}: begun with another simulator or on another machine: give another folder")
+        ours = simulator == simulator_digest()
     clear_litter(folder)
     if contents:
         with bars.phase(f"check {len(contents)} shards", len(contents)) as on_done:
@@ -236,6 +236,9 @@ def _begun(folder: Path, plan: Plan, bars: Progress) -> dict[str, Contents]:
                 if not intact(folder, name, listed):
                     del contents[name]
                 on_done(number + 1)
+    # shards of two simulators are no data set; what is whole may be of another
+    if not ours and len(contents) < len(plan.shards()):
+        raise BadInput(f"{folder}: begun with another simulator or on another machine: give another folder")
     return contents
 
 

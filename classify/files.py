@@ -171,12 +171,13 @@ def write_together(folder: str | os.PathLike[str], files: Mapping[str, bytes | s
     folder
         An existing folder.
     files
-        File name to content; other files of the folder stay.
+        File name to content; other files of the folder stay. A link of that name is replaced, not followed.
 
     Raises
     ------
     OSError
-        The folder is not writable, or the disk is full. Nothing is changed then.
+        The folder is not writable, or the disk is full. Nothing is changed then, unless the system refuses one rename
+        after it did another: `settle` tries again.
     """
     place = Path(folder)
     with only_writer(place):

@@ -273,6 +273,7 @@ def in_order(work: Callable[[Task], Done], tasks: Sequence[Task], workers: int |
         yield from map(work, tasks)
         return
     # spawn, not fork: a fork of a process with threads (torch, onnxruntime) may hang
+    others = set(active_children())
     pool_of = partial(ProcessPoolExecutor, mp_context=get_context("spawn"), initializer=_end_with_parent)
     with pool_of(min(workers, len(tasks))) as pool:
         waiting: list[Future[Done]] = []
@@ -286,7 +287,7 @@ def in_order(work: Callable[[Task], Done], tasks: Sequence[Task], workers: int |
                 yield waiting.pop(0).result()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
-            for worker in active_children():  # else what they have begun is waited for
+            for worker in set(active_children()) - others:  # else what they have begun is waited for
                 worker.terminate()
             raise
 

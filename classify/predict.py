@@ -45,7 +45,7 @@ _COLOURS = {"uav": "bold red", "bird": "green", "clutter": "cyan", UNKNOWN: "yel
 def terms(point: "OperatingPoint") -> str:
     """Say what a chosen false-alarm rate costs."""
     return (
-        f"uav from {point.threshold:.4f} on: at most {point.false_alarm:.2g} of birds and clutter are named uav, and "
+        f"uav from {point.threshold:.4f} on: at most {point.false_alarm:.4g} of birds and clutter are named uav, and "
         f"{point.detection:.3f} of UAVs (synthetic calibration records of the whole envelope)"
     )
 

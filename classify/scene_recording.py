@@ -3,13 +3,14 @@
 import hashlib
 import json
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .errors import BadInput
-from .files import read_bounded, write_together
+from .files import read_bounded, settle, write_together
 
 if TYPE_CHECKING:
     from bladewing.simulate.render import Rendering
@@ -54,6 +55,8 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
         raise BadInput(f"{stem}: no name for the recording: give --out NAME")
     if not np.isfinite(rendering.iq).all():
         raise BadInput(f"{stem}: the scene's samples exceed what complex64 holds: lower its levels")
+    with suppress(OSError):  # a folder that is missing or cannot be written to is told below
+        settle(stem.parent)
     if foreign := _foreign(stem.parent / f"{name}.sigmf-meta", stem.parent / f"{name}.sigmf-data"):
         raise BadInput(f"{foreign} is there and was not simulated: it is not written over: give another --out NAME")
     data = rendering.iq.astype("<c8").tobytes()

@@ -228,11 +228,16 @@ def _check_captures(captures: list[dict[str, Any]], path: Path) -> None:
                 f"{path}: captures[{index + 1}] starts at sample {following}, captures[{index}] at {start}: "
                 "they must follow one another: put them in order"
             )
-        places = [_count(entry, _INDEX, f"{path}: captures") for entry in (one, two) if _INDEX in entry]
-        if len(places) == 2 and places[1] - places[0] != following - start:
-            missing = places[1] - places[0] - (following - start)
+    # the index is optional: a capture without it is one with those about it
+    places = [
+        (number, entry["core:sample_start"], _count(entry, _INDEX, f"{path}: captures"))
+        for number, entry in enumerate(captures)
+        if _INDEX in entry
+    ]
+    for (one, start, place), (two, following, later) in pairwise(places):
+        if missing := later - place - (following - start):
             raise BadInput(
-                f"{path}: {missing} samples are missing between captures[{index}] and captures[{index + 1}] "
+                f"{path}: {missing} samples are missing between captures[{one}] and captures[{two}] "
                 f"({_INDEX}): store each run in a recording of its own"
             )
 

@@ -16,11 +16,11 @@ from bladewing.models import LADDER
 from bladewing.simulate.dataset import KIND_CLASS
 from numpy.typing import NDArray
 
-from .dataset import DataSet, Plan, simulator_digest
+from .dataset import SHARD_RECORDS, DataSet, Plan, simulator_digest
 from .envelope import Envelope
 from .errors import BadInput
 from .files import result_folder, write_together
-from .gather import Gathered, Sets, gather, gather_from, inputs_digest
+from .gather import TASK_RECORDS, Gathered, Sets, gather, gather_from, inputs_digest
 from .inference import COVERAGES, CURVE_KEY, KINDS_KEY, SETS_KEY, Classifier
 from .labels import CLASSES
 from .ladder import CASCADE
@@ -85,6 +85,7 @@ def run_training(
         out / PARTS,
         {
             "settings": settings.model_dump(mode="json"),
+            "run_records": TASK_RECORDS if stored is None else SHARD_RECORDS,  # kept parts hold so many of these
             "simulator_sha256": simulator,
             "inputs_sha256": inputs_digest(),
             "schema_sha256": schema_hash(),

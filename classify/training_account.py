@@ -80,7 +80,7 @@ def print_table(account: dict[str, Any], out: Path) -> None:
     console.print(
         "accuracy  balanced over the classes; radars of 2 to 100 GHz, dwells from 5 ms,\n"
         "          SNR from -20 dB: many records hold nothing to see\n"
-        f"found     UAVs found where {account['false_alarm']:.0%} of birds and clutter would be called UAV\n"
+        f"found     UAVs found where {100 * account['false_alarm']:.3g}% of birds and clutter would be called UAV\n"
         "false     birds and clutter that are named UAV\n"
         "named     records not answered 'unknown'; right: how many of these are right\n"
         "ECE       expected calibration error of the probabilities\n"

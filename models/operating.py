@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._checks import CLASS_COUNT, require_finite, require_labels
+from .calibration import NEVER
 
 #: False alarms that a threshold must rest on: with fewer its rate is wrong by more than a third (1 / sqrt(10)).
 SUPPORT = 10
 
-# Renard's series R10 (ISO 3), falling: with each rate its half is there too, which a cascade gives each of its models.
+# Renard's series R10 (ISO 3), falling: with most rates their half is there too, which a cascade gives each model.
 _RATES = (5.0, 4.0, 3.15, 2.5, 2.0, 1.6, 1.25, 1.0, 0.8, 0.63)
 _EVERY_WIN = 0.3333333  # the most probable of three reaches it
 
@@ -114,7 +115,8 @@ class OperatingCurve:
         try:
             table = json.loads(text)
             rows = np.array([[float(value) for value in row] for row in table["points"]]).reshape(-1, 3)
-            if not np.all((rows >= 0) & (rows <= 1)) or np.any(np.diff(rows[:, 0]) >= 0):
+            # a threshold just above the probability 1 is one that nothing reaches
+            if not np.all((rows >= 0) & (rows <= [1, NEVER, 1])) or np.any(np.diff(rows[:, 0]) >= 0):
                 raise ValueError("rates, thresholds and detections must lie in 0 to 1, the rates falling")
             points = tuple(OperatingPoint(*row) for row in rows.tolist())
             return cls(int(table["uavs"]), int(table["others"]), points)

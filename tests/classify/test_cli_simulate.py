@@ -1,6 +1,7 @@
 """`bladewing simulate`: a scene in, a SigMF recording with its truth out, or one line a problem and nothing."""
 
 import json
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -80,6 +81,25 @@ def test_a_recording_that_was_not_simulated_is_not_written_over(scene_file, tmp_
     assert main(["simulate", str(scene_file), "--out", str(tmp_path / "own")]) == 0
     assert main(["simulate", str(scene_file), "--out", str(tmp_path / "own"), "--seed", "2"]) == 0
     assert json.loads((tmp_path / "own.sigmf-meta").read_text())["global"]["bladewing:seed"] == 2
+
+
+def test_the_same_command_goes_on_after_it_was_killed_between_two_files(scene_file, tmp_path, monkeypatch, capsys):
+    replace, done = os.replace, []
+
+    def once(source, target):
+        if not str(target).endswith(".json"):
+            if done:
+                raise KeyboardInterrupt
+            done.append(target)
+        replace(source, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", once)
+        assert main(["simulate", str(scene_file), "--out", str(tmp_path / "rec")]) != 0
+    assert not (tmp_path / "rec.sigmf-meta").exists()
+    assert main(["simulate", str(scene_file), "--out", str(tmp_path / "rec"), "--seed", "2"]) == 0
+    assert json.loads((tmp_path / "rec.sigmf-meta").read_text())["global"]["bladewing:seed"] == 2
+    assert sorted(path.suffix for path in tmp_path.glob("rec*")) == [".sigmf-data", ".sigmf-meta"]
 
 
 def test_the_recording_holds_the_scene_it_was_made_from(scene_file, tmp_path):

@@ -202,6 +202,17 @@ def test_another_simulator_does_not_go_on_with_a_data_set(copy, monkeypatch):
         write(copy)
 
 
+def test_a_whole_data_set_of_another_simulator_stays_what_it_is(copy, monkeypatch):
+    monkeypatch.setattr(module, "simulator_digest", lambda: "0" * 64)
+    before = content(copy)
+    assert write(copy) == 0
+    assert content(copy) == before
+    (copy / "test-00000.iq.npy").unlink()
+    with pytest.raises(BadInput, match="another simulator"):
+        write(copy)
+    assert (copy / MANIFEST).read_bytes() == before[MANIFEST]
+
+
 def altered(manifest, **changes):
     return json.dumps(manifest | changes)
 

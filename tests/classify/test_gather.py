@@ -3,6 +3,7 @@ import signal
 import subprocess
 import sys
 import time
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -156,3 +157,16 @@ def test_an_interrupt_is_the_parent_s_alone(tmp_path):
     script.write_text(INTERRUPTED)
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, start_new_session=True, timeout=120)
     assert (done.stdout, done.stderr, done.returncode) == ("stopped\n", "", 0)
+
+
+def test_a_worker_of_the_caller_s_own_outlives_tasks_that_are_given_up():
+    own = get_context("spawn").Process(target=time.sleep, args=(30,))
+    own.start()
+    try:
+        tasks = gather_module.in_order(abs, [-1, -2, -3, -4], workers=2)
+        assert next(tasks) == 1
+        tasks.close()
+        assert own.is_alive()
+    finally:
+        own.terminate()
+        own.join()

@@ -285,6 +285,9 @@ def test_a_hole_between_captures_is_refused_and_the_first_index_is_the_start(sig
     assert load_recording(sigmf_pair(captures=whole)).start_s == pytest.approx(500 / PRF_HZ)
     with pytest.raises(BadInput, match="997 samples are missing between captures"):
         load_recording(sigmf_pair(captures=[whole[0], capture(3, **{index: 1500})]))
+    between = [whole[0], capture(2), capture(3, **{index: 1500})]
+    with pytest.raises(BadInput, match=r"997 samples are missing between captures\[0\] and captures\[2\]"):
+        load_recording(sigmf_pair(captures=between))
     with pytest.raises(BadInput, match="they must follow one another"):
         load_recording(sigmf_pair(captures=[capture(3), capture(0)]))
     with pytest.raises(BadInput, match="must be a whole number"):

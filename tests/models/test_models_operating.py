@@ -89,3 +89,6 @@ def test_the_curve_survives_its_text():
     assert len(curve.to_json()) < 2000
     with pytest.raises(ValueError, match="damaged"):
         OperatingCurve.from_json("{}")
+    sure = operating_curve(np.tile([1.0, 0.0, 0.0], (200, 1)), np.repeat([0, 1], 100))  # false ones of probability 1
+    assert OperatingCurve.from_json(sure.to_json()) == sure
+    assert sure.at(0.5).detection == 0
