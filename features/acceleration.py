@@ -5,7 +5,15 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .inputs import in_blocks
-from .spectrum import LEAST_PART, SPEED_OF_LIGHT_MPS, as_complex, largest_part, scaled, unit_scale
+from .spectrum import (
+    LEAST_PART,
+    SPEED_OF_LIGHT_MPS,
+    finite_complex,
+    largest_part,
+    require_radar,
+    scaled,
+    unit_scale,
+)
 
 #: Accelerations that are tried [m/s^2]: five times gravity.
 MAX_MPS2 = 50.0
@@ -55,9 +63,10 @@ def body_acceleration(
     Raises
     ------
     ValueError
-        If `iq` is not complex, or holds a value that is not finite.
+        If `iq` is not complex or holds a value that is not finite, or the frequencies are not positive.
     """
-    samples = as_complex(iq)
+    samples = finite_complex(iq)
+    require_radar(carrier_hz, prf_hz)
     pulses = samples.shape[-1]
     flat = samples.reshape(-1, pulses)
     value, std, smeared = np.full(len(flat), np.nan), np.full(len(flat), np.nan), np.zeros(len(flat), bool)

@@ -46,7 +46,7 @@ class Chopping:
     frequency_hz : ndarray of float32, shape (...)
         Chopping frequency [Hz]; NaN where the dwell holds no range to search.
     strength : ndarray of float32, shape (...)
-        Prominence of its peak over the rms of the cepstrum of noise [1]; below 4 in noise.
+        Prominence of its peak over the rms of the cepstrum of noise [1]; seldom over 4 in noise.
     repeats : ndarray of float32, shape (...)
         Mean height at two and three times the period over the height at the period [1]: a comb of narrow lines repeats.
     """

@@ -59,7 +59,7 @@ def entropy(energy: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def ripple_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
-    """Standard deviation of the level outside the notches [dB]: 5.6 for noise, more for lines, shape (...)."""
+    """Standard deviation of the level outside the notches [dB]: 5.0 to 5.4 for noise, more for lines, shape (...)."""
     kept = weights(mask)
     share = 1 / np.maximum(sums(kept), np.float32(1))
     level = spectrum.level_db * kept

@@ -14,7 +14,7 @@ from .comb import find_comb
 from .following import by_recording, normed
 from .one_thread import one_thread
 from .periodogram import prepare
-from .spectrum import SPEED_OF_LIGHT_MPS
+from .spectrum import SPEED_OF_LIGHT_MPS, require_radar
 
 #: Length of a dwell [s], short enough for a rate that changes, and its pulses at least and at most: more cost time and
 #: find little more.
@@ -64,7 +64,13 @@ def steady_comb(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: f
     Returns
     -------
     SteadyComb
+
+    Raises
+    ------
+    ValueError
+        If the samples are not complex or not finite, or the frequencies are not positive.
     """
+    require_radar(carrier_hz, prf_hz)
     with one_thread:
         return SteadyComb(*by_recording(iq, lambda samples: _one(samples, carrier_hz, prf_hz)))
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from .blades import TILE_SAMPLES, Array32, Blades, Room
 from .grid import PhaseLaw, PulseGrid, Sine
 from .radar import Radar
-from .rotor import RotorMotion
+from .rotor import MOST_FLOAT32_POINTS, RotorMotion
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Rotor:
     hub : array_like of complex
         Amplitude and phase of the whole rotor: where on the aircraft it sits.
     points : int or None
-        As in `rotor_echo`.
+        As in `rotor_echo`; at most `MOST_FLOAT32_POINTS`.
     """
 
     motion: RotorMotion
@@ -75,7 +75,15 @@ def rotors_echo(
     Returns
     -------
     ndarray of complex64, shape (records, pulses)
+
+    Raises
+    ------
+    ValueError
+        If a blade is a row of more points than float32 can tell apart.
     """
+    most = max((rotor.points or 0 for rotor in rotors), default=0)
+    if most > MOST_FLOAT32_POINTS:
+        raise ValueError(f"points is {most}: it must be at most {MOST_FLOAT32_POINTS}: more take `rotor_echo`")
     shake = (vibration_rad, vibration_hz, vibration_phase_rad)
     grid, path = PulseGrid(radar), _path(radar, velocity_mps, acceleration_mps2, records, shake)
     turning = _turning([rotor.motion for rotor in rotors], records)

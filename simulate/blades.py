@@ -77,7 +77,7 @@ class Blades:
         turn = TWO_PI / max(blades, 1) * np.arange(even.shape[1])
         cosine, sine = np.cos(turn), np.sin(turn)
         root = row_m(root, tip, points)[-1] if points else root
-        half, middle = np.maximum((tip - root) * k_cos_beta, _LEAST_HALF), (tip + root) * k_cos_beta
+        half, middle = np.maximum(np.abs((tip - root) * k_cos_beta), _LEAST_HALF), (tip + root) * k_cos_beta
         half = half / (points - 1) if points and points > 1 else half
         maps = np.zeros((len(half), len(turn), 4, 3), np.float32)
         for number, value in enumerate((half, middle)):

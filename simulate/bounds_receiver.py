@@ -84,8 +84,8 @@ class ReceiverBounds:
         """Most by which an effect makes a change before it larger: a ratio of norms, at least 1."""
         drawn = self.reception.drawn
         return {
-            "fading": float(10 ** (drawn.fading_db[0] / 20)),
-            "colour": float(10 ** (drawn.hump_db[0].sum() / 20)),
+            "fading": float(10 ** (abs(drawn.fading_db[0]) / 20)),
+            "colour": float(10 ** ((np.abs(drawn.hump_db[0]).sum() + max(drawn.tilt_db[0], 0)) / 20)),
             "image": float(1 + 10 ** (drawn.image_db[0] / 20)),
             "analytic": float(np.sqrt(2)),
         }.get(effect, 1.0)

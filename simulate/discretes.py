@@ -122,7 +122,8 @@ def _vehicle_body(
         rows = np.flatnonzero(points > point)
         passing = _passing(radar, x[rows, point], y[rows, point], gone[rows])
         body[rows] += echo[rows, point, None].astype(np.complex64) * passing
-    body /= np.sqrt(mean_power(body))[:, None]
+    power = mean_power(body)  # none where a narrow beam passes by all of it
+    body /= np.sqrt(np.where(power > 0, power, 1))[:, None]
     return body, (speed, pull, ahead, aside, sight, gone)
 
 

@@ -27,6 +27,8 @@ MOST_POINTS = 1000
 #: (Billingsley's has none in still air), a gait or a texture, and what float32 holds.
 BOUNDS = {
     "wheels": (1, 4),
+    "body_points": (1, 48),
+    "sight_rad": (-1.56, 1.56),
     "spokes": (1, 10),
     "tyre_points": (1, 60),
     "turbine_points": (3, 30),
@@ -35,10 +37,12 @@ BOUNDS = {
     "wind_mph": (0.5, 200),
     "gait_hz": (0.05, 20),
     "texture_hz": (1e-6, 1000),
-    "fading_db": (-200, 200),
-    "flicker_db": (-200, 200),
+    "high_pass_hz": (1e-6, 1e9),
     "adc_bits": (1, 24),
 }
+
+#: The same of every level [dB].
+LEVEL_BOUNDS_DB = (-200, 200)
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-MOST, le=MOST)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=MOST)]
@@ -283,7 +287,7 @@ def _known_laws(values: dict[str, float]) -> dict[str, float]:
         law = laws[name]
         if law.kind == "log" and value <= 0:
             raise ValueError(f"{name} is {value}: it must be above 0 [{law.unit}]")
-        low, high = BOUNDS.get(name, (-math.inf, math.inf))
+        low, high = BOUNDS.get(name, LEVEL_BOUNDS_DB if law.unit == "dB" else (-math.inf, math.inf))
         if not low <= value <= high:
             raise ValueError(f"{name} is {value}: it must be {low:g} to {high:g} [{law.unit}]")
     return values

@@ -101,8 +101,11 @@ class Reception:
 
     def __init__(self, scene: Setting, seed: int) -> None:
         part, self.radar, self._seed = scene.receiver, scene.sight, seed
-        self.drawn = Receiver(Chosen(stream(seed, "receiver").random((1, WIDTH)), part.values))
-        self.drawn.gain_db = np.zeros(1)
+        draws = Chosen(stream(seed, "receiver").random((1, WIDTH)), part.values)
+        self.drawn = Receiver(draws)
+        self.drawn.gain_db = np.zeros(1)  # the levels of a scene are those of its samples
+        #: Names of fixed values that it has no use for.
+        self.unused = sorted(draws.unused | ({"gain_db"} & set(part.values)))
         if part.mains_hz is not None:
             follow = np.where(self.drawn.bursts_of_mains, part.mains_hz / self.drawn.mains_hz, 1.0)
             self.drawn.burst_hz = self.drawn.burst_hz * follow

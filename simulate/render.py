@@ -79,6 +79,7 @@ def render(scene: Setting, seed: int = 0, *, plan: Plan | None = None) -> Render
         warnings += [f"{part.name}.values: {name} changes nothing of a clutter of kind {part.kind}" for name in unused]
         truth.append({"name": part.name, "label": "clutter", "kind": part.kind, "level_db": part.level_db, **drawn})
     reception = Reception(scene, seed)
+    warnings += [f"receiver.values: {name} changes nothing of a receiver" for name in reception.unused]
     kept = plan.receiver & reception.effects if plan else reception.effects
     iq = reception.receive(signal.astype(np.complex64), kept)
     return Rendering(radar, iq, truth, warnings)

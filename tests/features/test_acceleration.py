@@ -2,6 +2,8 @@ import numpy as np
 import pytest
 from bladewing.features import measure
 from bladewing.features.acceleration import body_acceleration, without_acceleration
+from bladewing.features.heave import heave
+from bladewing.features.steady_comb import steady_comb
 from bladewing.simulate import Scene
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
@@ -87,3 +89,15 @@ def test_blades_and_a_background_beside_the_line_show_in_its_deviation(airframe,
     assert not smeared.any()
     # one in ten at most: of a few draws alone, more or fewer by chance
     assert (np.abs(found) > 4 * std).mean() <= 1 / 10
+
+
+@pytest.mark.parametrize("pulses", [8, 500])
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_what_is_not_finite_and_no_radar_are_refused(pulses, wrong):
+    iq = tone(0.1, pulses) if pulses > 100 else np.ones(pulses, np.complex64)
+    for find in (body_acceleration, heave, steady_comb):
+        for radar in ({**RADAR, "carrier_hz": 0.0}, {**RADAR, "prf_hz": -1.0}):
+            with pytest.raises(ValueError, match="must be a finite number above 0"):
+                find(iq, **radar)
+        with pytest.raises(ValueError, match="not finite"):
+            find(np.where(np.arange(pulses) == 3, wrong, iq).astype(np.complex64), **RADAR)

@@ -94,6 +94,11 @@ def test_batch_equals_loop_bit_by_bit():
         np.testing.assert_array_equal(rotors_echo(RADAR, alone, 1, velocity_mps=float(i))[0], whole[i])
 
 
+def test_rows_of_more_points_than_float32_tells_apart_are_refused():
+    with pytest.raises(ValueError, match="points is 65: it must be at most 64"):
+        rotors_echo(RADAR, [Rotor(RotorMotion(80.0, 0.0), blade_length_m=0.2, points=65)], 1)
+
+
 def test_equal_blades_without_asymmetry_have_a_real_echo_at_a_real_hub():
     rotor = Rotor(RotorMotion(80.0, 0.3), blade_length_m=0.2, blade_amplitudes=(1.0, 1.0, 1.0, 1.0))
     echo = rotors_echo(RADAR, [rotor], 1)

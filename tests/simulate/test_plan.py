@@ -301,6 +301,27 @@ def test_every_bound_of_a_receiver_holds_and_is_not_idle(effect, others):
     assert np.median(ratios) <= 10
 
 
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        ("fading", {"fading_db": -20.0}),
+        ("fading", {"fading_db": 30.0}),
+        ("colour", {"hump_db": -5.0}),
+        ("colour", {"tilt_db": 20.0}),
+        ("colour", {"tilt_db": -20.0, "hump_db": 8.0}),
+    ],
+)
+def test_a_plan_keeps_its_bound_where_a_receiver_swells_what_was_left_out(effect, values):
+    for seed in range(6):
+        base = random_reception(np.random.default_rng(seed), [effect])
+        receiver = {**dict(base.receiver), "values": values}
+        scene = Scene.build({**dict(base), "receiver": receiver})
+        plan = scene.plan(seed, tolerance_db=30.0)
+        error = energy(render(scene, seed, plan=plan).iq.astype(complex) - render(scene, seed).iq)
+        digits = energy(render(scene, seed).iq) * 1e-9  # complex64, and float32 phases of long blades
+        assert error <= 10 ** (plan.error_db / 10) + digits, seed
+
+
 @pytest.mark.parametrize("tolerance_db", [-10.0, 20.0])
 def test_receivers_effects_that_a_plan_leaves_out_stay_below_its_bound(tolerance_db):
     left_out = set()

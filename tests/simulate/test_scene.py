@@ -8,9 +8,11 @@ import pytest
 from bladewing.simulate.bird import wingbeat_hz
 from bladewing.simulate.catalogue import AIRFRAMES, BIRDS
 from bladewing.simulate.clutter import _texture
-from bladewing.simulate.laws import WIDTH
-from bladewing.simulate.parts import BOUNDS
+from bladewing.simulate.insects import INSECT_LAWS
+from bladewing.simulate.laws import LAWS, WIDTH
+from bladewing.simulate.parts import BOUNDS, LEVEL_BOUNDS_DB, MOST
 from bladewing.simulate.radar import Radar
+from bladewing.simulate.receiver import FAULT_CHANCE
 from bladewing.simulate.reception import Chosen, Reception
 from bladewing.simulate.render_bird import _cycle_rad, heave_range_m, members
 from bladewing.simulate.scene import Scene, SceneError, shipped
@@ -353,6 +355,8 @@ def clutter_of(kind: str, seed: int = 0, **values: float):
         ("vehicle", "wheels"),
         ("vehicle", "spokes"),
         ("vehicle", "tyre_points"),
+        ("vehicle", "body_points"),
+        ("vehicle", "sight_rad"),
         ("wind_turbine", "turbine_points"),
         ("wind_turbine", "turbine_row_points"),
         ("insects", "insect_count"),
@@ -365,9 +369,41 @@ def test_values_that_cannot_be_rendered_are_refused_and_those_at_the_bounds_are_
     most = min(high, 3e4)
     for value in (low, most):
         assert all(np.isfinite(clutter_of(kind, seed, **{name: value}).iq).all() for seed in range(6))
-    for value in (low * 0.9, high * 1.1):
+    for value in (low - 0.1 * abs(low), high * 1.1):
         with pytest.raises(SceneError, match=rf"{name} is .*must be"):
             clutter_of(kind, **{name: value})
+
+
+def extremes(name: str) -> tuple[float, float]:
+    """Least and largest value of a parameter that a scene may give; of those that count points, few enough to draw."""
+    law = (LAWS | INSECT_LAWS)[name]
+    low, high = BOUNDS.get(name, LEVEL_BOUNDS_DB if law.unit == "dB" else (-MOST, MOST))
+    return max(low, 1e-12) if law.kind == "log" else low, min(high, 1e4 if name.endswith("_points") else MOST)
+
+
+@pytest.mark.parametrize("kind", ["ground", "rain", "sea", "person", "vehicle", "wind_turbine", "insects"])
+def test_every_parameter_of_a_clutter_is_rendered_at_its_extremes(kind):
+    unknown = clutter_of(kind, **{name: law.low for name, law in (LAWS | INSECT_LAWS).items()}).warnings
+    unused = {line.split(": ")[1].split()[0] for line in unknown}
+    used = sorted((LAWS | INSECT_LAWS).keys() - unused)
+    assert len(used) >= 2
+    for name in used:
+        for value in extremes(name):
+            assert np.isfinite(clutter_of(kind, **{name: value}).iq).all(), (name, value)
+
+
+def test_every_parameter_of_a_receiver_is_rendered_at_its_extremes():
+    part = {"name": "c", "kind": "rain", "level_db": 10.0}
+    for name in LAWS:
+        for value in extremes(name):
+            receiver = {"effects": list(FAULT_CHANCE), "values": {name: value}}
+            scene = Scene.build({"radar": {**RADAR, "pulses": 100}, "clutter": [part], "receiver": receiver})
+            assert np.isfinite(scene.render().iq).all(), (name, value)
+
+
+def test_a_vehicle_that_a_narrow_beam_misses_is_silent():
+    for seed in range(150):
+        assert np.isfinite(clutter_of("vehicle", seed, beam_rad=0.01).iq).all()
 
 
 @pytest.mark.parametrize("pulses", [1, 300])
@@ -381,6 +417,14 @@ def test_a_converter_leaves_silence_silent(pulses):
 def test_a_value_that_a_kind_of_clutter_does_not_know_is_warned_of():
     said = clutter_of("rain", rain_width_mps=2.0, wind_mph=30.0).warnings
     assert [line.partition(": ")[2] for line in said] == ["wind_mph changes nothing of a clutter of kind rain"]
+
+
+def test_a_value_that_no_receiver_knows_is_warned_of():
+    values = {"wind_mph": 30.0, "gain_db": 40.0, "image_db": -20.0}
+    scene = Scene.build({"radar": RADAR, "receiver": {"effects": ["image"], "values": values}})
+    assert scene.render().warnings == [
+        f"receiver.values: {name} changes nothing of a receiver" for name in ("gain_db", "wind_mph")
+    ]
 
 
 def test_a_texture_swells_at_the_rate_that_is_asked_for():
