@@ -234,10 +234,10 @@ def _check_captures(captures: list[dict[str, Any]], path: Path) -> None:
         for number, entry in enumerate(captures)
         if _INDEX in entry
     ]
-    for (one, start, place), (two, following, later) in pairwise(places):
+    for (before, start, place), (after, following, later) in pairwise(places):
         if missing := later - place - (following - start):
             raise BadInput(
-                f"{path}: {missing} samples are missing between captures[{one}] and captures[{two}] "
+                f"{path}: {missing} samples are missing between captures[{before}] and captures[{after}] "
                 f"({_INDEX}): store each run in a recording of its own"
             )
 
