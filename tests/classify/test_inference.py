@@ -157,7 +157,8 @@ def test_outside_the_envelope_every_record_is_unknown_with_the_cure(always_uav):
 def test_too_few_pulses_are_unknown_not_an_error(always_uav, pulses):
     answer = always_uav.predict(noise(pulses), **RADAR)
     assert answer.labels == "unknown"
-    assert str(answer.reasons).startswith(f"{pulses} pulses are fewer than 64: take 100 pulses")
+    few = "1 pulse is" if pulses == 1 else f"{pulses} pulses are"
+    assert str(answer.reasons).startswith(f"{few} fewer than 64: take 100 pulses")
 
 
 def test_the_envelope_is_the_models_own(make_model):
