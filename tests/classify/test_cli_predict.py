@@ -188,8 +188,8 @@ def test_people_get_a_table_that_fits_80_columns(run, sigmf_pair):
     assert lines[3] == "track: uav  uav 0.80  bird 0.15  clutter 0.05  from 1 of 1 dwells"
     assert lines[4] == "declared uav after 0.2 s"
     text = " ".join(out.split())
-    line = "0.000 4.000 unknown 0.33 0.33 0.33 4 dwells: unambiguous"  # one reason for all, in a column that wraps
-    assert line in text
+    assert "unambiguous velocity 7.5 m/s is below 10 m/s" in text
+    assert "0.000 4.000 unknown 0.33 0.33 0.33 4 dwells: unambiguous" in text  # one reason for all
     assert text.count("unknown 0.33") == 1
     assert "from 0 of 4 dwells (no dwell could be judged)" in text
     assert lines[-1] == "2 recordings: 1 uav, 1 unknown"
