@@ -216,7 +216,7 @@ def _writable(folder: Path) -> Iterator[None]:
 def _begun(folder: Path, plan: Plan, bars: Progress) -> dict[str, Contents]:
     """The shards that an earlier run left whole."""
     manifest = _read_manifest(folder)
-    ours = True
+    mixture: BadInput | None = None  # shards of two simulators are no data set; what is whole may be of another
     if manifest is None:
         if any(not path.name.startswith(".bladewing-") for path in folder.iterdir()):
             raise BadInput(f"{folder}: not empty, and it holds no {MANIFEST}: give a new folder")
@@ -228,17 +228,19 @@ def _begun(folder: Path, plan: Plan, bars: Progress) -> dict[str, Contents]:
                 f"{folder}: holds another data set (seed {found.seed}, records {found.records}; asked for: seed "
                 f"{plan.seed}, records {plan.records}): give another folder"
             )
-        ours = simulator == simulator_digest()
+        if simulator != simulator_digest():
+            mixture = BadInput(f"{folder}: begun with another simulator or on another machine: give another folder")
+            if len(contents) < len(plan.shards()):
+                raise mixture
     clear_litter(folder)
     if contents:
         with bars.phase(f"check {len(contents)} shards", len(contents)) as on_done:
             for number, (name, listed) in enumerate(list(contents.items())):
                 if not intact(folder, name, listed):
+                    if mixture:
+                        raise mixture
                     del contents[name]
                 on_done(number + 1)
-    # shards of two simulators are no data set; what is whole may be of another
-    if not ours and len(contents) < len(plan.shards()):
-        raise BadInput(f"{folder}: begun with another simulator or on another machine: give another folder")
     return contents
 
 

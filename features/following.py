@@ -10,7 +10,7 @@ from scipy import fft
 
 from .notch import body_line
 from .periodogram import LINE_DB
-from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum, finite_complex, scaled, unit_scale
+from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum, finite_complex, require_radar, scaled, unit_scale
 
 #: Dwells by which the body is followed [s].
 BODY_DWELL_S = 0.1
@@ -29,18 +29,23 @@ Course = tuple[float, float, float]
 
 
 def by_recording(
-    iq: NDArray[np.complexfloating], one: Callable[[NDArray[np.complex64]], tuple[Any, ...]]
+    iq: NDArray[np.complexfloating],
+    one: Callable[[NDArray[np.complex64], float, float], tuple[Any, ...]],
+    carrier_hz: float,
+    prf_hz: float,
 ) -> list[NDArray]:
     """What is found in each recording of a batch (..., pulses), one after the other: an array (...) a field.
 
     Raises
     ------
     ValueError
-        If the samples are not complex or not finite.
+        If the samples are not complex or not finite, or a frequency is not positive.
     """
+    require_radar(carrier_hz, prf_hz)
     samples = finite_complex(iq)
     lead, pulses = samples.shape[:-1], samples.shape[-1:]
-    rows = [one(samples[index]) for index in np.ndindex(lead)] or [one(np.zeros(pulses, np.complex64))]
+    each = [samples[index] for index in np.ndindex(lead)] or [np.zeros(pulses, np.complex64)]
+    rows = [one(recording, carrier_hz, prf_hz) for recording in each]
     return [np.array(column)[: math.prod(lead)].reshape(lead) for column in zip(*rows, strict=True)]
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .following import by_recording, followed, normed, standing
-from .spectrum import SPEED_OF_LIGHT_MPS, require_radar
+from .spectrum import SPEED_OF_LIGHT_MPS
 from .wingbeat import GAIT_HZ, GAIT_MPS, LEAST_S, WING_MPS
 
 #: Rates that count [Hz]: from a slow walker's steps to the fastest wings.
@@ -78,8 +78,7 @@ def heave(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float) 
     ValueError
         If the samples are not complex or not finite, or the frequencies are not positive.
     """
-    require_radar(carrier_hz, prf_hz)
-    return Heave(*by_recording(iq, lambda samples: _one(samples, carrier_hz, prf_hz)))
+    return Heave(*by_recording(iq, _one, carrier_hz, prf_hz))
 
 
 def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[float, float, bool]:

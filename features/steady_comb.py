@@ -14,7 +14,7 @@ from .comb import find_comb
 from .following import by_recording, normed
 from .one_thread import one_thread
 from .periodogram import prepare
-from .spectrum import SPEED_OF_LIGHT_MPS, require_radar
+from .spectrum import SPEED_OF_LIGHT_MPS
 
 #: Length of a dwell [s], short enough for a rate that changes, and its pulses at least and at most: more cost time and
 #: find little more.
@@ -70,9 +70,8 @@ def steady_comb(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: f
     ValueError
         If the samples are not complex or not finite, or the frequencies are not positive.
     """
-    require_radar(carrier_hz, prf_hz)
     with one_thread:
-        return SteadyComb(*by_recording(iq, lambda samples: _one(samples, carrier_hz, prf_hz)))
+        return SteadyComb(*by_recording(iq, _one, carrier_hz, prf_hz))
 
 
 def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[float, int]:

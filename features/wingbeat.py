@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from .following import by_recording, followed, normed, standing
 from .repetition import HARMONICS, LevelSpectrum, Repetition, level_spectrum, repetition
-from .spectrum import LEAST_FLOOR, SPEED_OF_LIGHT_MPS, require_radar
+from .spectrum import LEAST_FLOOR, SPEED_OF_LIGHT_MPS
 from .stft import stft
 
 #: Wingbeats that are sought [Hz]: the slowest is a swan's in a slow beat, the fastest a small songbird's.
@@ -133,8 +133,7 @@ def wingbeat(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: floa
     ValueError
         If `iq` is not complex or not finite, or a frequency is not positive.
     """
-    require_radar(carrier_hz, prf_hz)
-    return Wingbeat(*by_recording(iq, lambda samples: _one(samples, carrier_hz, prf_hz)))
+    return Wingbeat(*by_recording(iq, _one, carrier_hz, prf_hz))
 
 
 def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:

@@ -275,6 +275,12 @@ class ReceiverPart(Part):
         return _known_laws(values)
 
 
+def bounds_of(name: str) -> tuple[float, float]:
+    """Least and largest value that a scene may fix a parameter to, in its law's unit."""
+    law = (LAWS | INSECT_LAWS)[name]
+    return BOUNDS.get(name, LEVEL_BOUNDS_DB if law.unit == "dB" else (-math.inf, math.inf))
+
+
 def _known_laws(values: dict[str, float]) -> dict[str, float]:
     """Refuse a parameter that no law knows, or a value that its law's meaning forbids."""
     laws = LAWS | INSECT_LAWS
@@ -287,7 +293,7 @@ def _known_laws(values: dict[str, float]) -> dict[str, float]:
         law = laws[name]
         if law.kind == "log" and value <= 0:
             raise ValueError(f"{name} is {value}: it must be above 0 [{law.unit}]")
-        low, high = BOUNDS.get(name, LEVEL_BOUNDS_DB if law.unit == "dB" else (-math.inf, math.inf))
+        low, high = bounds_of(name)
         if not low <= value <= high:
             raise ValueError(f"{name} is {value}: it must be {low:g} to {high:g} [{law.unit}]")
     return values

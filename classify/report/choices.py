@@ -227,6 +227,12 @@ def train_features(sets: Mapping[str, Sets], config: ReportConfig) -> tuple[NDAr
     return Calibration().probabilities(tabular_scores(model, sets["test"].inputs[FEATURES])), content, seconds
 
 
+def classifier_of(name: str, files: Sequence[bytes]) -> Classifier:
+    """Open a model's ONNX file, or the two of a cascade."""
+    first, *others = files
+    return Cascade((first, name), (others[0], name)) if others else Classifier(first, source=name)
+
+
 def open_choice(kind: str, name: str, files: Sequence[bytes]) -> Answer:
     """Open a choice: what then answers goes all the way from samples to probabilities.
 
@@ -243,8 +249,7 @@ def open_choice(kind: str, name: str, files: Sequence[bytes]) -> Answer:
         From samples (n, pulses) and their radar to probabilities (n, 3).
     """
     if kind == "model":
-        stages = [(content, name) for content in files]
-        classifier = Classifier(*files, source=name) if len(files) == 1 else Cascade(*stages)
+        classifier = classifier_of(name, files)
         return lambda iq, radar: classifier.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz).probabilities
     import onnxruntime
 

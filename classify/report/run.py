@@ -22,7 +22,6 @@ from bladewing.simulate import Radar, Records, draw_records
 from numpy.typing import NDArray
 
 from ..bounds import MOST_MODEL_BYTES
-from ..cascade import Cascade
 from ..dataset import simulator_digest
 from ..errors import BadInput
 from ..files import read_bounded, result_folder, settle, write_together
@@ -37,6 +36,7 @@ from ..training_account import ACCOUNT
 from ..training_config import TrainingConfig
 from . import cost, evaluate, scores, stft, storage, trade
 from .card import model_card
+from .choices import classifier_of
 from .examples import OVERLAP, WINDOW, show_examples, show_stfts
 from .families import left_out
 from .front import Given, measure_front
@@ -92,12 +92,12 @@ def measure(
         for name, content in models.items()
     }
     cascades = _cascade(given, account)
-    answering = classifiers | {name: Cascade(*((one, name) for one in both.files)) for name, both in cascades.items()}
+    answering = classifiers | {name: classifier_of(name, both.files) for name, both in cascades.items()}
 
     def scored() -> dict[str, Any]:
         with progress.phase("Scoring records", config.records) as done:
             truth, answers = evaluate.ask(answering, records=config.records, seed=config.seed, on_records=done)
-        found = {name: scores.score(truth, given) for name, given in answers.items()}
+        found = {name: scores.score(truth, said) for name, said in answers.items()}
         return {"records": scores.describe_records(truth), "scores": found}
 
     def timed() -> list[dict[str, Any]]:

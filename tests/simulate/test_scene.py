@@ -10,7 +10,7 @@ from bladewing.simulate.catalogue import AIRFRAMES, BIRDS
 from bladewing.simulate.clutter import _texture
 from bladewing.simulate.insects import INSECT_LAWS
 from bladewing.simulate.laws import LAWS, WIDTH
-from bladewing.simulate.parts import BOUNDS, LEVEL_BOUNDS_DB, MOST
+from bladewing.simulate.parts import BOUNDS, MOST, bounds_of
 from bladewing.simulate.radar import Radar
 from bladewing.simulate.receiver import FAULT_CHANCE
 from bladewing.simulate.reception import Chosen, Reception
@@ -376,9 +376,8 @@ def test_values_that_cannot_be_rendered_are_refused_and_those_at_the_bounds_are_
 
 def extremes(name: str) -> tuple[float, float]:
     """Least and largest value of a parameter that a scene may give; of those that count points, few enough to draw."""
-    law = (LAWS | INSECT_LAWS)[name]
-    low, high = BOUNDS.get(name, LEVEL_BOUNDS_DB if law.unit == "dB" else (-MOST, MOST))
-    return max(low, 1e-12) if law.kind == "log" else low, min(high, 1e4 if name.endswith("_points") else MOST)
+    (low, high), above = bounds_of(name), (LAWS | INSECT_LAWS)[name].kind == "log"
+    return max(low, 1e-12 if above else -MOST), min(high, 1e4 if name.endswith("_points") else MOST)
 
 
 @pytest.mark.parametrize("kind", ["ground", "rain", "sea", "person", "vehicle", "wind_turbine", "insects"])
