@@ -13,7 +13,7 @@ import numpy as np
 import onnx
 import onnxruntime
 from bladewing.features.graph.inputs import IN_GRAPH, IQ, input_graph
-from bladewing.features.graph.operators import Graph, Value
+from bladewing.features.graph.operators import Graph, Value, needed
 from bladewing.models.export import attach_metadata
 from bladewing.models.seal import SEAL_KEY, seal
 from onnx import TensorProto, helper
@@ -116,20 +116,27 @@ def _whole_graph(
     judged = after.where(live.on(after), Value(after, f"{IQ}_model_probabilities", np.float32), 1 / len(CLASSES))
     after.name(judged, "probabilities")
     best = judged.argmax()
-    needed = after.constant(classifier.accept, np.float64).take_rows(best)
-    accepted = (judged.max().to(np.float64) >= needed) & live.on(after)
+    least = after.constant(classifier.accept, np.float64).take_rows(best)
+    accepted = (judged.max().to(np.float64) >= least) & live.on(after)
     label = after.where(accepted, best, np.array(len(CLASSES)))
     after.name(label.squeeze(), "label")
 
+    nodes = needed([*before.nodes, *model.graph.node, *after.nodes], ["probabilities", "label"])
+    read = {name for node in nodes for name in node.input}
     graph = helper.make_graph(
-        [*before.nodes, *model.graph.node, *after.nodes],
+        nodes,
         "bladewing",
         [helper.make_tensor_value_info(IQ, TensorProto.FLOAT, ["batch", pulses, 2])],
         [
             helper.make_tensor_value_info("probabilities", TensorProto.FLOAT, ["batch", len(CLASSES)]),
             helper.make_tensor_value_info("label", TensorProto.INT64, ["batch"]),
         ],
-        [*before.initializers, *model.graph.initializer, *after.initializers],
+        [
+            one
+            for part in (before.initializers, model.graph.initializer, after.initializers)
+            for one in part
+            if one.name in read
+        ],
     )
     whole = helper.make_model(
         graph, opset_imports=model.opset_import, ir_version=model.ir_version, producer_name="bladewing"

@@ -8,7 +8,7 @@ from ..evidence import LINE_CAP, MISSING_SHARE
 from ..schema import COMB_BINS
 from ..spectrum import Spectrum
 from .operators import Value
-from .spectrum import dft, to_db
+from .spectrum import dft_power, spans_of, to_db
 
 
 def line_nats(relative_power: Value) -> Value:
@@ -32,14 +32,16 @@ def comb_levels_db(radar: Spectrum, relative_power: Value, kept: Value) -> Value
     nats = line_nats(relative_power.slice(first, stop)).reshape(-1, plan.blocks, size)
     mean = (nats * counts).sum() / counts.sum().at_least(1.0)
     line = ((nats - mean) * counts).reshape(-1, stop - first).pad(0, plan.length - (stop - first))
-    re, im = dft(line, plan.length, plan.length // 2 + 1, real=True)
+    # one coefficient more than there are: what lies beyond the last counts as the mean
+    beyond = plan.length // 2 + 1
+    squares = dft_power(line, plan.length, beyond + 1)
     number = kept.slice(first, stop).sum().at_least(1.0)
-    heights = ((re * re + im * im) / number).apply("Sqrt") * plan.per_noise - definition.MEAN_HEIGHT
-    peaks = heights.pad(0, 1).take(np.minimum(plan.lags, plan.length // 2 + 1))
+    per_noise = np.append(plan.per_noise, np.float32(0))
+    heights = (squares / number).apply("Sqrt") * per_noise - definition.MEAN_HEIGHT * np.sign(per_noise)
+    peaks = heights.take(np.minimum(plan.lags, beyond))
     up_to = (np.arange(definition.ENDS[-1]) < np.array(definition.ENDS)[:, None]).astype(np.float32)
-    levels = (graph.matmul(up_to, peaks) * plan.per_deviation).transpose(0, 2, 1).max(keep=False).at_least(0.0)
-    starts, counted = plan.spans
-    within = starts[:, None] + np.minimum(np.arange(counted.max()), counted[:, None] - 1)
-    seen = to_db(levels.take(within).max(keep=False).at_least(1.0))
-    whole = seen.pad(plan.seen.start, COMB_BINS - plan.seen.stop, UNSEEN_DB)
-    return whole.take(np.arange(COMB_BINS)[::-1]).reshape(-1, 1, COMB_BINS)
+    levels = (graph.matmul(up_to, peaks) * plan.per_deviation).transpose(0, 2, 1).max(keep=False)
+    starts, held = (part[::-1] for part in plan.spans)  # rising in rate
+    elements, within = spans_of(levels, plan.lags.shape[1], starts, held)
+    seen = to_db((elements * within.astype(np.float32)).max(keep=False), 0.0)
+    return seen.pad(COMB_BINS - plan.seen.stop, plan.seen.start, UNSEEN_DB).reshape(-1, 1, COMB_BINS)

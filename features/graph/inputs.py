@@ -7,7 +7,7 @@ import numpy as np
 from ..axis import pooling
 from ..change import PARTS, _frame_starts, part_length
 from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
-from ..spectrum import LEAST_FLOOR, LEAST_PART, Spectrum, doppler_spectrum
+from ..spectrum import _LEAST, LEAST_FLOOR, LEAST_PART, Spectrum, doppler_spectrum
 from ..vector import _BANDS, _SIGNIFICANT, radar_columns
 from .cadence import cadence_db
 from .comb_levels import comb_levels_db
@@ -29,7 +29,7 @@ from .measurements import (
     threshold_width_hz,
 )
 from .operators import Graph, Value
-from .spectrum import centred_power, centred_transform, noise_floor, pooled, pooled_mean, power_of, to_db, unit_scale
+from .spectrum import centred_transform, noise_floor, pooled, pooled_mean, power_of, to_db, unit_scale
 
 #: The model inputs that are made in a graph.
 IN_GRAPH = ("features", "levels", "spectrum", "cadence", "combs")
@@ -74,24 +74,24 @@ def input_graph(
     iq = Value(graph, IQ, np.float32)
     flat = iq.reshape(-1, 2 * pulses)
     largest = flat.apply("Abs").max()
-    live = (largest >= LEAST_PART) & (largest <= float(np.finfo(np.float32).max)) & ((flat - flat).sum() >= 0.0)
-    packed = iq.transpose(0, 2, 1)
-    packed = graph.where(live.reshape(-1, 1, 1), packed, 0.0) * unit_scale(largest).reshape(-1, 1, 1)
+    scaled = flat * unit_scale(largest)
+    # no sum of what is not finite is within any limit; such a record spoils no other, and its answer is replaced
+    live = (largest >= LEAST_PART) & (scaled.sum().apply("Abs") <= 8.0 * pulses)
+    packed = scaled.reshape(-1, pulses, 2).transpose(0, 2, 1)
 
     transform = centred_transform(packed, pulses, radar.bins)
-    power = power_of(transform)
-    floor = noise_floor(power, radar.bins).at_least(power.mean() * float(LEAST_FLOOR))
-    safe = graph.where(floor > 0.0, floor, 1.0)
-    relative_power = power / safe
-    mean, peak = pooled(relative_power, pooling(radar.bins, radar.carrier_hz, radar.prf_hz, AXIS_BINS))
+    power = power_of(transform, radar.bins)
+    floor = noise_floor(power, radar.bins).at_least(power.mean() * float(LEAST_FLOOR)).at_least(float(_LEAST))
+    relative_power = power / floor
+    pool = pooling(radar.bins, radar.carrier_hz, radar.prf_hz, AXIS_BINS)
+    levels = pooled(relative_power, radar.bins, pool)
 
-    out = {"levels": graph.concat(*(row.reshape(-1, 1, AXIS_BINS) for row in (mean, peak)), axis=1)}
+    out = {"levels": levels}
     if {"features", "cadence", "combs"} & set(names):
-        level_db = to_db(relative_power)
-        body = body_line(radar, relative_power, level_db)
+        body = body_line(radar, relative_power)
         kept = notch_weights(radar, body)
     if "cadence" in names:
-        out["cadence"] = cadence_db(radar, transform, safe, kept)
+        out["cadence"] = cadence_db(radar, transform, floor, kept)
     if "combs" in names:
         out["combs"] = comb_levels_db(radar, relative_power, kept)
     if "spectrum" in names or "features" in names:
@@ -99,13 +99,16 @@ def input_graph(
         starts, _ = _frame_starts(pulses, length, PARTS)
         frames = graph.concat(*(packed.slice(start, start + length) for start in starts), axis=1)
         bins = doppler_spectrum(np.zeros(length, np.complex64), carrier_hz=carrier_hz, prf_hz=prf_hz).bins
-        parts = centred_power(frames.reshape(-1, 2, length), length, bins).reshape(-1, PARTS, bins)
+        whole = centred_transform(frames.reshape(-1, 2, length), length, bins)
+        parts = power_of(whole, bins).reshape(-1, PARTS, bins)
         pool = pooling(bins, radar.carrier_hz, radar.prf_hz, AXIS_BINS)
-        parts_db = pooled_mean(parts / safe.reshape(-1, 1, 1), pool).at_least(0.0)
+        parts_db = pooled_mean(parts / floor.reshape(-1, 1, 1), pool).at_least(0.0)
         away = parts_db - parts_db.sum(-2) / PARTS
         change = ((away * away).sum(-2, keep=False) / PARTS).apply("Sqrt")
-        out["spectrum"] = graph.concat(out["levels"], change.reshape(-1, 1, AXIS_BINS), axis=1)
+        out["spectrum"] = graph.concat(levels, change.reshape(-1, 1, AXIS_BINS), axis=1)
         if "features" in names:
+            level_db = to_db(relative_power)
+            mean = levels.slice(0, 1, axis=-2).reshape(-1, AXIS_BINS)
             out["features"] = _feature_vector(radar, relative_power, level_db, body, kept, mean, parts_db, change)
     return {name: out[name] for name in INPUT_SHAPES if name in names}, live
 

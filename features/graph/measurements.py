@@ -11,7 +11,7 @@ from .. import bandwidth, chopping, notch, shape, smearing, vector
 from ..axis import UNSEEN_DB, axis_velocities_mps
 from ..spectrum import LOWEST_DB, Spectrum
 from .operators import Value
-from .spectrum import dft
+from .spectrum import dft_power, to_db
 
 LOG10 = 1 / np.log(10)
 
@@ -49,12 +49,12 @@ def _around(index: Value, bins: int) -> Value:
     return index.graph.op("Mod", index, np.array(bins))
 
 
-def body_line(radar: Spectrum, relative_power: Value, level_db: Value) -> Body:
+def body_line(radar: Spectrum, relative_power: Value) -> Body:
     """As `notch.body_line`."""
     index = (relative_power >= relative_power.max() * float(notch.EQUAL_SHARE)).to(np.float32).argmax()
-    left, middle, right = (
-        level_db.pick(_around(index + np.array(shift), radar.bins)) for shift in (radar.bins - 1, 0, 1)
-    )
+    places = _around(index + np.array([radar.bins - 1, 0, 1]), radar.bins)
+    top = to_db(relative_power.pick(places))
+    left, middle, right = (top.slice(i, i + 1) for i in range(3))
     step = radar.prf_hz / radar.bins * radar.wavelength_m / 2
     at_bin = index.graph.constant(radar.velocity_mps, np.float32).take_rows(index)
     return Body(index, at_bin - _vertex(left, middle, right) * step, middle)
@@ -170,8 +170,7 @@ def cepstral_chopping(radar: Spectrum, level_db: Value, kept: Value) -> Chopping
     where = graph.where
     level = level_db.at_least(0.0).at_most(chopping.CLIP_DB) * kept
     level = level - kept * (level.sum() / kept.sum().at_least(1.0))
-    re, im = dft(level, radar.bins, periods, real=True)
-    heights = (re * re + im * im).apply("Sqrt") / chopping.noise_shape(radar.pulses, radar.bins)
+    heights = dft_power(level, radar.bins, periods).apply("Sqrt") / chopping.noise_shape(radar.pulses, radar.bins)
     flat = _prominence(heights, periods)
 
     window = flat.slice(first, last + 1)

@@ -1,5 +1,6 @@
 """ONNX operators written like arithmetic: values with +, <, & and reductions along the last axis."""
 
+from collections.abc import Iterable, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -134,9 +135,9 @@ class Value:
         """The elements start to stop - 1 of an axis."""
         return self.graph.op("Slice", self, *(np.array([number]) for number in (start, stop, axis)), dtype=self.dtype)
 
-    def take(self, index: NDArray[np.integer]) -> "Value":
-        """Elements of the last axis at fixed places, shape (..., *index.shape)."""
-        return self.graph.op("Gather", self, index.astype(np.int64), dtype=self.dtype, axis=-1)
+    def take(self, index: NDArray[np.integer], axis: int = -1) -> "Value":
+        """What stands at fixed places of an axis, which becomes those of the index."""
+        return self.graph.op("Gather", self, index.astype(np.int64), dtype=self.dtype, axis=axis)
 
     def pick(self, index: "Value") -> "Value":
         """Elements of the last axis at each record's own places; the shapes agree but for the last axis."""
@@ -164,6 +165,16 @@ class Value:
             return self
         operands = np.array([before, after]), np.array(value, self.dtype), np.array([-1])
         return self.graph.op("Pad", self, *operands, dtype=self.dtype)
+
+
+def needed(nodes: Sequence[NodeProto], outputs: Iterable[str]) -> list[NodeProto]:
+    """The nodes, in their order, that some of the named outputs come from; runtimes compute the others as well."""
+    wanted, kept = set(outputs), []
+    for node in reversed(nodes):
+        if wanted.intersection(node.output):
+            wanted.update(node.input)
+            kept.append(node)
+    return kept[::-1]
 
 
 class Graph:

@@ -9,7 +9,7 @@ from ..cadence import CadencePlan
 from .operators import Value
 
 
-def dft(packed: Value, length: int, count: int, *, real: bool = False) -> tuple[Value, Value]:
+def dft(packed: Value, length: int, count: int, *, conjugate: bool = False) -> Value:
     """Discrete Fourier transform as two matrix products with twiddle factors between (Cooley and Tukey 1965).
 
     Lengths that transform fast have factors near their root, so this costs 8 length^1.5 multiplications and runs on
@@ -18,20 +18,35 @@ def dft(packed: Value, length: int, count: int, *, real: bool = False) -> tuple[
     Parameters
     ----------
     packed : Value
-        Shape (n, 2, length): real and imaginary parts; (n, length) where `real`.
+        Shape (n, 2, length): real and imaginary parts.
     length : int
         Of the transform.
     count : int
         How many coefficients are wanted, from 0 on.
-    real : bool
-        Whether the samples are real.
+    conjugate : bool
+        Transform the conjugate of the samples instead.
 
     Returns
     -------
-    real, imaginary : Value
-        Shape (n, count).
+    Value
+        Shape (n, 2, count).
     """
-    graph = packed.graph
+    full, rows, wanted = _by_rows(packed, length, count, parts=2, conjugate=conjugate)
+    line = full.reshape(-1, rows, 2, wanted).transpose(0, 2, 3, 1).reshape(-1, 2, rows * wanted)
+    return line if rows * wanted == count else line.slice(0, count)
+
+
+def dft_power(samples: Value, length: int, count: int, *, parts: int = 1, conjugate: bool = False) -> Value:
+    """Squared magnitude of the transform of real samples (n, length), or of 2 `parts` (n, 2, length): (n, count)."""
+    full, rows, wanted = _by_rows(samples, length, count, parts=parts, conjugate=conjugate)
+    squares = full * full
+    line = (squares.slice(0, wanted) + squares.slice(wanted, 2 * wanted)).transpose(0, 2, 1).reshape(-1, rows * wanted)
+    return line if rows * wanted == count else line.slice(0, count)
+
+
+def _by_rows(samples: Value, length: int, count: int, *, parts: int, conjugate: bool) -> tuple[Value, int, int]:
+    """Transform of shape (n, rows, 2 wanted), coefficient k in row k % rows and column k // rows of both halves."""
+    graph = samples.graph
     rows = next(n for n in range(int(np.sqrt(length)), 0, -1) if length % n == 0)
     columns = length // rows
     wanted = -(-count // rows)
@@ -42,48 +57,34 @@ def dft(packed: Value, length: int, count: int, *, real: bool = False) -> tuple[
 
     across = np.arange(rows)
     cosine, sine = turns(across, across, rows)
-    first = np.block([[cosine], [sine]]) if real else np.block([[cosine, -sine], [sine, cosine]])
-    half = graph.matmul(first, packed.reshape(-1, first.shape[1], columns))
+    first = np.block([[cosine, -sine], [sine, cosine]])[:, : parts * rows]
+    if conjugate:
+        first[:, rows:] *= -1
+    half = graph.matmul(first, samples.reshape(-1, parts * rows, columns))
     re, im = half.slice(0, rows, axis=-2), half.slice(rows, 2 * rows, axis=-2)
     cosine, sine = turns(across, np.arange(columns), length)
     turned = graph.concat(re * cosine - im * sine, re * sine + im * cosine)
     cosine, sine = turns(np.arange(columns), np.arange(wanted), columns)
-    full = graph.matmul(turned, np.block([[cosine, sine], [-sine, cosine]]))
-
-    def laid_out(part: Value) -> Value:
-        line = part.transpose(0, 2, 1).reshape(-1, rows * wanted)
-        return line if rows * wanted == count else line.slice(0, count)
-
-    return laid_out(full.slice(0, wanted)), laid_out(full.slice(wanted, 2 * wanted))
+    return graph.matmul(turned, np.block([[cosine, sine], [-sine, cosine]])), rows, wanted
 
 
-def centred_transform(packed: Value, pulses: int, bins: int) -> tuple[Value, Value]:
-    """As `spectrum.centred_transform`: from samples (n, 2, pulses) to two parts (n, bins)."""
+def centred_transform(packed: Value, pulses: int, bins: int) -> Value:
+    """As `spectrum.centred_transform`: from samples (n, 2, pulses) to real and imaginary parts (n, 2, bins)."""
     even = bins % 2 == 0
-    parts = dft((packed * definition._window(pulses, even)[::2]).pad(0, bins - pulses), bins, bins)
+    transform = dft((packed * definition._window(pulses, even)[::2]).pad(0, bins - pulses), bins, bins)
     half = (bins + 1) // 2
-    if even:
-        return parts
-    re, im = (packed.graph.concat(part.slice(half, bins), part.slice(0, half)) for part in parts)
-    return re, im
+    return transform if even else packed.graph.concat(transform.slice(half, bins), transform.slice(0, half))
 
 
-def power_of(parts: tuple[Value, Value]) -> Value:
-    """As `spectrum.power_of`."""
-    re, im = parts
-    return re * re + im * im
-
-
-def centred_power(packed: Value, pulses: int, bins: int) -> Value:
-    """As `spectrum.centred_power`: from samples (n, 2, pulses) to power (n, bins)."""
-    return power_of(centred_transform(packed, pulses, bins))
+def power_of(transform: Value, bins: int) -> Value:
+    """As `spectrum.power_of`: from parts (n, 2, bins) to power (n, bins)."""
+    squares = (transform * transform).reshape(-1, 2 * bins)
+    return squares.slice(0, bins) + squares.slice(bins, 2 * bins)
 
 
 def unit_scale(largest: Value) -> Value:
-    """As `spectrum.unit_scale`: a power of two that brings each record's largest part into about [0.5, 1)."""
-    exponent = (largest.to(np.float64).at_least(2.0**-126).apply("Log") / np.log(2)).apply("Floor") + 1.0
-    two = largest.graph.constant(np.float64(2))
-    return largest.graph.op("Pow", two, -exponent.at_most(126.0).at_least(-126.0)).to(np.float32)
+    """What brings each record's largest part to 1, unless it is beyond all use; `spectrum.unit_scale` rounds to 2^k."""
+    return 1.0 / largest.at_least(2.0**-126).at_most(2.0**126)
 
 
 def noise_floor(power: Value, bins: int) -> Value:
@@ -91,30 +92,59 @@ def noise_floor(power: Value, bins: int) -> Value:
     half, lower = bins // 2, (bins + 1) % 2
     size = max(1, half // definition._FLOOR_BLOCKS)
     blocks = half // size
-    rank = definition.quartile_rank(blocks)
-    sides = [
-        side.reshape(-1, blocks, size).sum(keep=False)
-        for side in (power.slice(lower, lower + blocks * size), power.slice(bins - blocks * size, bins))
-    ]
-    one, other = (side.ranked(rank) for side in sides)
+    sides = power.graph.concat(power.slice(lower, lower + blocks * size), power.slice(bins - blocks * size, bins))
+    levels = sides.reshape(-1, 2, blocks, size).sum(keep=False).ranked(definition.quartile_rank(blocks)).squeeze()
+    one, other = levels.slice(0, 1), levels.slice(1, 2)
     least, most = one.at_most(other), one.at_least(other)
     level = power.graph.where(most > definition._EMPTY_RATIO * least, most, (least + most) / 2)
     return level / float(definition.quartile_of_noise(bins, size, blocks))
 
 
-def to_db(relative_power: Value) -> Value:
+def to_db(relative_power: Value, lowest_db: float = definition.LOWEST_DB) -> Value:
     """As `spectrum.to_db`."""
-    return relative_power.at_least(10 ** (definition.LOWEST_DB / 10)).apply("Log") * (10 / np.log(10))
+    return relative_power.at_least(10 ** (lowest_db / 10)).apply("Log") * (10 / np.log(10))
 
 
-def pooled(relative_power: Value, pool: Pooling | CadencePlan) -> tuple[Value, Value]:
-    """As `Pooling.mean_and_peak_db`, shape (n, axis bins) each."""
+def spans_of(
+    values: Value, length: int, starts: NDArray[np.intp], counts: NDArray[np.intp]
+) -> tuple[Value, NDArray[np.bool_]]:
+    """Neighbouring elements of the last axis that belong together, side by side.
+
+    They are taken by blocks, as a runtime copies block by block: one by one takes three times as long.
+
+    Parameters
+    ----------
+    values : Value
+        Shape (n, length).
+    length : int
+        Elements of the last axis.
+    starts, counts : ndarray of int, shape (spans,)
+        First element of each span, and how many it holds.
+
+    Returns
+    -------
+    elements : Value
+        Shape (n, spans, width): those of each span, others of their blocks beside them.
+    within : ndarray of bool, shape (spans, width)
+        Which of them are the span's.
+    """
+    size = int(2 ** np.round(np.log2(counts.max()) / 2))
+    blocks, number = -(-length // size), int(counts.max() + size - 2) // size + 1  # and those that a span may touch
+    places = (starts // size)[:, None] + np.arange(number)
+    tiles = values.pad(0, blocks * size - length).reshape(-1, blocks, size)
+    taken = tiles.take(np.minimum(places, blocks - 1), axis=-2).reshape(-1, len(starts), number * size)
+    element = (places[..., None] * size + np.arange(size)).reshape(len(starts), -1)
+    return taken, (element >= starts[:, None]) & (element < (starts + counts)[:, None])
+
+
+def pooled(relative_power: Value, length: int, pool: Pooling | CadencePlan) -> Value:
+    """As `Pooling.mean_and_peak_db` of so many bins or lines, shape (n, 2, axis bins)."""
     starts, counts = pool.spans
-    place = np.arange(counts.max())
-    gathered = relative_power.take(starts[:, None] + np.minimum(place, counts[:, None] - 1))
-    share = ((place < counts[:, None]) / counts[:, None]).astype(np.float32)
-    mean = (gathered * share).sum(keep=False)
-    return _place(mean, pool), _place(gathered.max(keep=False) / pool.expected_peak, pool)
+    elements, within = spans_of(relative_power, length, starts, counts)
+    held = elements * within.astype(np.float32)
+    units = 1 / np.concatenate([counts.astype(np.float32), pool.expected_peak])
+    rows = relative_power.graph.concat(held.sum(keep=False), held.max(keep=False)) * units
+    return _place(rows.reshape(-1, 2, len(starts)), pool)
 
 
 def pooled_mean(relative_power: Value, pool: Pooling) -> Value:
