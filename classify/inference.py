@@ -13,6 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 import onnxruntime
+from bladewing.features.allocator import keep_freed
 from bladewing.features.inputs import model_inputs
 from bladewing.features.schema import INPUT_SHAPES, schema_hash
 from bladewing.features.spectrum import LEAST_PART, largest_part
@@ -222,6 +223,7 @@ class Classifier:
         except ValueError as error:
             raise BadInput(f"{source}: {error}") from None
         self.envelope, self.accept = _read_metadata(self.metadata, source)
+        keep_freed()
         self._session = _open_session(onnx_bytes, source, threads)
         if dict(self._session.get_modelmeta().custom_metadata_map) != dict(self.metadata):
             raise BadInput(f"{source}: damaged metadata: onnxruntime reads others: train it again")

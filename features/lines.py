@@ -9,8 +9,11 @@ from scipy import fft
 
 #: Bins of the twice padded spectrum that a line is interpolated from, and the kernel's shape for them: errors of 1e-6.
 #: The kernel is exp(shape x sqrt(1 - x^2)) (Barnett, Magland and af Klinteberg, SIAM J. Sci. Comput. 41, 2019).
-_TAPS = 8
-_SHAPE = 2.3 * _TAPS
+TAPS = 8
+_SHAPE = 2.3 * TAPS
+
+#: These bins, from the one below the line.
+TAP = np.arange(1 - TAPS // 2, 1 + TAPS // 2)
 
 
 def _bell(away: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -19,26 +22,29 @@ def _bell(away: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 @lru_cache(maxsize=16)
-def _kernel(pulses: int) -> tuple[int, NDArray[np.float64]]:
+def kernel(pulses: int) -> tuple[int, NDArray[np.float64]]:
     """Transform length, and one over the kernel's own transform at each pulse."""
     size = fft.next_fast_len(2 * pulses)
     time = np.arange(pulses) - (pulses - 1) / 2
     node, weight = np.polynomial.legendre.leggauss(64)
-    out = 2 / _TAPS / (np.cos(np.pi * _TAPS / size * np.outer(time, node)) @ (weight * _bell(node)))
+    out = 2 / TAPS / (np.cos(np.pi * TAPS / size * np.outer(time, node)) @ (weight * _bell(node)))
     out.setflags(write=False)
     return size, out
 
 
-def _taps(frequency: NDArray[np.floating], pulses: int) -> tuple[NDArray[np.intp], NDArray[np.complex128]]:
-    """Bins about each frequency and their weights, shape (lines, taps); time counts from the middle of the record."""
-    size, _ = _kernel(pulses)
-    place = frequency * size
+def taps(place: NDArray[np.floating]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """The bin below each place [bins of `kernel`], and the weights of the `TAP` bins about it, shape (lines, taps)."""
     first = np.floor(place).astype(np.intp)
-    tap = np.arange(1 - _TAPS // 2, 1 + _TAPS // 2)
-    weight = _bell(2 / _TAPS * ((place - first)[:, None] - tap))
+    return first, _bell(2 / TAPS * ((place - first)[:, None] - TAP))
+
+
+def _turned_taps(frequency: NDArray[np.floating], pulses: int) -> tuple[NDArray[np.intp], NDArray[np.complex128]]:
+    """Bins about each frequency and their weights, shape (lines, taps); time counts from the middle of the record."""
+    size, _ = kernel(pulses)
+    first, weight = taps(frequency * size)
     turn = 1j * np.pi * (pulses - 1) / size
-    turns = np.exp(turn * (first % (2 * size)))[:, None] * np.exp(turn * tap)
-    return (first[:, None] + tap) % size, weight * turns
+    turns = np.exp(turn * (first % (2 * size)))[:, None] * np.exp(turn * TAP)
+    return (first[:, None] + TAP) % size, weight * turns
 
 
 @dataclass(frozen=True)
@@ -57,7 +63,7 @@ class LineSpace:
     def _spectra(self) -> NDArray[np.complex128]:
         """Spectra of the samples and of the samples times their time, shape (2, bins)."""
         pulses = len(self.samples)
-        size, shape = _kernel(pulses)
+        size, shape = kernel(pulses)
         time = np.arange(pulses) - (pulses - 1) / 2
         flat = self.samples * shape
         return np.asarray(fft.fft(np.stack([flat, flat * time]), size), np.complex128)
@@ -75,7 +81,7 @@ class LineSpace:
         amplitude, moment : ndarray of complex128, shape (lines,)
             Time counts from the middle of the record, in samples.
         """
-        bins, weight = _taps(frequency, len(self.samples))
+        bins, weight = _turned_taps(frequency, len(self.samples))
         seen = np.einsum("lt,klt->kl", weight, self._spectra.take(bins, axis=1)) / len(self.samples)
         return seen[0], seen[1]
 
@@ -84,8 +90,8 @@ def sum_of_lines(
     pulses: int, frequency: NDArray[np.floating], amplitudes: NDArray[np.complexfloating]
 ) -> NDArray[np.complex128]:
     """Samples of a sum of lines, shape (pulses,): the way back from `LineSpace.at`."""
-    size, shape = _kernel(pulses)
-    bins, weight = _taps(frequency, pulses)
+    size, shape = kernel(pulses)
+    bins, weight = _turned_taps(frequency, pulses)
     part = (weight.conj() * amplitudes[:, None]).ravel()
     place = bins.ravel()
     grid = np.bincount(place, part.real, size) + 1j * np.bincount(place, part.imag, size)

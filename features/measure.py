@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .allocator import keep_freed
 from .bandwidth import threshold_band_hz
 from .body_velocity import body_velocity, folded
 from .chopping import Chopping
@@ -191,6 +192,7 @@ def measure(
     some = samples if samples.size else np.zeros((1, *samples.shape[-1:]), np.complex64)  # of none, fields of no length
     spectrum = doppler_spectrum(some, carrier_hz=carrier_hz, prf_hz=prf_hz)
     rows = []
+    keep_freed()
     with one_thread:
         for index in np.ndindex(some.shape[:-1]):
             rows.append(_measure_one(some[index], _record(spectrum, index), blades, beta_rad))

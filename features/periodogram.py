@@ -31,6 +31,9 @@ THINNED_BINS = 4
 #: Half width taken out about the body line [m/s]. A body is steadier than the clutter about velocity zero.
 BODY_NOTCH_MPS = 0.5
 
+#: No wider band is taken out [bins], 3 m/s of 160 ms at 100 GHz: the sequences that span it fill memory.
+MOST_NOTCH_BINS = 320
+
 #: A second body's line stands so far over all others but the first one's [dB]: a bird's beside a drone, or a drone's.
 OTHER_OVER_DB = 8.0
 
@@ -326,7 +329,7 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
         return None
     pulses = spectrum.pulses
     bin_mps = spectrum.prf_hz / pulses * spectrum.wavelength_m / 2
-    widest = pulses / 16  # a slow radar must keep something to look at
+    widest = min(pulses / 16, MOST_NOTCH_BINS)  # a slow radar must keep something to look at
 
     def half_bins(half_mps: float) -> float:
         return float(np.ceil(2 * min(max(half_mps / bin_mps, 1.0), widest)) / 2)

@@ -13,19 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .lines import line_products
+from .lines import TAP, TAPS, kernel, line_products, taps
 
 #: Sequences beyond the time-bandwidth product: what the band leaks past it falls under -100 dB.
 EXTRA_SEQUENCES = 11
 
-#: What lines lose to a band is tabulated in so many steps a bin.
-_HELD_STEPS = 8
-
-
-#: Points about a place that a table is read from, the others of each, and one over the products of their distances.
-_NODES = np.arange(-2, 4)
-_OTHER_NODES = np.array([[other for other in range(6) if other != node] for node in range(6)])
-_NODE_SCALES = 1 / (_NODES[:, None] - _NODES[_OTHER_NODES]).prod(axis=1)
+#: Values of a table that are made at a time: what lies between takes little memory, whatever the dwell.
+_AT_ONCE = 1 << 22
 
 
 def times(matrix: NDArray[np.float64], columns: NDArray[np.complexfloating]) -> NDArray[np.complex128]:
@@ -43,25 +37,41 @@ def whole(both: NDArray[np.float64]) -> NDArray[np.complex128]:
     return np.ascontiguousarray(both).view(np.complex128)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=4)
 def slepian(pulses: int, half_bins: float) -> NDArray[np.float64]:
     """Orthonormal sequences that hold the signals within so many bins of frequency 0, shape (sequences, pulses).
+
+    They read the same from both ends, but for the sign of every second one, the best concentrated first: half of each
+    tells the whole, and takes a quarter of the time.
 
     Parameters
     ----------
     pulses : int
-        Pulses of the dwell.
+        Pulses of the dwell, at least 2.
     half_bins : float
         Half width of the band [bins of PRF / pulses], > 0.
     """
     from scipy.linalg import eigh_tridiagonal
 
-    count = min(pulses, int(np.ceil(2 * half_bins)) + EXTRA_SEQUENCES)
-    n = np.arange(pulses)
+    count, half = min(pulses, int(np.ceil(2 * half_bins)) + EXTRA_SEQUENCES), pulses // 2
+    n = np.arange(half + 1)
     diagonal = ((pulses - 1 - 2 * n) / 2) ** 2 * np.cos(2 * np.pi * half_bins / pulses)
-    off = n[1:] * (pulses - n[1:]) / 2
-    _, vectors = eigh_tridiagonal(diagonal, off, select="i", select_range=(pulses - count, pulses - 1))
-    out = np.ascontiguousarray(vectors.T)
+    off = n[1:] * (pulses - n[1:]) / 2  # the last joins both halves, or the first one to the middle
+    out = np.zeros((count, pulses))
+    for odd in (False, True):
+        own = out[int(odd) :: 2]
+        length = half + (pulses % 2 and not odd)
+        main, beside = diagonal[:length].copy(), off[: length - 1].copy()
+        if pulses % 2 == 0:
+            main[-1] += -off[-1] if odd else off[-1]
+        elif not odd:
+            beside[-1] *= np.sqrt(2)
+        _, vectors = eigh_tridiagonal(main, beside, select="i", select_range=(length - len(own), length - 1))
+        rows = vectors.T[::-1]
+        own[:, :half] = rows[:, :half] / np.sqrt(2)
+        own[:, pulses - half :] = own[:, half - 1 :: -1] * (-1 if odd else 1)
+        if length > half:
+            own[:, half] = rows[:, half]
     out.setflags(write=False)
     return out
 
@@ -88,7 +98,7 @@ def remove_bands(samples: NDArray[np.complex128], bands: Iterable[tuple[float, f
     seen = [times(basis, samples * turn.conj()) for basis, turn in zip(bases, turns, strict=True)]
     if len(bands) > 1:
         # jointly: taken out one after the other, each band would keep what the first took of the second's strong line
-        factor = np.concatenate([np.where(_odd(pulses, float(half)), 1j, 1) for _, half in bands])
+        factor = np.concatenate([np.where(_odd(basis), 1j, 1) for basis in bases])
         together = factor * (_gram_inverse(pulses, bands) @ (factor.conj() * np.concatenate(seen)))
         seen = np.split(together, np.cumsum([len(basis) for basis in bases])[:-1])
     out = samples
@@ -105,28 +115,30 @@ def _turn(pulses: int, frequency: float) -> NDArray[np.complex128]:
     return out
 
 
-@lru_cache(maxsize=32)
-def _odd(pulses: int, half_bins: float) -> NDArray[np.bool_]:
+def _odd(basis: NDArray[np.float64]) -> NDArray[np.bool_]:
     """True for the sequences of `slepian` that change sign in the middle."""
-    basis = slepian(pulses, half_bins)
-    return np.asarray((basis * basis[:, ::-1]).sum(axis=1) < 0)
+    return np.arange(len(basis)) % 2 == 1
 
 
 @lru_cache(maxsize=2)
 def _held(pulses: int, half_bins: float) -> NDArray[np.float32]:
     """Unit lines, and those times time, seen by the sequences, even and odd ones both real.
 
-    Shape (steps, 2, sequences); steps of 1 / (`_HELD_STEPS` x pulses) cycles a sample from -1/2 to 1/2 and some over.
+    Shape (bins, 2, sequences): the bins of `lines.kernel` from -1/2 to 1/2 and some over, to be read with its bell.
     """
-    size = _HELD_STEPS * pulses
-    place = np.arange(-(size // 2) - 4, size // 2 + 4)
+    size, shape = kernel(pulses)
+    place = np.arange(-(size // 2) - TAPS, size // 2 + TAPS)
     basis = slepian(pulses, half_bins)
     time = np.arange(pulses) - (pulses - 1) / 2
     turn = (np.exp(1j * np.pi * (pulses - 1) / size * place) / np.sqrt(pulses)).astype(np.complex64)
-    plain, timed = (fft.fft(v.astype(np.complex64), size)[:, place % size] * turn for v in (basis, basis * time))
-    odd = _odd(pulses, half_bins)[:, None]
-    seen = np.where(odd, -plain.imag, plain.real), np.where(odd, timed.real, timed.imag)
-    out = np.ascontiguousarray(np.stack(seen).transpose(2, 0, 1))
+    out = np.empty((len(place), 2, len(basis)), np.float32)
+    step = max(1, _AT_ONCE // size)
+    for first in range(0, len(basis), step):
+        some = basis[first : first + step] * shape
+        odd = _odd(basis)[first : first + step, None]
+        plain, timed = (fft.fft(v.astype(np.complex64), size)[:, place % size] * turn for v in (some, some * time))
+        out[:, 0, first : first + step] = np.where(odd, -plain.imag, plain.real).T
+        out[:, 1, first : first + step] = np.where(odd, timed.real, timed.imag).T
     out.setflags(write=False)
     return out
 
@@ -188,19 +200,17 @@ def notched_products(
     bands : tuple of (float, float)
         Centre [cycles a sample] and half width [bins] of each band.
     """
-    products = line_products(frequency, pulses)
-    plains, timeds = [np.zeros((len(frequency), 0), np.float32)], [np.zeros((len(frequency), 0), np.float32)]
+    products, (size, _) = line_products(frequency, pulses), kernel(pulses)
+    plains: list[NDArray[np.floating]] = [np.zeros((len(frequency), 0), np.float32)]
+    timeds = plains.copy()
     for centre, half in bands:
         table = _held(pulses, float(half))
         away = frequency - centre
         turns = np.rint(away)
-        place = (away - turns) * (pulses * _HELD_STEPS) + len(table) // 2
-        first = np.floor(place).astype(np.intp)
-        # the polynomial through six points; time counts from the middle, half a sample off where the pulses are even
-        sign = 1 - 2 * (turns % 2) * (pulses % 2 == 0)
-        gaps = (place - first)[:, None] - _NODES
-        weights = gaps[:, _OTHER_NODES].prod(axis=-1) * _NODE_SCALES * sign[:, None]
-        about = table.take(first[:, None] + _NODES, axis=0).reshape(*gaps.shape, -1)
+        first, weights = taps((away - turns) * size)
+        # time counts from the middle, half a sample off where the pulses are even
+        weights = (weights * (1 - 2 * (turns % 2) * (pulses % 2 == 0))[:, None]).astype(np.float32)
+        about = table.take(first[:, None] + (TAP + len(table) // 2), axis=0).reshape(*weights.shape, -1)
         held = (weights[:, None, :] @ about).reshape(-1, *table.shape[1:])
         plains.append(held[:, 0])
         timeds.append(held[:, 1])
@@ -219,7 +229,7 @@ def _gram_inverse(pulses: int, bands: tuple[tuple[float, float], ...]) -> NDArra
     """Inverse of the products between the sequences of all bands, odd ones times j, which makes them real."""
     time = np.arange(pulses) - (pulses - 1) / 2
     bases = [slepian(pulses, half) for _, half in bands]
-    odds = [_odd(pulses, float(half)) for _, half in bands]
+    odds = [_odd(basis) for basis in bases]
     rows = []
     for (one, _), first, odd in zip(bands, bases, odds, strict=True):
         row = []

@@ -8,7 +8,13 @@ from bladewing.features.comb_fit import fit_combs
 from bladewing.features.flashes import flash_nats
 from bladewing.features.lines import LineSpace, line_products, sum_of_lines
 from bladewing.features.one_thread import one_thread
-from bladewing.features.periodogram import CLICK_OVER_BESIDE, CLICK_POWER, prepare, without_clicks
+from bladewing.features.periodogram import (
+    CLICK_OVER_BESIDE,
+    CLICK_POWER,
+    MOST_NOTCH_BINS,
+    prepare,
+    without_clicks,
+)
 from bladewing.features.rotors import MAX_ROTORS
 from bladewing.features.slow_lines import notched_products, remove_bands, slepian
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
@@ -204,9 +210,20 @@ def test_linear_algebra_has_one_thread_within_and_its_own_again_after():
         assert (before, within, threads()) == ({2}, [{1}, {1}], {2})
 
 
-def test_slepian_sequences_take_out_a_band_and_leave_the_rest():
-    basis = slepian(600, 3.0)
+@pytest.mark.parametrize(("pulses", "half_bins"), [(600, 3.0), (601, 3.0), (601, 8.5), (13, 1.0), (4, 1.0), (3, 0.5)])
+def test_slepian_sequences_are_the_best_concentrated_first(pulses, half_bins):
+    basis = slepian(pulses, half_bins)
     np.testing.assert_allclose(basis @ basis.T, np.eye(len(basis)), atol=1e-9)
+    apart = np.arange(pulses)[:, None] - np.arange(pulses)
+    within = 2 * half_bins / pulses * np.sinc(2 * half_bins / pulses * apart)  # what of a sequence lies in the band
+    shares, vectors = np.linalg.eigh(within)
+    np.testing.assert_allclose(np.einsum("kn,nm,km->k", basis, within, basis), shares[::-1][: len(basis)], atol=1e-9)
+    clear = shares[::-1][: len(basis)] > 1e-9  # below, the shares tell nothing apart
+    best = vectors[:, ::-1][:, : int(clear.sum())]
+    np.testing.assert_allclose(basis[clear].T @ basis[clear], best @ best.T, atol=1e-6)
+
+
+def test_slepian_sequences_take_out_a_band_and_leave_the_rest():
     time = np.arange(600)
     inside, outside = np.exp(2j * np.pi * 0.1012 * time), np.exp(2j * np.pi * 0.15 * time)
     assert np.mean(np.abs(remove_bands(1e4 * inside, [(0.1, 3.0), (0.3, 3.0)])) ** 2) < 1e-4
@@ -246,10 +263,19 @@ def test_the_products_of_lines_know_what_the_notch_takes(bands):
     timed = np.stack([remove_bands(line * time, bands) for line in lines])
     each = np.eye(len(frequency), dtype=complex)
     with_time, squared = left.conj() @ timed.T / pulses, timed.conj() @ timed.T / pulses
-    np.testing.assert_allclose(products.plain, left.conj() @ left.T / pulses, atol=1e-4)
-    np.testing.assert_allclose(-1j * products.with_time(each), with_time, atol=1e-4 * pulses)
-    np.testing.assert_allclose(1j * products.time_with(each), with_time.conj().T, atol=1e-4 * pulses)
-    np.testing.assert_allclose(products.with_time_squared(each), squared, atol=1e-4 * pulses**2)
+    np.testing.assert_allclose(products.plain, left.conj() @ left.T / pulses, atol=1e-5)
+    np.testing.assert_allclose(-1j * products.with_time(each), with_time, atol=1e-5 * pulses)
+    np.testing.assert_allclose(1j * products.time_with(each), with_time.conj().T, atol=1e-5 * pulses)
+    np.testing.assert_allclose(products.with_time_squared(each), squared, atol=1e-5 * pulses**2)
+
+
+def test_a_long_dwell_of_a_short_wave_takes_out_no_wider_band_than_memory_holds():
+    pulses, radar = 8192, {"carrier_hz": 94e9, "prf_hz": 25e3}  # 3 m/s would be 617 bins of this dwell
+    moving = 10 * np.exp(0.4j * np.pi * np.arange(pulses))
+    iq = (30 + moving + white(np.random.default_rng(0), pulses)).astype(np.complex64)
+    data = prepare(iq, **radar)
+    assert [half for turn, half in data.bands if turn == 0.0] == [MOST_NOTCH_BINS]
+    assert np.abs(np.fft.fft(data.samples)[:MOST_NOTCH_BINS]).max() < 1e-3 * np.abs(np.fft.fft(iq)).max()
 
 
 def test_clicks_are_taken_out_and_flashes_are_not():
