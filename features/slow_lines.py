@@ -163,8 +163,8 @@ class LineProducts:
     plain: NDArray[np.float64]
     first: NDArray[np.float64]
     second: NDArray[np.float64]
-    held: NDArray[np.float32]
-    held_timed: NDArray[np.float32]
+    held: NDArray[np.floating]
+    held_timed: NDArray[np.floating]
     joint: NDArray[np.floating]
     joint_timed: NDArray[np.floating]
 
@@ -209,7 +209,7 @@ def notched_products(
         turns = np.rint(away)
         first, weights = taps((away - turns) * size)
         # time counts from the middle, half a sample off where the pulses are even
-        weights = (weights * (1 - 2 * (turns % 2) * (pulses % 2 == 0))[:, None]).astype(np.float32)
+        weights *= (1 - 2 * (turns % 2) * (pulses % 2 == 0))[:, None]
         about = table.take(first[:, None] + (TAP + len(table) // 2), axis=0).reshape(*weights.shape, -1)
         held = (weights[:, None, :] @ about).reshape(-1, *table.shape[1:])
         plains.append(held[:, 0])
