@@ -17,7 +17,7 @@ from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 from .errors import BadInput, one_line
 from .predict import checked_dwell_s, distinct
 from .progress import Progress
-from .recording import Recording, left_out_sentence, load_recording
+from .recording import Recording, load_recording
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -114,6 +114,8 @@ class Measured:
         the lines it is taken out of `iq`.
     beat
         Wingbeat and body over the whole recording; None where that is too short.
+    cut
+        How the dwells fit the recording, in words; "" where they fill it.
     """
 
     recording: Recording
@@ -124,6 +126,7 @@ class Measured:
     acceleration_mps2: np.ndarray
     acceleration_mps2_std: np.ndarray
     beat: Wingbeat | None
+    cut: str
 
     def json_objects(self) -> Iterator[dict[str, Any]]:
         """One object a dwell and a closing one; what has no value is null."""
@@ -219,8 +222,8 @@ class Measured:
             detail = reasons[0][len(short) + 1 :].strip()
             detail = detail and f"{': ' if len(set(reasons)) == 1 else ', e.g. '}{detail}"
             console.print(Text(f"{counted(len(reasons))}: {short}{detail}"), soft_wrap=True)
-        if left_out := left_out_sentence(self.recording.left_out_s(self.iq)):
-            console.print(Text(left_out), soft_wrap=True)
+        if self.cut:
+            console.print(Text(self.cut), soft_wrap=True)
         console.print(Text(self.sentence()), soft_wrap=True)
         if beat := self.beat_sentence():
             console.print(Text(beat), soft_wrap=True)
@@ -390,7 +393,8 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     long = len(recording.iq) >= LEAST_S * recording.prf_hz
     beat = wingbeat(recording.iq, **radar) if long else None
     stop_s = start_s + pulses / recording.prf_hz
-    return Measured(recording, iq, start_s, stop_s, values, acceleration, acceleration_std, beat)
+    cut = recording.cut_sentence(settings.dwell_s, iq)
+    return Measured(recording, iq, start_s, stop_s, values, acceleration, acceleration_std, beat, cut)
 
 
 def measured(

@@ -15,7 +15,7 @@ from bladewing.features.wingbeat import wingbeat
 from .errors import BadInput, one_line
 from .fusion import LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
-from .recording import Recording, find_recording, left_out_sentence, load_recording
+from .recording import Recording, find_recording, load_recording
 from .samples import positive
 from .track import Track, fuse
 
@@ -70,6 +70,8 @@ class Answer:
         1.5 s and more.
     left_out_s
         The end of the recording that is shorter than a dwell [s].
+    cut
+        How the dwells fit the recording, in words; "" where they fill it.
     """
 
     name: str
@@ -79,6 +81,7 @@ class Answer:
     track: Track
     shown: Mapping[str, float] = field(default_factory=dict)
     left_out_s: float = 0.0
+    cut: str = ""
 
     @property
     def declared_s(self) -> float | None:
@@ -144,8 +147,8 @@ class Answer:
         if self.track.reason:
             line.append(f"  ({self.track.reason})")
         console.print(line)
-        if left_out := left_out_sentence(self.left_out_s):
-            console.print(Text(left_out))
+        if self.cut:
+            console.print(Text(self.cut))
         for name, rate_hz in self.shown.items():
             whose, odds = ODDS[name]
             said = f"{_SHOWN[name].format(rate_hz)}: the odds of {_WHOSE[whose]} count {odds:g} times"
@@ -212,7 +215,8 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
         dwell_s=wanted / recording.prf_hz,
     )
     stop_s = start_s + wanted / recording.prf_hz
-    return Answer(recording.name, start_s, stop_s, dwells, track, shown, recording.left_out_s(iq))
+    left_out_s, cut = recording.left_out_s(iq), recording.cut_sentence(dwell_s, iq)
+    return Answer(recording.name, start_s, stop_s, dwells, track, shown, left_out_s, cut)
 
 
 def long_look(iq: np.ndarray, carrier_hz: float, prf_hz: float) -> dict[str, float]:

@@ -68,16 +68,22 @@ class Recording:
         """What `dwells` left out at the end [s]."""
         return round((len(self.iq) - dwells.size) / self.prf_hz, 9)
 
+    def cut_sentence(self, dwell_s: float, dwells: NDArray[np.complex64]) -> str:
+        """How `dwells` of so many seconds fit the recording, in words; empty where they fill it.
 
-def left_out_sentence(left_out_s: float) -> str:
-    """What was left out of a recording in words; empty where it was nothing.
-
-    Examples
-    --------
-    >>> left_out_sentence(0.02)
-    'the last 0.02 s, shorter than a dwell, are left out'
-    """
-    return f"the last {left_out_s:.2g} s, shorter than a dwell, are left out" if left_out_s else ""
+        Examples
+        --------
+        >>> recording = Recording("walk", np.ones(1000, np.complex64), 24e9, 1e4)
+        >>> recording.cut_sentence(0.08, recording.dwells(0.08))
+        'the last 0.02 s, shorter than a dwell, are left out'
+        >>> recording.cut_sentence(80, recording.dwells(80))
+        'all of its 0.1 s are one dwell: they are shorter than the 80 s asked for'
+        """
+        if len(self.iq) < round(dwell_s * self.prf_hz):
+            all_s = len(self.iq) / self.prf_hz
+            return f"all of its {all_s:.2g} s are one dwell: they are shorter than the {dwell_s:g} s asked for"
+        left_out_s = self.left_out_s(dwells)
+        return f"the last {left_out_s:.2g} s, shorter than a dwell, are left out" if left_out_s else ""
 
 
 def load_recording(

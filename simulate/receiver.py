@@ -32,6 +32,26 @@ FAULT_CHANCE = {
     "converter": 0.4,
 }
 
+#: Whose effect each parameter of a receiver is.
+EFFECT_OF = {
+    "fading_db": "fading",
+    "fading_hz": "fading",
+    "impulse_db": "impulses",
+    "high_pass_hz": "high_pass",
+    "flicker_db": "flicker",
+    "phase_noise_rad": "phase_noise",
+    "mains_db": "mains",
+    "burst_hz": "bursts",
+    "burst_share": "bursts",
+    "burst_db": "bursts",
+    "tilt_db": "colour",
+    "hump_db": "colour",
+    "hump_turns": "colour",
+    "image_db": "image",
+    "full_scale_db": "converter",
+    "adc_bits": "converter",
+}
+
 #: How often there is none of them: simulated records, good radars.
 FAULTLESS_CHANCE = 0.2
 

@@ -12,8 +12,9 @@ from bladewing.simulate.insects import INSECT_LAWS
 from bladewing.simulate.laws import LAWS, WIDTH
 from bladewing.simulate.parts import BOUNDS, MOST, bounds_of
 from bladewing.simulate.radar import Radar
-from bladewing.simulate.receiver import FAULT_CHANCE
+from bladewing.simulate.receiver import EFFECT_OF, FAULT_CHANCE
 from bladewing.simulate.reception import Chosen, Reception
+from bladewing.simulate.render import Rendering
 from bladewing.simulate.render_bird import _cycle_rad, heave_range_m, members
 from bladewing.simulate.scene import Scene, SceneError, shipped
 from hypothesis import given, settings
@@ -488,3 +489,27 @@ def test_lines_stand_as_far_apart_as_a_turn_looks_the_same_often(amplitudes, rep
     lines = power > 1e-6 * power.max()
     assert set(np.flatnonzero(lines) % repeats) == {0}
     assert lines[repeats]
+
+
+def received(effects: list[str], **values: float) -> Rendering:
+    rain = {"name": "shower", "kind": "rain", "level_db": 10.0}
+    receiver = {"effects": effects, "values": values}
+    return Scene.build({"radar": RADAR, "clutter": [rain], "receiver": receiver}).render(seed=3)
+
+
+@pytest.mark.parametrize("name", EFFECT_OF)
+def test_a_value_of_a_receiver_changes_its_effect_alone_and_is_warned_of_without_it(name):
+    effect, (low, high) = EFFECT_OF[name], (LAWS[name].low, LAWS[name].high)
+    with_it, other = received([effect], **{name: low}), received([effect], **{name: high})
+    assert not with_it.warnings
+    assert not np.array_equal(with_it.iq, other.iq)
+    others = [one for one in FAULT_CHANCE if one != effect]
+    without, other = received(others, **{name: low}), received(others, **{name: high})
+    assert without.warnings == [f'receiver.values: {name} changes nothing without "{effect}" among the effects']
+    np.testing.assert_array_equal(without.iq, other.iq)
+
+
+def test_every_parameter_that_a_receiver_draws_has_an_effect_of_its_own():
+    warned = received(list(FAULT_CHANCE), **{name: law.low for name, law in LAWS.items()}).warnings
+    unused = {line.split(": ")[1].split()[0] for line in warned}
+    assert LAWS.keys() - unused == EFFECT_OF.keys() | {"phase_rad"}
