@@ -6,7 +6,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .spectrum import LOWEST_DB, NOISE_BANDWIDTH_BINS, SPEED_OF_LIGHT_MPS, to_db
+from .spectrum import LOWEST_DB, NOISE_BANDWIDTH_BINS, SPEED_OF_LIGHT_MPS, as_ordered, to_db
 
 #: Velocity below which bins are of about equal width [m/s]; above it their width grows with the velocity.
 KNEE_MPS = 4.0
@@ -94,7 +94,7 @@ class Pooling:
         rows, seen = self._blank((len(flat), 2))
         self._mean(flat, seen[:, 0])
         peak = seen[:, 1]
-        self._pooled(np.maximum, flat, peak)
+        self._pooled(np.maximum, as_ordered(flat), as_ordered(peak))
         peak *= self._per_expected_peak
         return self._levels(rows, LOWEST_DB).reshape(*relative_power.shape[:-1], 2, self.bins)
 
@@ -138,7 +138,7 @@ class Pooling:
     def _per_expected_peak(self) -> NDArray[np.float32]:
         return np.reciprocal(self.expected_peak)
 
-    def _pooled(self, operation: np.ufunc, relative_power: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    def _pooled(self, operation: np.ufunc, relative_power: NDArray, out: NDArray) -> None:
         """Write the sum or the largest of the spectrum bins of each seen axis bin, in rising velocity."""
         side, middle, reach = len(self.starts), self.spectrum_bins // 2, int(self.starts[-1] + self.counts[-1])
         alone = self._alone

@@ -14,7 +14,7 @@ from scipy import fft
 from .axis import UNSEEN_DB, expected_peak
 from .notch import Mask, weights
 from .schema import CADENCE_BINS
-from .spectrum import Spectrum, means, per_floor, power_of, taper, to_db
+from .spectrum import Spectrum, as_ordered, means, per_floor, power_of, taper, to_db
 
 #: Range of the shared axis of rates [Hz]: from slow wings to the tenth flash of the fastest propeller.
 CADENCE_RANGE_HZ = (1.5, 6000.0)
@@ -164,7 +164,7 @@ def cadence_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
         mean, peak = out[..., 0, plan.seen], out[..., 1, plan.seen]
         np.add.reduceat(reach, starts, axis=-1, out=mean)
         mean /= counts.astype(np.float32)
-        np.maximum.reduceat(reach, starts, axis=-1, out=peak)
+        np.maximum.reduceat(as_ordered(reach), starts, axis=-1, out=as_ordered(peak))
         peak /= plan.expected_peak
         out[..., plan.seen] = to_db(out[..., plan.seen])
     return out

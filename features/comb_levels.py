@@ -18,7 +18,7 @@ from .chopping import CHOPPING_RANGE_HZ, MIN_SPACING_BINS
 from .evidence import line_log_ratio
 from .notch import Mask, weights
 from .schema import COMB_BINS
-from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, bins_alike, sums, to_db
+from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, as_ordered, bins_alike, sums, to_db
 
 #: Lines are looked for up to this speed [m/s]: beyond it lie the ends of few rotors' bands, and noise.
 REACH_MPS = 80.0
@@ -182,8 +182,8 @@ def comb_levels_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     plan = comb_plan(spectrum.bins, spectrum.pulses, spectrum.carrier_hz, spectrum.prf_hz)
     if plan is not None:
         heights = comb_heights(spectrum.relative_power[..., plan.band], weights(mask[..., plan.band]), plan)
-        loudest = np.maximum.reduceat(_loudest_sums(heights, plan), plan.spans[0], axis=-1)
-        out[..., 0, ::-1][..., plan.seen] = to_db(loudest, 0.0)
+        loudest = np.maximum.reduceat(as_ordered(_loudest_sums(heights, plan)), plan.spans[0], axis=-1)
+        out[..., 0, ::-1][..., plan.seen] = to_db(loudest.view(np.float32), 0.0)
     return out
 
 

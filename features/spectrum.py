@@ -138,6 +138,11 @@ def means(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return sums(values) * np.float32(1 / values.shape[-1])
 
 
+def as_ordered(values: NDArray[np.float32]) -> NDArray[np.int32]:
+    """The same memory as whole numbers, in which what is not negative has the same order: maxima take half the time."""
+    return values.view(np.int32)
+
+
 def windows(values: NDArray, shape: tuple[int, ...], steps: tuple[int, ...], first: int = 0) -> NDArray:
     """The last axis from an element on seen as axes of so many elements and steps, shape (..., *shape), to be read."""
     values = np.ascontiguousarray(values)
