@@ -33,7 +33,7 @@ def gathered(purpose: str, count: int) -> tuple[Gathered, dict[str, NDArray[np.f
     names = tuple(dict.fromkeys(name for model in OURS for name in LADDER[model].inputs))
     ours: dict[str, list[NDArray]] = {name: [] for name in names}
     theirs: dict[str, list[NDArray]] = {name: [] for name in BASELINES}
-    labels = []
+    labels, kinds = [], []
     for records in stream(5, purpose, count):
         radar = records.radar
         given = model_inputs(records.iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz, names=names)
@@ -42,8 +42,10 @@ def gathered(purpose: str, count: int) -> tuple[Gathered, dict[str, NDArray[np.f
         for name, baseline in BASELINES.items():
             theirs[name].append(baseline.read(records.iq, radar))
         labels.append(records.label_indices)
+        kinds.append(records.truth["kind"])
     whole = {name: np.concatenate(parts) for name, parts in ours.items()}
-    return Gathered(whole, np.concatenate(labels), {}), {name: np.concatenate(rows) for name, rows in theirs.items()}
+    truth = {"kind": np.concatenate(kinds)}
+    return Gathered(whole, np.concatenate(labels), truth), {name: np.concatenate(rows) for name, rows in theirs.items()}
 
 
 def judged(scores: NDArray[np.floating], labels: NDArray[np.int64]) -> tuple[float, float, float]:
