@@ -330,13 +330,17 @@ def simulate(
         for problem in error.problems[:-1]:
             _complain(problem)
         raise BadInput(error.problems[-1]) from None
-    for warning in found.warnings():
+    told = found.warnings()
+    for warning in told:
         _complain(f"{scene}: {warning}", kind="warning")
     plan = None if full else found.plan(seed, tolerance_db=tolerance_db)
     if explain:
         print(plan.explain() if plan else "full fidelity: nothing is left out", flush=True)
     if out is not None:
-        written = write_rendering(out, render(found, seed, plan=plan), found, seed)
+        rendering = render(found, seed, plan=plan)
+        for warning in rendering.warnings[len(told) :]:  # what shows as it is drawn
+            _complain(f"{scene}: {warning}", kind="warning")
+        written = write_rendering(out, rendering, found, seed)
         print("\n".join(str(path) for path in written), flush=True)
 
 

@@ -77,11 +77,10 @@ class Recording:
         >>> recording.cut_sentence(0.08, recording.dwells(0.08))
         'the last 0.02 s, shorter than a dwell, are left out'
         >>> recording.cut_sentence(80, recording.dwells(80))
-        'all of its 0.1 s are one dwell: they are shorter than the 80 s asked for'
+        'its 0.1 s, shorter than a dwell of 80 s, are taken whole'
         """
-        if len(self.iq) < round(dwell_s * self.prf_hz):
-            all_s = len(self.iq) / self.prf_hz
-            return f"all of its {all_s:.2g} s are one dwell: they are shorter than the {dwell_s:g} s asked for"
+        if dwell_s * self.prf_hz > len(self.iq) + 0.5:
+            return f"its {len(self.iq) / self.prf_hz:.6g} s, shorter than a dwell of {dwell_s:g} s, are taken whole"
         left_out_s = self.left_out_s(dwells)
         return f"the last {left_out_s:.2g} s, shorter than a dwell, are left out" if left_out_s else ""
 

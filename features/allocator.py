@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
-#: Of the largest arrays that a record or a block of them needs, with room to spare [bytes]; glibc goes no higher.
+#: More than the largest arrays of a record, or of a block of them [bytes].
 KEPT_BYTES = 1 << 24
 
 

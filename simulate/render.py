@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from .plan import Plan
 from .radar import Radar
-from .receiver import EFFECT_OF
 from .reception import Reception, clutter_echo, pulse_times_s
 from .render_bird import BIRD_EFFECTS, bird_echo, bird_truth
 from .render_uav import Fidelity, full_fidelity, uav_echo, uav_truth
@@ -81,11 +80,6 @@ def render(scene: Setting, seed: int = 0, *, plan: Plan | None = None) -> Render
         truth.append({"name": part.name, "label": "clutter", "kind": part.kind, "level_db": part.level_db, **drawn})
     reception = Reception(scene, seed)
     warnings += [f"receiver.values: {name} changes nothing of a receiver" for name in reception.unused]
-    warnings += [
-        f'receiver.values: {name} changes nothing without "{effect}" among the effects'
-        for name, effect in EFFECT_OF.items()
-        if name in scene.receiver.values and effect not in reception.effects
-    ]
     kept = plan.receiver & reception.effects if plan else reception.effects
     iq = reception.receive(signal.astype(np.complex64), kept)
     return Rendering(radar, iq, truth, warnings)

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, model_validator
 from .motion import TWO_PI
 from .parts import BirdPart, ClutterPart, RadarPart, ReceiverPart, TargetPart, UavPart
 from .radar import Radar
-from .receiver import FAULT_CHANCE
+from .receiver import EFFECT_OF, FAULT_CHANCE
 
 _SOUND_MPS = 340.0
 
@@ -126,4 +126,8 @@ class Setting(BaseModel):
                     f"{target.name}: it moves at {fastest:.1f} m/s, beyond the unambiguous {radar.unambiguous_mps:.1f} "
                     "m/s: its line aliases"
                 )
+        for name in self.receiver.values:
+            effect = EFFECT_OF.get(name)
+            if effect is not None and effect not in self.receiver.effects:
+                said.append(f'receiver.values: {name} changes nothing without "{effect}" among the effects')
         return said

@@ -9,7 +9,7 @@ from ..cadence import CadencePlan
 from .operators import Value
 
 
-def dft(packed: Value, length: int, count: int, *, conjugate: bool = False) -> Value:
+def dft(packed: Value, length: int, count: int) -> Value:
     """Discrete Fourier transform as two matrix products with twiddle factors between (Cooley and Tukey 1965).
 
     Lengths that transform fast have factors near their root, so this costs 8 length^1.5 multiplications and runs on
@@ -23,28 +23,29 @@ def dft(packed: Value, length: int, count: int, *, conjugate: bool = False) -> V
         Of the transform.
     count : int
         How many coefficients are wanted, from 0 on.
-    conjugate : bool
-        Transform the conjugate of the samples instead.
 
     Returns
     -------
     Value
         Shape (n, 2, count).
     """
-    full, rows, wanted = _by_rows(packed, length, count, parts=2, conjugate=conjugate)
+    full, rows, wanted = _by_rows(packed, length, count, parts=2)
     line = full.reshape(-1, rows, 2, wanted).transpose(0, 2, 3, 1).reshape(-1, 2, rows * wanted)
     return line if rows * wanted == count else line.slice(0, count)
 
 
 def dft_power(samples: Value, length: int, count: int, *, parts: int = 1, conjugate: bool = False) -> Value:
-    """Squared magnitude of the transform of real samples (n, length), or of 2 `parts` (n, 2, length): (n, count)."""
+    """Squared magnitude of the transform of real samples (n, length), or of 2 `parts` (n, 2, length): (n, count).
+
+    With `conjugate` that of the conjugate of the samples: with its sign, the way back.
+    """
     full, rows, wanted = _by_rows(samples, length, count, parts=parts, conjugate=conjugate)
     squares = full * full
     line = (squares.slice(0, wanted) + squares.slice(wanted, 2 * wanted)).transpose(0, 2, 1).reshape(-1, rows * wanted)
     return line if rows * wanted == count else line.slice(0, count)
 
 
-def _by_rows(samples: Value, length: int, count: int, *, parts: int, conjugate: bool) -> tuple[Value, int, int]:
+def _by_rows(samples: Value, length: int, count: int, *, parts: int, conjugate: bool = False) -> tuple[Value, int, int]:
     """Transform of shape (n, rows, 2 wanted), coefficient k in row k % rows and column k // rows of both halves."""
     graph = samples.graph
     rows = next(n for n in range(int(np.sqrt(length)), 0, -1) if length % n == 0)

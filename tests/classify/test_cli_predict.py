@@ -186,7 +186,7 @@ def test_people_get_a_table_that_fits_80_columns(run, sigmf_pair):
     assert lines[1].split() == ["start", "s", "stop", "s", "label", *NAMES, "reason"]
     assert lines[2].split() == ["0.000", "0.200", "uav", "0.80", "0.15", "0.05"]
     assert lines[3] == "track: uav  uav 0.80  bird 0.15  clutter 0.05  from 1 of 1 dwells"
-    assert lines[4] == "all of its 0.2 s are one dwell: they are shorter than the 1 s asked for"
+    assert lines[4] == "its 0.2 s, shorter than a dwell of 1 s, are taken whole"
     assert lines[5] == "declared uav after 0.2 s"
     text = " ".join(out.split())
     assert "unambiguous velocity 7.5 m/s is below 10 m/s" in text

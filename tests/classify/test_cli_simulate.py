@@ -178,3 +178,13 @@ def test_wrong_arguments_are_one_line(arguments, tmp_path, monkeypatch, capsys):
     assert main(["simulate", *arguments]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_values_that_nothing_uses_are_warned_of_on_the_terminal(scene_file, tmp_path, capsys):
+    unused = "\n[receiver]\nvalues = { fading_db = 6.0, rain_width_mps = 1.0 }\n"
+    scene_file.write_text(SCENE + unused)
+    assert main(["simulate", str(scene_file), "--out", str(tmp_path / "rec")]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2
+    assert 'fading_db changes nothing without "fading" among the effects' in lines[0]
+    assert "rain_width_mps changes nothing of a receiver" in lines[1]

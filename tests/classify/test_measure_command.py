@@ -64,10 +64,10 @@ def test_what_is_shorter_than_a_dwell_is_said_to_be_left_out(folder, capsys):
     assert closing["left_out_s"] == pytest.approx(left_out_s)
     assert main(given) == 0
     assert f"the last {left_out_s:.2g} s, shorter than a dwell, are left out" in capsys.readouterr().out
-    assert main([*given[:-1], "80"]) == 0  # 80 ms were meant
-    all_s = 2 * PULSES / PRF_HZ
-    said = f"all of its {all_s:.2g} s are one dwell: they are shorter than the 80 s asked for"
-    assert said in capsys.readouterr().out
+    for dwell_s in (80, 1e305):  # 80 ms were meant; and as many pulses are no whole number
+        assert main([*given[:-1], str(dwell_s)]) == 0
+        said = f"its {2 * PULSES / PRF_HZ:.6g} s, shorter than a dwell of {dwell_s:g} s, are taken whole"
+        assert said in capsys.readouterr().out
 
 
 def test_the_reason_for_no_rotor_is_given_whole(folder, capsys):

@@ -509,6 +509,13 @@ def test_a_value_of_a_receiver_changes_its_effect_alone_and_is_warned_of_without
     np.testing.assert_array_equal(without.iq, other.iq)
 
 
+def test_an_effect_that_is_switched_off_is_meant_to_be():
+    receiver = {"effects": ["fading"], "values": {"fading_db": 3.0}}
+    scene = Scene.build({"radar": RADAR, "receiver": receiver})
+    assert not scene.without("fading").render().warnings
+    assert not scene.without("fading").warnings()
+
+
 def test_every_parameter_that_a_receiver_draws_has_an_effect_of_its_own():
     warned = received(list(FAULT_CHANCE), **{name: law.low for name, law in LAWS.items()}).warnings
     unused = {line.split(": ")[1].split()[0] for line in warned}
