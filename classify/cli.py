@@ -259,15 +259,20 @@ def export(
     model: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME|FILE", help="A shipped model, an .onnx file, fast or best.", show_default="spectrum-cnn"
+            metavar="NAME|FILE",
+            help="A shipped model, an .onnx file, fast, balanced or best: of models of one file, not the cascade.",
+            show_default="spectrum-cnn",
         ),
     ] = None,
 ) -> None:
     """Write one self-contained ONNX graph for a radar: raw IQ in, probabilities and label out, onnxruntime alone."""
     from .export import export_raw_iq
+    from .inference import chosen_name
 
-    worst = export_raw_iq(out, carrier_hz=carrier_hz, prf_hz=prf_hz, pulses=pulses, model=model)
-    print(f"Wrote {out}: iq (batch, {pulses}, 2) to probabilities and label, within {worst:.0e} of predict", flush=True)
+    name = chosen_name(model, single=True)
+    worst = export_raw_iq(out, carrier_hz=carrier_hz, prf_hz=prf_hz, pulses=pulses, model=name)
+    graph = f"iq (batch, {pulses}, 2) to probabilities and label"
+    print(f"Wrote {out}: {graph}, within {worst:.0e} of predict --model {name}", flush=True)
 
 
 @app.command()
@@ -445,7 +450,8 @@ def _console() -> "Console":
     """Where answers are printed: as wide as the terminal, and in a pipe or a file as wide as a line is."""
     from rich.console import Console
 
-    unbounded = not sys.stdout.isatty() and "COLUMNS" not in os.environ
+    columns = os.environ.get("COLUMNS", "")
+    unbounded = columns.strip("0") == "" if columns else not sys.stdout.isatty()  # no terminal has no columns
     return Console(highlight=False, width=_LONGEST_LINE if unbounded else None)
 
 

@@ -5,6 +5,7 @@ interrupts the work, what it lists is whole; the same command goes on from there
 seed, the purpose and its number alone, the bytes are those of a run that nothing interrupted.
 """
 
+import errno
 import hashlib
 import json
 import shutil
@@ -204,9 +205,9 @@ def _writable(folder: Path) -> Iterator[None]:
     except BlockingIOError:
         raise BadInput(f"{folder}: another process is writing there: let it finish, or give another folder") from None
     except OSError as error:
-        raise BadInput(
-            f"{folder}: cannot be written: {error.strerror or error}: what is whole stays; the same command goes on"
-        ) from None
+        never = error.errno in (errno.EEXIST, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.EROFS)
+        cure = "give another folder" if never else "what is whole stays; the same command goes on"
+        raise BadInput(f"{folder}: cannot be written: {error.strerror or error}: {cure}") from None
     finally:
         with suppress(OSError):  # they stay once anything is in them
             for place in made:

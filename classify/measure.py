@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
-from bladewing.features.measure import Measurements, measure
+from bladewing.features.measure import CARRIER_RANGE_HZ, PRF_RANGE_HZ, Measurements, measure
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 from bladewing.features.steady_comb import OVER_BODY
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
@@ -18,6 +18,7 @@ from .errors import BadInput, one_line
 from .predict import checked_dwell_s, distinct
 from .progress import Progress
 from .recording import Recording, load_recording
+from .terminal import print_table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -53,9 +54,6 @@ VALUES = (
 
 #: What a recording's JSON object holds of the wingbeat and of the body's course.
 WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std", "acceleration_mps2", "acceleration_mps2_std")
-
-#: Radars that are measured [Hz]: beyond, a frequency was given in another unit.
-CARRIER_RANGE_HZ, PRF_RANGE_HZ = (1e8, 1e12), (1.0, 1e8)
 
 #: No rotor has more; eight is the most that fly.
 MOST_BLADES = 64
@@ -213,11 +211,7 @@ class Measured:
                 with_error(v.tip_speed_mps[n], v.tip_speed_mps_std[n]),
             )
         if table.row_count:
-            # a number is never cut: a narrow terminal gets narrow gaps, then wraps the lines
-            endless = console.options.update(max_width=1000)
-            table.collapse_padding = table.__rich_measure__(console, endless).maximum > console.width
-            console.width = max(console.width, table.__rich_measure__(console, endless).maximum)
-            console.print(table)
+            print_table(console, table)
         for short, reasons in silent.items():
             detail = reasons[0][len(short) + 1 :].strip()
             detail = detail and f"{': ' if len(set(reasons)) == 1 else ', e.g. '}{detail}"

@@ -17,6 +17,7 @@ from .fusion import LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
 from .recording import Recording, find_recording, load_recording
 from .samples import positive
+from .terminal import print_table
 from .track import Track, fuse
 
 if TYPE_CHECKING:
@@ -140,7 +141,7 @@ class Answer:
                 Text(f"{len(others) + 1} dwells: {reason}" if others else reason),
             )
         console.print(Text(one_line(self.name), style="bold"), soft_wrap=True)
-        console.print(table)
+        print_table(console, table)
         shares = "  ".join(f"{name} {share:.2f}" for name, share in zip(CLASSES, self.track.probabilities, strict=True))
         line = Text("track: ").append(self.track.label, style=_COLOURS[self.track.label])
         line.append(f"  {shares}  from {self.track.used} of {len(self.dwells.labels)} dwells")

@@ -124,7 +124,9 @@ def load_recording(
     carrier = _agreed(name, "carrier", carrier_hz, file_carrier_hz)
     prf = _agreed(name, "PRF", prf_hz, file_prf_hz)
     if carrier is None and prf is None:
-        raise BadInput(f"{name}: the file says no carrier and no PRF: give --carrier-hz and --prf-hz [Hz]")
+        of_array = found.suffix.lower() in ARRAY_SUFFIXES
+        says = "of arrays the samples alone are read" if of_array else "the file says no carrier and no PRF"
+        raise BadInput(f"{name}: {says}: give --carrier-hz and --prf-hz [Hz]")
     if carrier is None:
         raise BadInput(f"{name}: the file says no carrier (SigMF core:frequency): give --carrier-hz [Hz]")
     if prf is None:
@@ -165,10 +167,11 @@ def _one_range_cell(samples: NDArray[np.generic], name: str) -> NDArray[np.compl
     """Check the samples, and let go of axes of length 1 (MATLAB has no other vectors)."""
     if samples.size == 0:
         raise BadInput(f"{name}: no samples (shape {samples.shape}): a recording needs at least one pulse")
-    if samples.dtype.kind in "fiu" and samples.ndim == 2 and samples.shape[1] == 2:
+    if samples.dtype.kind in "fiu" and samples.ndim == 2 and 2 in samples.shape:
+        parts = ("x[:, 0]", "x[:, 1]") if samples.shape[1] == 2 else ("x[0]", "x[1]")
         raise BadInput(
             f"{name}: real samples of shape {samples.shape}: I and Q must be one complex number: "
-            "store x[:, 0] + 1j * x[:, 1]"
+            f"store {parts[0]} + 1j * {parts[1]}"
         )
     if samples.ndim == 0 or samples.size != max(samples.shape):
         raise BadInput(

@@ -53,6 +53,8 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
     name = re.sub(r"\.sigmf(-meta|-data)?$", "", stem.name)
     if not name or name == "..":
         raise BadInput(f"{stem}: no name for the recording: give --out NAME")
+    if stem.is_dir():
+        raise BadInput(f"{stem} is a folder: name the recording in it: give --out {stem / 'NAME'}")
     if not np.isfinite(rendering.iq).all():
         raise BadInput(f"{stem}: the scene's samples exceed what complex64 holds: lower its levels")
     with suppress(OSError):  # a folder that is missing or cannot be written to is told below

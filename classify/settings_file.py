@@ -64,6 +64,8 @@ def build_settings(
             known = ", ".join(table.model_fields)
             raise BadInput(f"{file}: unknown field {field!r}: the fields are {known}") from None
         rule = first["msg"].replace("Input ", "it ", 1).replace("Tuple ", "it ", 1)
+        if first["type"] == "tuple_type":
+            rule = "it must be a list: write [...] about it"
         raise BadInput(f"{place} is {first['input']!r}: {rule}") from None
 
 
@@ -74,7 +76,7 @@ def named(field: str, file: Path | None, options: Mapping[str, Any]) -> str:
 
 def _read(file: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(read_bounded(file, MOST_TEXT_BYTES).decode())
+        return tomllib.loads(read_bounded(file, MOST_TEXT_BYTES).decode("utf-8-sig"))  # some editors begin with a mark
     except OSError as error:
         raise BadInput(f"{file}: cannot be read: {error.strerror}: give the path of a TOML file") from None
     except (ValueError, RecursionError) as error:  # too large, not UTF-8, not TOML, or nested beyond reason

@@ -21,6 +21,9 @@ from .rotors import MAX_ROTORS
 from .smearing import smearing_index
 from .spectrum import LEAST_PART, Spectrum, doppler_spectrum, finite_complex, largest_part
 
+#: Radars that are measured [Hz]: beyond, a frequency was given in another unit.
+CARRIER_RANGE_HZ, PRF_RANGE_HZ = (1e8, 1e12), (1.0, 1e8)
+
 #: Threshold of the paper's bandwidth rule over the noise [dB]: it took 20 on measured data, 30 on simulated.
 PAPER_THRESHOLD_DB = 20.0
 
@@ -162,7 +165,7 @@ def measure(
     iq : array_like of complex, shape (..., pulses)
         Slow-time samples of one range cell, any gain.
     carrier_hz, prf_hz : float
-        Carrier and pulse repetition frequency [Hz], > 0.
+        Carrier and pulse repetition frequency [Hz], within `CARRIER_RANGE_HZ` and `PRF_RANGE_HZ`.
     blades : int, optional
         Blades of a rotor, >= 1.
     beta_rad : float, optional
@@ -183,6 +186,12 @@ def measure(
         If `iq` is not complex, has fewer than 2 pulses or holds a value that is not finite, or an argument is out of
         its range.
     """
+    for name, value, (low, high) in (
+        ("carrier_hz", carrier_hz, CARRIER_RANGE_HZ),
+        ("prf_hz", prf_hz, PRF_RANGE_HZ),
+    ):
+        if not low <= value <= high:
+            raise ValueError(f"{name} is {value!r}: it must be {low:g} to {high:g} Hz: 9.85 GHz is 9.85e9")
     if blades is not None and (blades != int(blades) or blades < 1):
         raise ValueError(f"blades is {blades!r}: it must be a whole number of at least 1")
     if beta_rad is not None and not 0 <= beta_rad < np.pi / 2:

@@ -75,7 +75,7 @@ class Scene(Setting):
                 file = files("bladewing.simulate") / "scenes" / f"{name}.toml"
             if isinstance(file, Path) and file.exists() and not (file.is_file() and file.stat().st_size <= _MOST_BYTES):
                 raise ValueError(f"it must be a file of at most {_MOST_BYTES} bytes")
-            values = tomllib.loads(file.read_text(encoding="utf-8"))
+            values = tomllib.loads(file.read_text(encoding="utf-8-sig"))  # some editors begin with a mark
         except OSError as error:
             raise SceneError(
                 [
@@ -126,8 +126,16 @@ def _line(problem: dict[str, Any]) -> str:
         return f"{field} is one table: there may be several: write [[{field}]] above each"
     if problem["type"] == "model_type":
         return f"{field} is {problem['input']!r}: it must be a table: write [{field}] above its fields"
+    rule = _RULES.get(problem["type"], rule)
     return f"{field} is {problem['input']!r}: it {rule}"
 
+
+#: What must be of a field, where the library's own words are no cure.
+_RULES = {
+    "string_pattern_mismatch": "must begin with a letter, and hold letters, digits, _ and - alone",
+    "tuple_type": "must be a list: write [...] about it",
+    "dict_type": "must be a table: write { name = number }",
+}
 
 #: The models that the names within a field's path stand for.
 _PARTS: dict[str, type[BaseModel]] = {

@@ -121,6 +121,8 @@ class Setting(BaseModel):
         for target in (*self.uavs, *self.birds):
             ends = [target.velocity_mps, target.velocity_mps + target.acceleration_mps2 * radar.dwell_s]
             fastest = max(abs(v) for v in ends)
+            if fastest > _SOUND_MPS:
+                said.append(f"{target.name}: it moves at {fastest:.4g} m/s, faster than sound")
             if fastest > radar.unambiguous_mps:
                 said.append(
                     f"{target.name}: it moves at {fastest:.1f} m/s, beyond the unambiguous {radar.unambiguous_mps:.1f} "

@@ -176,7 +176,8 @@ def _cascade(given: Mapping[str, Given], account: Mapping[str, Any] | None) -> d
     if not stages or not given.keys() >= set(stages):
         return {}
     first, second = (given[name] for name in stages)
-    return {CASCADE: replace(second, files=(*first.files, *second.files), train_s=None)}
+    inputs = tuple(dict.fromkeys((*first.inputs, *second.inputs)))
+    return {CASCADE: replace(second, files=(*first.files, *second.files), inputs=inputs, train_s=None)}
 
 
 def _forms(reference: Records) -> dict[str, NDArray[np.generic]]:

@@ -196,6 +196,17 @@ def test_people_get_a_table_that_fits_80_columns(run, sigmf_pair):
     assert lines[-1] == "2 recordings: 1 uav, 1 unknown"
 
 
+@pytest.mark.parametrize("columns", ["0", "20", "40"])
+def test_no_number_and_no_reason_is_lost_on_a_narrow_terminal(run, sigmf_pair, monkeypatch, columns):
+    monkeypatch.setenv("COLUMNS", columns)
+    code, out, err = run(sigmf_pair("one"), sigmf_pair("two", sample_rate=1000.0))
+    assert (code, err) == (0, "")
+    assert "…" not in out
+    text = " ".join(out.split())
+    assert "0.000 0.080 uav 0.80 0.15 0.05" in text
+    assert all(word in text for word in ("unambiguous", "velocity", "7.5", "below", "raise", "PRF"))
+
+
 def test_the_summary_counts_the_unreadable(run, sigmf_pair, tmp_path):
     code, out, _ = run(sigmf_pair(), tmp_path / "gone")
     assert code == 2

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -188,3 +189,31 @@ def test_values_that_nothing_uses_are_warned_of_on_the_terminal(scene_file, tmp_
     assert len(lines) == 2
     assert 'fading_db changes nothing without "fading" among the effects' in lines[0]
     assert "rain_width_mps changes nothing of a receiver" in lines[1]
+
+
+@pytest.mark.parametrize(
+    ("added", "said"),
+    [
+        ('[[bird]]\nname = "Möwe"\nspecies = "herring_gull"', r"bird\[1\].name is 'Möwe': it must begin with a letter"),
+        ('[receiver]\neffects = "fading"', r"receiver.effects is 'fading': it must be a list: write \[...\] about it"),
+        ("[receiver]\nvalues = [1]", r"receiver.values is \[1\]: it must be a table: write { name = number }"),
+    ],
+)
+def test_a_field_of_another_kind_gets_its_cure(scene_file, capsys, added, said):
+    scene_file.write_text(f"{SCENE}{added}\n")
+    assert main(["simulate", str(scene_file), "--explain"]) == 2
+    assert re.search(said, capsys.readouterr().err)
+
+
+def test_a_scene_may_begin_with_the_mark_of_its_encoding(scene_file, capsys):
+    scene_file.write_text(SCENE, encoding="utf-8-sig")
+    assert main(["simulate", str(scene_file), "--explain"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_a_folder_is_no_name_for_a_recording(scene_file, tmp_path, capsys):
+    assert main(["simulate", str(scene_file), "--out", f"{tmp_path}/"]) == 2
+    assert (
+        f"{tmp_path} is a folder: name the recording in it: give --out {tmp_path / 'NAME'}" in capsys.readouterr().err
+    )
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]

@@ -306,6 +306,6 @@ def test_the_command_names_what_is_wrong(tmp_path, capsys):
     assert "--records is '599': it must be greater than or equal to 600" in capsys.readouterr().err
     (tmp_path / "file").write_text("")
     assert main(["dataset", str(tmp_path / "file"), "--records", "600"]) == 2
-    assert "cannot be written" in capsys.readouterr().err
+    assert "cannot be written: File exists: give another folder" in capsys.readouterr().err
     assert main(["train", "--data", str(tmp_path), "--out", str(tmp_path / "m")]) == 2
     assert "give the folder that `bladewing dataset` wrote" in capsys.readouterr().err

@@ -81,7 +81,7 @@ def test_samples_that_are_refused(npy, array, said):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({}, "no carrier and no PRF: give --carrier-hz and --prf-hz"),
+        ({}, "of arrays the samples alone are read: give --carrier-hz and --prf-hz"),
         ({"prf_hz": PRF_HZ}, "no carrier .*: give --carrier-hz"),
         ({"carrier_hz": CARRIER_HZ}, "no PRF .*: give --prf-hz"),
         (RADAR | {"prf_hz": 0.0}, "PRF given is 0: it must be a finite number above 0"),
@@ -93,6 +93,14 @@ def test_samples_that_are_refused(npy, array, said):
 def test_carrier_and_prf_must_be_known(npy, options, said):
     with pytest.raises(BadInput, match=said):
         load_recording(npy(noise(100)), **options)
+
+
+@pytest.mark.parametrize(
+    ("shape", "cure"), [((100, 2), r"x\[:, 0\] \+ 1j \* x\[:, 1\]"), ((2, 100), r"x\[0\] \+ 1j \* x\[1\]")]
+)
+def test_parts_along_an_axis_of_two_are_told_how_to_join(npy, shape, cure):
+    with pytest.raises(BadInput, match=f"I and Q must be one complex number: store {cure}"):
+        load_recording(npy(np.ones(shape, np.float32)), **RADAR)
 
 
 def test_a_directory_is_refused_with_the_cure(tmp_path):

@@ -378,6 +378,7 @@ def test_options_come_before_the_file_and_the_file_before_quick(tmp_path):
         ('models = ["magic"]', r"models holds 'magic': it may hold features-linear"),
         ("models = []", r"models is \[\]"),
         ("records = = 3", "not TOML"),
+        ('models = "spectrum-cnn"', r"models is 'spectrum-cnn': it must be a list: write \[\.\.\.\] about it"),
     ],
 )
 def test_wrong_settings_get_one_line_that_names_them(tmp_path, text, match):

@@ -177,6 +177,9 @@ def test_bad_arguments_are_refused():
     for wrong in ({"blades": 0}, {"blades": 1.5}, {"beta_rad": np.pi / 2}, {"beta_rad": -0.1}):
         with pytest.raises(ValueError, match="must be"):
             measure(iq, **RADAR, **wrong)
+    for radar in ({"carrier_hz": 9.85}, {"prf_hz": 0.5}, {"carrier_hz": np.nan}):  # in GHz; in MHz; none
+        with pytest.raises(ValueError, match=r"is .*: it must be .* Hz: 9\.85 GHz is 9\.85e9"):
+            measure(iq, **RADAR | radar)
     with pytest.raises(ValueError, match="not finite"):
         measure(np.where(np.arange(PULSES) == 5, np.nan, iq), **RADAR)
     with pytest.raises(ValueError, match="iq holds float64: its samples must be complex"):
