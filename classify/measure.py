@@ -322,10 +322,14 @@ def with_error(value: float, std: float) -> str:
     '116.667 +- 0.012'
     >>> with_error(7220.4, 61.2)
     '7220 +- 61'
+    >>> with_error(6.1, 1e-7)
+    '6.10000 +- <0.00001'
     """
     if not (math.isfinite(value) and math.isfinite(std)):
         return "-"
-    digits = 0 if std >= 9.5 else min(5, 1 - math.floor(math.log10(max(std, 1e-5))))
+    if std < 5e-6:
+        return f"{value:.5f} +- <0.00001"
+    digits = 0 if std >= 9.5 else min(5, 1 - math.floor(math.log10(std)))
     return f"{value:.{digits}f} +- {std:.{digits}f}"
 
 

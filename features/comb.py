@@ -115,12 +115,13 @@ def _contrast(strong: float, weak: float) -> float:
     return max(strong - 1, 0) / max(weak - 1, 0.1)
 
 
-def of_mains(fit: CombFit, data: Periodogram, score: float) -> bool:
-    """True where spacing and centre of a comb are both multiples of the mains, or a weak comb's spacing is."""
+def of_mains(fit: CombFit, data: Periodogram, score: float, per_turn: int = 1) -> bool:
+    """True where spacing and centre of a comb's strong lines are multiples of the mains, or a weak comb's spacing is."""
+    spacing = fit.spacing * per_turn
     for mains_hz in MAINS_HZ:
-        multiple = round(fit.spacing * data.prf_hz / mains_hz)
-        if multiple in MAINS_MULTIPLES and abs(fit.spacing * data.prf_hz / (multiple * mains_hz) - 1) < MAINS_SHARE:
-            base = fit.spacing / multiple
+        multiple = round(spacing * data.prf_hz / mains_hz)
+        if multiple in MAINS_MULTIPLES and abs(spacing * data.prf_hz / (multiple * mains_hz) - 1) < MAINS_SHARE:
+            base = spacing / multiple
             off = abs(fit.centre - base * round(fit.centre / base)) * data.pulses
             return (data.rest_half > 0 and score < MAINS_SCORE) or off < max(0.2, 3 * fit.centre_std * data.pulses)
     return False
@@ -197,10 +198,11 @@ def find_comb(data: Periodogram) -> tuple[Comb | None, str]:
             f"dwell too short: lines {fit.spacing * data.prf_hz:.0f} Hz apart with others between them, "
             f"a dwell of {1e3 * least_s:.0f} ms tells them apart"
         )
-    if of_mains(fit, data, start.score):
-        return None, f"no rotor: lines every {fit.spacing * data.prf_hz:.1f} Hz may be the mains"
     seen = fit.amplitudes + LineSpace(fitted[1]).at(fit.frequencies)[0]
     power = np.abs(seen) ** 2 * data.pulses / data.level_of(fitted[1])(fit.frequencies)
     within = (fit.orders >= start.low) & (fit.orders <= start.high)
     per_turn = strong_multiple(fit.orders[within], power[within])
+    for number in {1, per_turn}:
+        if of_mains(fit, data, start.score, number):
+            return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"
     return Comb(fit, fitted[1], max(start.high, -start.low), per_turn, open_orders * fit.spacing), ""

@@ -39,6 +39,9 @@ FOREIGN_FACTOR, FOREIGN_ORDERS = 10.0, 8
 #: been folded back between its lines.
 SPAN, SPAN_SHARE, SPAN_DEVIATIONS = 0.49, 0.05, 4.0
 
+#: No blade's tip is faster [m/s]; a radar of a wide span sees further, but what stands there is another's or noise.
+FASTEST_TIP_MPS = 250.0
+
 #: The orders beyond this share of the span are those asked whether it ends there.
 SPAN_OUTER = 0.9
 
@@ -48,6 +51,11 @@ NOISE_ORDERS, NOISE_BELOW = 0.1, 1.28
 
 #: Rotors that are not told apart differ by about so much in their rates, relative.
 LEAST_SPREAD = 0.02
+
+
+def span_of(data: Periodogram) -> float:
+    """How far from the body lines of a rotor are looked for [cycles a sample]: `SPAN`, or the fastest tip's."""
+    return min(SPAN, 2 * FASTEST_TIP_MPS / (data.wavelength_m * data.prf_hz))
 
 
 def edge_of_lines(
@@ -79,7 +87,8 @@ def edge_of_lines(
     """
     spacings = np.array([fit.spacing * per_turn for fit in fits])
     fastest = float(spacings.max())
-    order = np.arange(1, int(SPAN / fastest) + 1)
+    span = span_of(data)
+    order = np.arange(1, max(int(span / fastest), 1) + 1)
     sides = np.array([[-1], [1]]) * order
     centres = np.array([fit.centre for fit in fits])
     frequency = np.asarray(centres[:, None, None] + spacings[:, None, None] * sides, np.float64)
@@ -97,7 +106,7 @@ def edge_of_lines(
     if not seen.any():
         return 0.0, np.inf
     count = number[seen]
-    if _fills_span(order[seen] * fastest, total[seen], noise[seen], count):
+    if _fills_span(order[seen] * fastest, total[seen], noise[seen], count, span):
         return np.inf, np.inf
     leak = SEVERAL_LEAK if len(fits) > 1 else LEAK_SHARE
     edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades, leak=leak)
@@ -134,7 +143,11 @@ def _foreign(power: NDArray[np.float64], number: NDArray[np.floating]) -> NDArra
 
 
 def _fills_span(
-    away: NDArray[np.float64], total: NDArray[np.float64], noise: NDArray[np.float64], bins: NDArray[np.float64]
+    away: NDArray[np.float64],
+    total: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    bins: NDArray[np.float64],
+    span: float,
 ) -> bool:
     """True where a line family still stands at the end of the span.
 
@@ -144,13 +157,15 @@ def _fills_span(
         Distance of each order from the body, rising [cycles a sample].
     total, noise : ndarray, shape (orders,)
         Power of its lines with their noise, and of that alone, summed over so many `bins`.
+    span : float
+        From `span_of`.
     """
-    outer = (away > SPAN_OUTER * SPAN) | (away == away[-1])
+    outer = (away > SPAN_OUTER * span) | (away == away[-1])
     excess, number = total - noise, bins[outer].sum()
     deviation = float(np.sqrt((noise[outer] ** 2 / bins[outer]).sum()))
     stands = float(excess[outer].sum()) > SPAN_DEVIATIONS * deviation
     mean = float(excess.sum() / bins.sum())
-    return bool(away[-1] > SPAN / 2 and stands and excess[outer].sum() / number > SPAN_SHARE * mean)
+    return bool(away[-1] > span / 2 and stands and excess[outer].sum() / number > SPAN_SHARE * mean)
 
 
 def _amplitudes_at(fit: CombFit, orders: NDArray[np.intp]) -> NDArray[np.complex128]:
@@ -198,7 +213,8 @@ def edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | Non
     """
     nominal, centre = float(np.mean([rotors.rates.min(), rotors.rates.max()])), rotors.fits[0].centre
     size, pulses = len(data.power), data.pulses
-    order = np.arange(1, int(SPAN / nominal) + 1)
+    span = span_of(data)
+    order = np.arange(1, max(int(span / nominal), 1) + 1)
     spread = max(rotors.spread, LEAST_SPREAD * nominal)
     half_bins = min(nominal * pulses / 2, 1 + comb.last / comb.per_turn * spread * pulses)
     half = int(half_bins * size / pulses)
@@ -215,7 +231,7 @@ def edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | Non
     # means of so many exponentials are those of Wilson and Hilferty's cube
     lowest = (1 - 1 / (9 * count) - NOISE_BELOW / (3 * np.sqrt(count))) ** 3
     noise = np.full(len(count), min(float(np.quantile(total[seen] / count / lowest, NOISE_ORDERS)), 1.0))
-    if _fills_span(np.asarray(order[seen] * nominal, np.float64), total[seen], noise * count, count):
+    if _fills_span(np.asarray(order[seen] * nominal, np.float64), total[seen], noise * count, count, span):
         return np.inf, np.inf
     # once the lines part, what they have of one another falls with the square of their distance
     scatter = np.asarray(AROUND_SCATTER / (1 + (2 * order[seen] * rotors.spread * pulses) ** 2), np.float64)

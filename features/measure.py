@@ -12,11 +12,11 @@ from .bandwidth import threshold_band_hz
 from .body_velocity import body_velocity, folded
 from .chopping import Chopping
 from .comb import LEAST_REACH_MPS, find_comb
-from .family_edge import SPAN, edge_around, edge_of_lines, surer_edge
+from .family_edge import SPAN, edge_around, edge_of_lines, span_of, surer_edge
 from .helicopter import find_gear
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .one_thread import one_thread
-from .periodogram import prepared
+from .periodogram import Periodogram, prepared
 from .rotors import MAX_ROTORS
 from .smearing import smearing_index
 from .spectrum import LEAST_PART, Spectrum, doppler_spectrum, finite_complex, largest_part
@@ -226,6 +226,14 @@ def _record(spectrum: Spectrum, index: tuple[int, ...]) -> Spectrum:
     )
 
 
+def _slower_than_rotors(data: Periodogram, edge: float, edge_std: float) -> str:
+    """Why a line family of this edge [cycles a sample] is no rotor's; empty where it may be one's."""
+    edge_mps, edge_std_mps = (value * data.prf_hz * data.wavelength_m / 2 for value in (edge, edge_std))
+    if edge_mps + edge_std_mps < LEAST_REACH_MPS:
+        return f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
+    return ""
+
+
 def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | None, beta_rad: float | None) -> dict:
     """The numbers of one record, by the names of `Measurements`."""
     out: dict = {field.name: np.nan for field in fields(Measurements)}
@@ -242,24 +250,25 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     out["notch_residual_db"] = float(notch_residual_db(spectrum, mask))
     low, high = threshold_band_hz(spectrum, PAPER_THRESHOLD_DB)
     out["threshold_bandwidth_hz"] = float(high - low)
-    comb, out["reason"] = find_comb(data)
+    comb, why = find_comb(data)
     prf_hz, wavelength_m = data.prf_hz, data.wavelength_m
-    if comb is not None:
-        edge, edge_std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades)
-        edge_mps, edge_std_mps = (value * prf_hz * wavelength_m / 2 for value in (edge, edge_std))
-        if edge_mps + edge_std_mps < LEAST_REACH_MPS:
-            comb, out["reason"] = (
-                None,
-                f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s",
-            )
+    blank, whole = dict(out), data
+
+    def without_rotor(reason: str) -> dict:
+        return blank | {"reason": reason} | dict(zip(BODY, body_velocity(whole, spectrum, None), strict=True))
+
     if comb is None:
-        return out | dict(zip(BODY, body_velocity(data, spectrum, None), strict=True))
+        return without_rotor(why)
+    edge, edge_std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades)
+    if slow := _slower_than_rotors(data, edge, edge_std):
+        return without_rotor(slow)
+    out["reason"] = ""
     out["chopping_hz"], out["chopping_hz_std"] = comb.chopping * prf_hz, comb.chopping_std * prf_hz
     out["comb_order"] = float(comb.last // comb.per_turn)
     out["comb_snr_db"] = float(10 * np.log10(max(comb.fit.snr.sum() / data.pulses, 1e-9)))
 
-    fills = np.isinf(edge)
-    gear, rotors, out["gear_reason"] = find_gear(data, comb, min(edge, SPAN))
+    fills, span = np.isinf(edge), span_of(data)
+    gear, rotors, out["gear_reason"] = find_gear(data, comb, min(edge, span))
     if gear is not None:
         data, comb = gear.alone, gear.first
         out["chopping_hz"], out["chopping_hz_std"] = comb.chopping * prf_hz, comb.chopping_std * prf_hz
@@ -281,6 +290,8 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     elif count > 1 and not edge_std < UNSURE_SHARE * edge:  # the lines of rates just resolved hardly part within it
         around = edge_around(data, comb, rotors, blades)
         edge, edge_std = around if np.isinf(edge) else surer_edge((edge, edge_std), around)
+    if slow := _slower_than_rotors(data, edge, edge_std):
+        return without_rotor(slow)
     for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):
         padded = np.full(MAX_ROTORS, np.nan)
         padded[:count] = values * prf_hz
@@ -290,10 +301,13 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     # unequal blades tell their number; between the lines of several rotors the weak ones may be something else
     seen = comb.per_turn if comb.per_turn > 1 and count == 1 else None
     known = blades if blades is not None else seen
-    if fills or not edge + EDGE_DEVIATIONS * edge_std < FURTHEST_EDGE:
-        least_mps = FURTHEST_EDGE * prf_hz * wavelength_m / 2
+    furthest = FURTHEST_EDGE * span / SPAN
+    if fills or not edge + EDGE_DEVIATIONS * edge_std < furthest:
+        least_mps = furthest * prf_hz * wavelength_m / 2
         out["band_reason"] = (
             f"no band: lines may fill the unambiguous span, tips of {least_mps:.1f} m/s and more: raise the PRF"
+            if span == SPAN
+            else f"no band: lines reach {least_mps:.0f} m/s and more from the body, faster than any blade's tip"
         )
         edge = edge_std = np.nan
     # counted from a line beside the body's, the family is so much the wider on one side

@@ -31,8 +31,8 @@ THINNED_BINS = 4
 #: Half width taken out about the body line [m/s]. A body is steadier than the clutter about velocity zero.
 BODY_NOTCH_MPS = 0.5
 
-#: No wider band is taken out [bins], 3 m/s of 160 ms at 100 GHz: the sequences that span it fill memory.
-MOST_NOTCH_BINS = 320
+#: No wider band is taken out [bins], 3 m/s of 80 ms at 100 GHz: the sequences that span it fill memory.
+MOST_NOTCH_BINS = 160
 
 #: A second body's line stands so far over all others but the first one's [dB]: a bird's beside a drone, or a drone's.
 OTHER_OVER_DB = 8.0

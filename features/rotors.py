@@ -25,6 +25,10 @@ RATE_SPREAD, FURTHEST_SPREAD, INNER_ORDERS = 0.05, (-0.25, 0.33), 10
 #: The lines of one of these reach this share of what the others' do: else they are what rotors not told apart leave.
 APART_REACH = 0.5
 
+#: Lines that are fitted together at most, memory and time growing with their square and cube; rotors that would have
+#: more are not told apart.
+MOST_LINES = 2000
+
 #: A further rotor must have this much evidence [nats], and this share of the strongest one's.
 LEAST_EVIDENCE = 13.0
 LEAST_SHARE = 0.03
@@ -281,6 +285,9 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
         if not fits and comb.per_turn == 1 and abs(rate - nominal) < resolution:
             fits, rest, reaches = [comb.fit], data.left(comb.rest), [far]
             continue
+        if 2 * (sum(reaches) + far) > MOST_LINES:
+            resolved = False
+            break
         spacings = [*(fit.spacing for fit in fits), rate]
         outermost = [(-r, r) for r in (*reaches, far)]
         fitted = fit_combs(data, centre, spacings, outermost, JOINT_STEPS, rest=rest.samples)

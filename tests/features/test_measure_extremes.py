@@ -1,0 +1,64 @@
+"""What `measure` says at radars and dwells far from those that rotors are usually measured with."""
+
+import numpy as np
+import pytest
+from bladewing.features import measure, rotors
+from bladewing.features.comb import LEAST_REACH_MPS
+from bladewing.simulate import Radar, draw_records
+
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, white
+from .signals import rotors as blades
+
+RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+
+
+def comb(prf_hz: float, pulses: int, spacing_hz: float, amplitudes: np.ndarray, seed: int = 0) -> np.ndarray:
+    """Lines about velocity zero, amplitudes of orders 0, 1, -1, 2, ..., of random phases, in noise."""
+    rng = np.random.default_rng(seed)
+    order = np.arange(len(amplitudes))
+    order = np.where(order % 2, -(order + 1) // 2, order // 2)
+    turns = np.outer(np.arange(pulses) / prf_hz, order * spacing_hz) + rng.uniform(size=len(order))
+    return np.exp(2j * np.pi * turns) @ amplitudes + white(rng, pulses)
+
+
+def test_lines_beyond_every_blades_speed_give_no_band():
+    radar = {"carrier_hz": 2e9, "prf_hz": 100e3}  # 3700 m/s to each side
+    whole = measure(comb(100e3, 8000, 116.3, np.append(20, np.full(800, 0.2))), **radar)
+    assert abs(whole.chopping_hz - 116.3) < 0.5
+    assert np.isnan([whole.tip_speed_mps, whole.bandwidth_hz]).all()
+    assert "faster than any blade's tip" in str(whole.band_reason)
+    some = measure(comb(100e3, 8000, 116.3, np.append(20, np.full(20, 1.0))), **radar)
+    assert abs(some.tip_speed_mps - 10.5 * 116.3 * 299_792_458 / 2e9 / 2) < 10
+    assert some.band_reason == ""
+
+
+def test_no_tip_is_faster_than_any_blades():
+    radar = Radar(2e9, 1e5, 8000)
+    iq = draw_records(radar, 12, 21, kind="quadcopter").iq
+    tips = measure(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz).tip_speed_mps
+    assert np.isfinite(tips).sum() > 3
+    assert not (tips > 300).any()
+
+
+def test_no_rotor_is_left_whose_band_ends_below_those_of_rotors():
+    radar = Radar(1e11, 1e5, 6000)
+    birds = draw_records(radar, 12, 11, start=12, kind="flapping_bird").iq
+    found = measure(birds, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
+    some = np.isfinite(found.tip_speed_mps)
+    assert (found.tip_speed_mps + found.tip_speed_mps_std >= LEAST_REACH_MPS)[some].all()
+    assert np.isnan(found.chopping_hz[found.reason != ""]).all()
+
+
+@pytest.mark.parametrize("weak", [0.0, 0.3])
+def test_a_hum_between_whose_lines_others_stand_is_one(weak):
+    strong = np.arange(1, 242) // 2 % 3 == 0  # every third of 20 Hz
+    hum = measure(comb(20e3, 6000, 20.0, np.where(strong, 1.0, weak)), carrier_hz=24e9, prf_hz=20e3)
+    assert "60.0 Hz may be the mains" in str(hum.reason)
+
+
+def test_rotors_of_more_lines_than_are_fitted_together_are_not_told_apart(monkeypatch):
+    iq = blades([56.6, 57.4, 58.3]) * 3 + white(np.random.default_rng(0), PULSES)
+    assert measure(iq, **RADAR).rotor_count == 3
+    monkeypatch.setattr(rotors, "MOST_LINES", 40)
+    found = measure(iq, **RADAR)
+    assert (found.rotor_count, found.rotors_resolved) == (1, False)
