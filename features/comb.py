@@ -116,7 +116,7 @@ def _contrast(strong: float, weak: float) -> float:
 
 
 def of_mains(fit: CombFit, data: Periodogram, score: float, per_turn: int = 1) -> bool:
-    """True where spacing and centre of a comb's strong lines are multiples of the mains, or a weak comb's spacing is."""
+    """True where spacing and centre of strong lines, `per_turn` apart, are the mains', or of a weak comb the spacing."""
     spacing = fit.spacing * per_turn
     for mains_hz in MAINS_HZ:
         multiple = round(spacing * data.prf_hz / mains_hz)
@@ -202,7 +202,7 @@ def find_comb(data: Periodogram) -> tuple[Comb | None, str]:
     power = np.abs(seen) ** 2 * data.pulses / data.level_of(fitted[1])(fit.frequencies)
     within = (fit.orders >= start.low) & (fit.orders <= start.high)
     per_turn = strong_multiple(fit.orders[within], power[within])
-    for number in {1, per_turn}:
+    for number in sorted({1, per_turn}):
         if of_mains(fit, data, start.score, number):
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"
     return Comb(fit, fitted[1], max(start.high, -start.low), per_turn, open_orders * fit.spacing), ""
