@@ -116,7 +116,7 @@ def _contrast(strong: float, weak: float) -> float:
 
 
 def of_mains(fit: CombFit, data: Periodogram, score: float, per_turn: int = 1) -> bool:
-    """True where spacing and centre of strong lines, `per_turn` apart, are the mains', or of a weak comb the spacing."""
+    """True where spacing and centre of strong lines (`per_turn` apart) are the mains', or a weak comb's spacing is."""
     spacing = fit.spacing * per_turn
     for mains_hz in MAINS_HZ:
         multiple = round(spacing * data.prf_hz / mains_hz)
