@@ -244,9 +244,11 @@ def test_a_cascade_stands_on_the_front_only_where_both_its_models_are_given() ->
     from bladewing.classify.report import run
 
     of_account = run._cascade
-    models = {name: front.Given((name.encode(),), ("features",), 1.0) for name in ("a", "b")}
+    reads = {"a": ("levels", "cadence"), "b": ("cadence", "features")}
+    models = {name: front.Given((name.encode(),), inputs, 1.0) for name, inputs in reads.items()}
     told = {"cascade": {"stages": ["a", "b"]}}
-    assert of_account(models, told)["cascade"].files == (b"a", b"b")
+    both = of_account(models, told)["cascade"]
+    assert (both.files, both.inputs) == ((b"a", b"b"), ("levels", "cadence", "features"))
     for account in (None, {}, {"cascade": None}, {"cascade": {"stages": ["a", "c"]}}):
         assert of_account(models, account) == {}
 
