@@ -223,8 +223,8 @@ class Classifier:
         except ValueError as error:
             raise BadInput(f"{source}: {error}") from None
         self.envelope, self.accept = _read_metadata(self.metadata, source)
-        keep_freed()
         self._session = _open_session(onnx_bytes, source, threads)
+        keep_freed()
         if dict(self._session.get_modelmeta().custom_metadata_map) != dict(self.metadata):
             raise BadInput(f"{source}: damaged metadata: onnxruntime reads others: train it again")
         self.inputs = self._reads = _read_inputs(self._session, source)
