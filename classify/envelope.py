@@ -139,8 +139,9 @@ class Envelope:
         return f"take {needed} pulses, {_up(needed / prf_hz)} s, or more (dwell = pulses / PRF)"
 
     def _shorten(self, prf_hz: float) -> str:
-        longest_s = min(self.pulses_max / prf_hz, self.dwell_max_s)
-        return f"take dwells of {_down(longest_s)} s or less (dwell = pulses / PRF)"
+        # of whole pulses: a dwell in seconds is rounded to them, and must not be rounded up beyond
+        longest = min(self.pulses_max, math.floor(self.dwell_max_s * prf_hz * (1 + _ROUNDING)))
+        return f"take dwells of {_down(longest / prf_hz)} s or less (dwell = pulses / PRF)"
 
     def _prf_for_velocity_hz(self, carrier_hz: float) -> float:
         return 4 * self.unambiguous_min_mps * carrier_hz / SPEED_OF_LIGHT_MPS

@@ -4,7 +4,7 @@ from dataclasses import asdict
 
 import pytest
 from bladewing.classify.envelope import Envelope
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 ENVELOPE = Envelope()
@@ -80,6 +80,7 @@ def test_inside_exactly_where_every_rule_holds(carrier_hz, prf_hz, pulses):
 
 
 @given(st.floats(2e9, 100e9), st.floats(10, 1e6), st.integers(1, 200_000))
+@example(2e9, 1000.75, 5004)  # 5 s are 5003.75 pulses
 def test_who_follows_the_cures_gets_inside(carrier_hz, prf_hz, pulses):
     for _ in range(4):
         reason = ENVELOPE.reason(carrier_hz, prf_hz, pulses)
