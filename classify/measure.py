@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
-from bladewing.features.measure import CARRIER_RANGE_HZ, PRF_RANGE_HZ, Measurements, measure
+from bladewing.features.measure import Measurements, beyond_radars, measure
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 from bladewing.features.steady_comb import OVER_BODY
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
@@ -373,13 +373,8 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     """
     if len(recording.iq) < 2:
         raise BadInput(f"{recording.name}: 1 pulse: a measurement needs at least 2")
-    for what, value, (low, high) in (
-        ("carrier", recording.carrier_hz, CARRIER_RANGE_HZ),
-        ("PRF", recording.prf_hz, PRF_RANGE_HZ),
-    ):
-        if not low <= value <= high:
-            said = f"the {what} is {value:g} Hz: it must be {low:g} to {high:g} Hz"
-            raise BadInput(f"{recording.name}: {said}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3")
+    if beyond := beyond_radars(recording.carrier_hz, recording.prf_hz):
+        raise BadInput(f"{recording.name}: {beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3")
     iq = recording.dwells(settings.dwell_s, least=2)
     count, pulses = iq.shape
     radar = {"carrier_hz": recording.carrier_hz, "prf_hz": recording.prf_hz}

@@ -58,6 +58,11 @@ def span_of(data: Periodogram) -> float:
     return min(SPAN, 2 * FASTEST_TIP_MPS / (data.wavelength_m * data.prf_hz))
 
 
+def _orders(spacing: float, span: float) -> NDArray[np.intp]:
+    """Orders of the lines within a span, the first at least."""
+    return np.arange(1, max(int(span / spacing), 1) + 1)
+
+
 def edge_of_lines(
     data: Periodogram, fits: list[CombFit], rest: NDArray[np.complex128], per_turn: int, blades: int | None
 ) -> tuple[float, float]:
@@ -88,7 +93,7 @@ def edge_of_lines(
     spacings = np.array([fit.spacing * per_turn for fit in fits])
     fastest = float(spacings.max())
     span = span_of(data)
-    order = np.arange(1, max(int(span / fastest), 1) + 1)
+    order = _orders(fastest, span)
     sides = np.array([[-1], [1]]) * order
     centres = np.array([fit.centre for fit in fits])
     frequency = np.asarray(centres[:, None, None] + spacings[:, None, None] * sides, np.float64)
@@ -214,7 +219,7 @@ def edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | Non
     nominal, centre = float(np.mean([rotors.rates.min(), rotors.rates.max()])), rotors.fits[0].centre
     size, pulses = len(data.power), data.pulses
     span = span_of(data)
-    order = np.arange(1, max(int(span / nominal), 1) + 1)
+    order = _orders(nominal, span)
     spread = max(rotors.spread, LEAST_SPREAD * nominal)
     half_bins = min(nominal * pulses / 2, 1 + comb.last / comb.per_turn * spread * pulses)
     half = int(half_bins * size / pulses)

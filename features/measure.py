@@ -149,6 +149,14 @@ class Measurements:
         ]
 
 
+def beyond_radars(carrier_hz: float, prf_hz: float) -> str:
+    """Which of both is no frequency of a radar that is measured, and the rule; empty where both are."""
+    for name, value, (low, high) in (("carrier", carrier_hz, CARRIER_RANGE_HZ), ("PRF", prf_hz, PRF_RANGE_HZ)):
+        if not low <= value <= high:
+            return f"the {name} is {value:g} Hz: it must be {low:g} to {high:g} Hz"
+    return ""
+
+
 def measure(
     iq: ArrayLike,
     *,
@@ -186,12 +194,8 @@ def measure(
         If `iq` is not complex, has fewer than 2 pulses or holds a value that is not finite, or an argument is out of
         its range.
     """
-    for name, value, (low, high) in (
-        ("carrier_hz", carrier_hz, CARRIER_RANGE_HZ),
-        ("prf_hz", prf_hz, PRF_RANGE_HZ),
-    ):
-        if not low <= value <= high:
-            raise ValueError(f"{name} is {value!r}: it must be {low:g} to {high:g} Hz: 9.85 GHz is 9.85e9")
+    if beyond := beyond_radars(carrier_hz, prf_hz):
+        raise ValueError(f"{beyond}: 9.85 GHz is 9.85e9")
     if blades is not None and (blades != int(blades) or blades < 1):
         raise ValueError(f"blades is {blades!r}: it must be a whole number of at least 1")
     if beta_rad is not None and not 0 <= beta_rad < np.pi / 2:
