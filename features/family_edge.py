@@ -49,6 +49,14 @@ SPAN_OUTER = 0.9
 #: deviations below its mean lies the lowest such share of what is noise alone.
 NOISE_ORDERS, NOISE_BELOW = 0.1, 1.28
 
+#: From so many times the edge on there is noise alone. Where its nearer and its further half differ by more than this
+#: and three deviations [nats], and by more than the share of the family's power that leaks there, the receiver's band
+#: is not flat.
+PAST_EDGE, UNEVEN_NATS, UNEVEN_SHARE = 1.15, 0.1, 5e-4
+
+#: The noise shows between the lines of rotors not told apart where these are spread over less than this [orders].
+GAPS_SHOW = 0.4
+
 #: Rotors that are not told apart differ by about so much in their rates, relative.
 LEAST_SPREAD = 0.02
 
@@ -197,6 +205,51 @@ def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple
     return lines if agreed and lines[1] < around[1] else around
 
 
+def _uneven_past(order: NDArray[np.intp], mean: NDArray[np.float64], bins: NDArray[np.float64], edge: float) -> bool:
+    """True where what lies about the orders past an edge is no flat noise, by more than leaks there from within.
+
+    Parameters
+    ----------
+    order : ndarray of int, shape (orders,)
+        Rising.
+    mean, bins : ndarray, shape (orders,)
+        Mean power about each, and of how many bins.
+    edge : float
+        Where a family is said to end [orders].
+    """
+    past = np.flatnonzero(order > PAST_EDGE * edge)
+    if len(past) < 2:
+        return False
+    parts = np.array_split(past, 2)
+    near, far = (max(float(np.average(mean[part], weights=bins[part])), 1e-9) for part in parts)
+    deviation = float(np.sqrt(sum(1 / bins[part].sum() for part in parts)))
+    within = float(mean[: max(int((order < edge).sum()), 1)].mean())
+    return abs(np.log(near / far)) > UNEVEN_NATS + 3 * deviation and abs(near - far) > UNEVEN_SHARE * within
+
+
+def _noise_about(smear: NDArray[np.float64], level: NDArray[np.float64], flat: float) -> NDArray[np.float64]:
+    """Noise of a receiver whose band is not flat, about each order of rotors that are not told apart.
+
+    The local level tells it; but where the lines fill all that lies between the orders they lift that. There it is no
+    more than what leads from the last level that is sure to the lowest of all.
+
+    Parameters
+    ----------
+    smear : ndarray, shape (orders,)
+        How far the lines about each order are spread, rising [orders].
+    level : ndarray, same shape
+        Local level.
+    flat : float
+        The lowest of all.
+    """
+    last = int((smear < GAPS_SHOW).sum())
+    if last in (0, len(level)):
+        return level if last else np.full(len(level), flat)
+    start = float(np.log(level[max(last - 3, 0) : last].mean()))
+    way = np.linspace(start, min(float(np.log(flat)), start), len(level) - last + 1)[1:]
+    return np.concatenate([level[:last], np.minimum(level[last:], np.exp(way))])
+
+
 def edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | None) -> tuple[float, float]:
     """Edge of the line family by all that lies about each order: rotors that are not told apart count too.
 
@@ -235,22 +288,23 @@ def edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | Non
     # what lies between the lines lifts the local level, and lines that fill most of the span the floor; the lowest
     # means of so many exponentials are those of Wilson and Hilferty's cube
     lowest = (1 - 1 / (9 * count) - NOISE_BELOW / (3 * np.sqrt(count))) ** 3
-    noise = np.full(len(count), min(float(np.quantile(total[seen] / count / lowest, NOISE_ORDERS)), 1.0))
+    mean = total[seen] / count
+    flat = min(float(np.quantile(mean / lowest, NOISE_ORDERS)), 1.0)
+    noise = np.full(len(count), flat)
     if _fills_span(np.asarray(order[seen] * nominal, np.float64), total[seen], noise * count, count, span):
         return np.inf, np.inf
     # once the lines part, what they have of one another falls with the square of their distance
     scatter = np.asarray(AROUND_SCATTER / (1 + (2 * order[seen] * rotors.spread * pulses) ** 2), np.float64)
-    edge, std = fit_edge(
-        order[seen],
-        total[seen] / count,
-        noise,
-        count,
-        blades,
-        scatter=scatter,
-        leak=SEVERAL_LEAK,
-        spread=spread / nominal,
-    )
+    relative = spread / nominal
+
+    def fitted(noise: NDArray[np.float64]) -> tuple[float, float]:
+        return fit_edge(order[seen], mean, noise, count, blades, scatter=scatter, leak=SEVERAL_LEAK, spread=relative)
+
+    edge, std = fitted(noise)
+    if _uneven_past(order[seen], mean, count, edge):
+        level = np.where(usable, data.level_at(frequency), 0.0).sum(axis=-1) * pulses / size
+        edge, std = fitted(_noise_about(order[seen] * relative, (level * own).sum(axis=0)[seen] / count, flat))
     fastest = float(max(nominal, rotors.rates.max()))
     # where the orders mix at the edge, the tips of the fastest and of the slowest are all that is told apart
-    mixed = edge * spread / nominal / 2
+    mixed = edge * relative / 2
     return edge * fastest, float(np.hypot(std, mixed if mixed > MIXED_LINES else AROUND_LINES)) * fastest
