@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .allocator import keep_freed
-from .bandwidth import threshold_band_hz
+from .bandwidth import half_empty, threshold_band_hz
 from .body_velocity import body_velocity, folded
 from .chopping import Chopping
 from .comb import LEAST_REACH_MPS, find_comb
@@ -32,6 +32,9 @@ FURTHEST_EDGE, EDGE_DEVIATIONS = 0.48, 3.0
 
 #: Fitted lines that tell the edge of several rotors to no more than this share of it leave it to all about the orders.
 UNSURE_SHARE = 0.03
+
+#: Why there is no band where one channel was made analytic: the lines on both sides of the body lie in one another.
+ONE_CHANNEL = "no band: one side of the spectrum is empty, one channel has both folded onto the other: record I and Q"
 
 #: The fields of the body's velocity and its deviation.
 BODY = ("body_velocity_mps", "body_velocity_mps_std")
@@ -88,7 +91,8 @@ class Measurements:
     gear_reason : ndarray of str
         Why there is no second comb; empty where there is one.
     band_reason : ndarray of str
-        Why there is a comb but no band, tip speed and blade length: its lines fill the unambiguous span; else empty.
+        Why there is a comb but no band, tip speed and blade length: its lines fill the unambiguous span, or a single
+        channel has both sides of the body folded onto one; else empty.
     """
 
     body_velocity_mps: NDArray[np.float64]
@@ -281,7 +285,11 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         out["gear_ratio"], out["gear_ratio_std"] = gear.ratio, gear.ratio_std
     count = len(rotors.rates)
     middle = rotors.fits[0] if count > 1 else comb.fit
-    velocity = body_velocity(data, spectrum, middle, steady=rotors.resolved, open_std=comb.body_std)
+    one_channel = bool(half_empty(spectrum.relative_power))
+    if one_channel:  # about a body whose sides lie in one another nothing is even: its own line tells
+        velocity = body_velocity(whole, spectrum, None)
+    else:
+        velocity = body_velocity(data, spectrum, middle, steady=rotors.resolved, open_std=comb.body_std)
     out |= dict(zip(BODY, velocity, strict=True))
     if count > 1:
         # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
@@ -306,7 +314,10 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     seen = comb.per_turn if comb.per_turn > 1 and count == 1 else None
     known = blades if blades is not None else seen
     furthest = FURTHEST_EDGE * span / SPAN
-    if fills or not edge + EDGE_DEVIATIONS * edge_std < furthest:
+    if one_channel:
+        out["band_reason"] = ONE_CHANNEL
+        edge = edge_std = np.nan
+    elif fills or not edge + EDGE_DEVIATIONS * edge_std < furthest:
         least_mps = furthest * prf_hz * wavelength_m / 2
         out["band_reason"] = (
             f"no band: lines may fill the unambiguous span, tips of {least_mps:.1f} m/s and more: raise the PRF"

@@ -32,8 +32,8 @@ REACH = 3.0
 #: Gauss-Newton steps of the level.
 LEVEL_STEPS = 2
 
-#: In place of 0 [rad].
-NEAR_ZERO = 1e-4
+#: In place of 0 [rad], and of sums that may be it.
+NEAR_ZERO, LEAST_SUM = 1e-4, 1e-300
 
 #: Step of the first search [lines]: the lines' ripple repeats every pi of the phase deviation.
 STEP = 0.2
@@ -128,7 +128,8 @@ def _log_likelihood(
     """
     excess, beat, own = power - noise, 2 * noise / bins, (noise + leak) ** 2 / bins
     shape = shape[..., None, :]
-    level = np.maximum((shape @ excess) / (shape**2).sum(axis=-1), 1e-6)
+    # past the edge of a narrow family there may be no line at all: its level is then anyone's guess
+    level = np.maximum((shape @ excess) / np.maximum((shape**2).sum(axis=-1), LEAST_SUM), 1e-6)
 
     def variance(line: NDArray[np.float64]) -> NDArray[np.float64]:
         out = shares * line
@@ -141,7 +142,7 @@ def _log_likelihood(
         pull = variance(level[..., None] * shape)
         np.divide(shape, pull, out=pull)
         fisher = (pull[..., None, :] @ shape[..., None])[..., 0, 0]
-        level = np.maximum((pull @ excess) / fisher, 0.05 * level)
+        level = np.maximum((pull @ excess) / np.maximum(fisher, LEAST_SUM), 0.05 * level)
     line = level[..., None] * shape
     mean = line + (noise + leak)
     number = mean**2
@@ -211,7 +212,8 @@ def fit_edge(
     few = np.arange(len(every))[::-3]
     for search in range(SEARCHES):
         edges = np.arange(max(low, LEAST_EDGE), high + step, step)
-        near = order <= high + REACH * high ** (1 / 3) / min(choices) ** (2 / 3)
+        # the first that is seen may lie past where the edge is sought: that nothing is there speaks too
+        near = order <= max(high + REACH * high ** (1 / 3) / min(choices) ** (2 / 3), order[0])
         count = int(order[near][-1])
         shapes = [_spread_powers(number * edges, number, count, spread)[..., order[near] - 1] for number in choices]
         weight = _log_likelihood(

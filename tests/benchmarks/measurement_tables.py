@@ -6,6 +6,7 @@ Shares stand with the 95 % interval that the number of draws leaves them (Wilson
 import argparse
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from time import process_time
 
@@ -17,6 +18,10 @@ import records
 from bladewing.classify.recording import load_recording
 from bladewing.features import measure
 from bladewing.features.stft import PAPER_SETTINGS, flash_bandwidth_hz, flash_period_s, stft
+from bladewing.simulate import Radar
+from bladewing.simulate.dataset import _powered, _target
+from bladewing.simulate.laws import WIDTH, Draws
+from bladewing.simulate.receiver import FAULT_CHANCE, Receiver
 
 RECORDINGS = Path(__file__).parents[3] / "shared" / "recordings"
 
@@ -256,6 +261,44 @@ def helicopters(draws: int) -> None:
             print(f"{name:20s} {snr_db:3d} dB: combs {combs / draws:.2f}, gears {gears / draws:.3f}", flush=True)
 
 
+def receivers(draws: int) -> None:
+    """Tips of fixed wings as training draws them, through receivers of one fault each."""
+    print(f"tips through receivers of one fault, {draws} draws a row, fixed wings at 0 to 30 dB, chopping within 2 %")
+    print("fault         tips | error %: 5th, 25th, median, 75th, 95th | median and share over 4 of error / deviation")
+    for fault in ("none", *FAULT_CHANCE):
+        iq, tip_mps, chopping_hz = _through(fault, draws)
+        found = measure(iq, **records.RADAR)
+        right = np.isfinite(found.tip_speed_mps) & (np.abs(found.chopping_hz / chopping_hz - 1) < 0.02)
+        error = (found.tip_speed_mps / tip_mps - 1)[right]
+        if not len(error):
+            print(f"{fault:12s}     0 | no tip")
+            continue
+        normalised = np.abs(error * tip_mps[right] / found.tip_speed_mps_std[right])
+        marks = " ".join(f"{100 * mark:6.1f}" for mark in np.quantile(error, [0.05, 0.25, 0.5, 0.75, 0.95]))
+        print(
+            f"{fault:12s} {right.sum():5d} | {marks} | {np.median(normalised):5.2f} {np.mean(normalised > 4):5.2f}",
+            flush=True,
+        )
+
+
+def _through(fault: str, draws: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fixed wings behind receivers of one fault, or none: samples, tips along the line of sight, chopping [Hz]."""
+    rng, faults = np.random.default_rng(11), np.random.default_rng(12)
+    radar = Radar(records.CARRIER_HZ, records.PRF_HZ, records.PULSES)
+    cursor = Draws(rng.random((draws, WIDTH)))
+    receiver = Receiver(cursor)
+    receiver.on = {name: np.full(draws, name == fault) for name in FAULT_CHANCE}
+    noise = records.white(rng, draws, records.PULSES).astype(np.complex64)
+    target = _target(cursor, radar, "fixed_wing", lambda _: partial(_normals, rng, draws), np.arange(draws))
+    signal = _powered(target, rng.uniform(0, 30, draws))
+    iq = receiver.receive(signal, noise, radar, lambda _: lambda rows: partial(_normals, faults, len(rows)))
+    return iq, target.truth["tip_mps"] * np.cos(target.truth["beta_rad"]), target.truth["chopping_hz"]
+
+
+def _normals(rng: np.random.Generator, rows: int, count: int) -> np.ndarray:
+    return rng.standard_normal((rows, count), np.float32)
+
+
 def false_alarms(draws: int) -> None:
     """Rotors reported where there is none."""
     print(f"false alarms, {draws} draws a row")
@@ -343,6 +386,7 @@ TABLES = {
     "bandwidth": bandwidth,
     "rotors": single_rotors,
     "near-rotors": near_rotors,
+    "receivers": receivers,
     "random-rotors": random_rotors,
     "helicopters": helicopters,
     "false-alarms": false_alarms,

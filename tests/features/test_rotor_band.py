@@ -5,6 +5,8 @@ import pytest
 from bladewing.features import measure
 from bladewing.features.rotor_band import _spread_powers, fit_edge, line_powers
 from bladewing.simulate import RotorMotion, rotor_echo
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.special import jv
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, white
@@ -162,3 +164,21 @@ def test_the_edge_of_blades_that_reflect_at_their_tips_is_found_far_out_too(gamm
         power = np.mean(np.abs(np.sqrt(shape) + white(rng, 2, count)) ** 2, axis=0)
         edge, _ = fit_edge(order, power, np.ones(count), sides, 2)
         assert abs(2 * edge / tip - 1) < 2e-3
+
+
+@given(st.data())
+def test_whatever_orders_are_seen_an_edge_is_found(data):
+    """A family whose first visible orders lie far past its edge once ended the measurement of a whole recording."""
+    orders = np.array(sorted(data.draw(st.sets(st.integers(1, 80), min_size=1, max_size=30))))
+    some = st.lists(st.floats(-3, 5), min_size=len(orders), max_size=len(orders))
+    power = 10 ** np.array(data.draw(some))
+    edge, std = fit_edge(
+        orders,
+        power,
+        np.ones(len(orders)),
+        np.full(len(orders), data.draw(st.floats(1, 20))),
+        data.draw(st.sampled_from([None, 1, 2, 3, 5])),
+        spread=data.draw(st.sampled_from([0.0, 0.02, 0.3])),
+    )
+    assert 0 < edge < 2 * orders[-1] + 20
+    assert std >= 0

@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
+from bladewing.features.bandwidth import half_empty
+from bladewing.features.measure import ONE_CHANNEL
+from scipy.signal import hilbert
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, rotors, white
 
@@ -42,3 +45,31 @@ def test_the_tips_of_rotors_that_are_not_told_apart_stand_in_any_band(band, apar
     # noise that falls outwards passed for lines up to where it was lowest, the span's end: tips a third too fast
     assert np.abs(error).max() < 0.06
     assert np.median(np.abs(normalised)) < 2
+
+
+@pytest.mark.parametrize("velocity_mps", [-4.0, 0.0, 12.0])
+def test_one_channel_made_analytic_has_no_band(velocity_mps):
+    """Both sides of the body lie on one side of the spectrum: a tip came out a third too slow, 0.1 % stated."""
+    rng = np.random.default_rng(3)
+    both = rotors([57.3], velocity_mps=velocity_mps) * 3 + white(rng, PULSES)
+    folded = hilbert(both.real)
+    found = measure(np.array([both, folded]), **RADAR, blades=2)
+    assert np.isfinite(found.tip_speed_mps).tolist() == [True, False]
+    assert np.isnan([found.bandwidth_hz[1], found.tip_speed_mps_std[1], found.blade_length_m[1]]).all()
+    assert found.band_reason.tolist() == ["", ONE_CHANNEL]
+    assert found.chopping_hz == pytest.approx(114.6, rel=0.01)
+    # nothing is even about the body any more: its own line tells, whose side is anyone's guess
+    assert np.abs(found.body_velocity_mps) == pytest.approx(abs(velocity_mps), abs=0.05)
+
+
+@pytest.mark.parametrize("bins", [1, 2, 7, 8, 64, 4096])
+def test_a_side_is_empty_only_if_all_of_it_is(bins):
+    power = np.random.default_rng(bins).exponential(size=(6, bins)).astype(np.float32)
+    assert not half_empty(power).any()
+    power[..., : bins // 2] *= np.float32(1e-6)
+    assert half_empty(power).all() == (bins >= 64)
+    assert half_empty(power[:, ::-1]).all() == (bins >= 64)
+    if bins >= 64:
+        power[::2, bins // 4] = 1.0  # one line is enough to show that it is not
+        assert half_empty(power).tolist() == [False, True] * 3
+        assert half_empty(power[1]) == half_empty(power)[1]
