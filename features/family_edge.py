@@ -52,7 +52,7 @@ NOISE_ORDERS, NOISE_BELOW = 0.1, 1.28
 #: From so many times the edge on there is noise alone. Where its nearer and its further half differ by more than this
 #: and three deviations [nats], and by more than the share of the family's power that leaks there, the receiver's band
 #: is not flat.
-PAST_EDGE, UNEVEN_NATS, UNEVEN_SHARE = 1.15, 0.1, 5e-4
+NOISE_FROM, UNEVEN_NATS, UNEVEN_SHARE = 1.15, 0.1, 5e-4
 
 #: The noise shows between the lines of rotors not told apart where these are spread over less than this [orders].
 GAPS_SHOW = 0.4
@@ -217,7 +217,7 @@ def _uneven_past(order: NDArray[np.intp], mean: NDArray[np.float64], bins: NDArr
     edge : float
         Where a family is said to end [orders].
     """
-    past = np.flatnonzero(order > PAST_EDGE * edge)
+    past = np.flatnonzero(order > NOISE_FROM * edge)
     if len(past) < 2:
         return False
     parts = np.array_split(past, 2)
