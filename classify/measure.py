@@ -112,8 +112,8 @@ class Measured:
         the lines it is taken out of `iq`.
     beat
         Wingbeat and body over the whole recording; None where that is too short.
-    cut
-        How the dwells fit the recording, in words; "" where they fill it.
+    remarks
+        What is to be known of the recording beside this, a sentence each.
     """
 
     recording: Recording
@@ -124,7 +124,7 @@ class Measured:
     acceleration_mps2: np.ndarray
     acceleration_mps2_std: np.ndarray
     beat: Wingbeat | None
-    cut: str
+    remarks: tuple[str, ...]
 
     def json_objects(self) -> Iterator[dict[str, Any]]:
         """One object a dwell and a closing one; what has no value is null."""
@@ -159,7 +159,8 @@ class Measured:
         pair = ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
         gear = {name: _median(getattr(self.values, name)[geared]) for name in pair}
         counts = {"dwells": len(self.iq), "with_comb": int(held.sum()), "with_second_comb": int(geared.sum())}
-        return {**counts, "left_out_s": self.recording.left_out_s(self.iq), **medians, **gear, **self.over_all()}
+        beside = {"left_out_s": self.recording.left_out_s(self.iq), "remarks": list(self.remarks)}
+        return {**counts, **beside, **medians, **gear, **self.over_all()}
 
     def over_all(self) -> dict[str, Any]:
         """Wingbeat and acceleration over the whole recording; nothing where that is too short.
@@ -216,8 +217,8 @@ class Measured:
             detail = reasons[0][len(short) + 1 :].strip()
             detail = detail and f"{': ' if len(set(reasons)) == 1 else ', e.g. '}{detail}"
             console.print(Text(f"{counted(len(reasons))}: {short}{detail}"), soft_wrap=True)
-        if self.cut:
-            console.print(Text(self.cut), soft_wrap=True)
+        for remark in self.remarks:
+            console.print(Text(remark), soft_wrap=True)
         console.print(Text(self.sentence()), soft_wrap=True)
         if beat := self.beat_sentence():
             console.print(Text(beat), soft_wrap=True)
@@ -386,8 +387,8 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     long = len(recording.iq) >= LEAST_S * recording.prf_hz
     beat = wingbeat(recording.iq, **radar) if long else None
     stop_s = start_s + pulses / recording.prf_hz
-    cut = recording.cut_sentence(settings.dwell_s, iq)
-    return Measured(recording, iq, start_s, stop_s, values, acceleration, acceleration_std, beat, cut)
+    remarks = recording.remarks(settings.dwell_s, iq)
+    return Measured(recording, iq, start_s, stop_s, values, acceleration, acceleration_std, beat, remarks)
 
 
 def measured(

@@ -71,8 +71,8 @@ class Answer:
         1.5 s and more.
     left_out_s
         The end of the recording that is shorter than a dwell [s].
-    cut
-        How the dwells fit the recording, in words; "" where they fill it.
+    remarks
+        What is to be known of the recording beside this, a sentence each.
     """
 
     name: str
@@ -82,7 +82,7 @@ class Answer:
     track: Track
     shown: Mapping[str, float] = field(default_factory=dict)
     left_out_s: float = 0.0
-    cut: str = ""
+    remarks: tuple[str, ...] = ()
 
     @property
     def declared_s(self) -> float | None:
@@ -117,6 +117,7 @@ class Answer:
             "heave_hz": rates.get("heaves", rates.get("steps")),
             "steps": "steps" in rates,
             "left_out_s": self.left_out_s,
+            "remarks": list(self.remarks),
         }
         yield {"file": self.name, "track": track}
 
@@ -148,8 +149,8 @@ class Answer:
         if self.track.reason:
             line.append(f"  ({self.track.reason})")
         console.print(line)
-        if self.cut:
-            console.print(Text(self.cut))
+        for remark in self.remarks:
+            console.print(Text(remark), soft_wrap=True)
         for name, rate_hz in self.shown.items():
             whose, odds = ODDS[name]
             said = f"{_SHOWN[name].format(rate_hz)}: the odds of {_WHOSE[whose]} count {odds:g} times"
@@ -216,8 +217,8 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
         dwell_s=wanted / recording.prf_hz,
     )
     stop_s = start_s + wanted / recording.prf_hz
-    left_out_s, cut = recording.left_out_s(iq), recording.cut_sentence(dwell_s, iq)
-    return Answer(recording.name, start_s, stop_s, dwells, track, shown, left_out_s, cut)
+    left_out_s, remarks = recording.left_out_s(iq), recording.remarks(dwell_s, iq)
+    return Answer(recording.name, start_s, stop_s, dwells, track, shown, left_out_s, remarks)
 
 
 def long_look(iq: np.ndarray, carrier_hz: float, prf_hz: float) -> dict[str, float]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import ARRAY_SUFFIXES, read_array
+from .clipping import clipped_values
 from .errors import BadInput
 from .samples import complex_samples, positive
 from .sigmf_file import find_sigmf, read_sigmf
@@ -83,6 +84,15 @@ class Recording:
             return f"its {len(self.iq) / self.prf_hz:.6g} s, shorter than a dwell of {dwell_s:g} s, are taken whole"
         left_out_s = self.left_out_s(dwells)
         return f"the last {left_out_s:.2g} s, shorter than a dwell, are left out" if left_out_s else ""
+
+    def remarks(self, dwell_s: float, dwells: NDArray[np.complex64]) -> tuple[str, ...]:
+        """What is to be known of the recording beside its answer: `cut_sentence`, and clipping."""
+        clipped = clipped_values(self.iq)
+        said = (
+            f"clipped: {clipped} values of I and Q stand at the converter's largest, which makes lines that are no "
+            "target's: lower the gain"
+        )
+        return tuple(sentence for sentence in (self.cut_sentence(dwell_s, dwells), said if clipped else "") if sentence)
 
 
 def load_recording(

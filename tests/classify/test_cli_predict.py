@@ -68,9 +68,10 @@ def test_one_line_a_dwell_and_a_closing_line(run_json, sigmf_pair):
     assert second == said | {"start_s": 0.08, "stop_s": 0.16, "reason": None}
     assert list(first) == ["file", "start_s", "stop_s", "label", "probabilities", "reason"]
     assert list(closing) == ["file", "track"]
-    told = ["label", "probabilities", "dwells", "declared", "declared_s", *STILL, "left_out_s"]
+    told = ["label", "probabilities", "dwells", "declared", "declared_s", *STILL, "left_out_s", "remarks"]
     assert list(closing["track"]) == told
     assert closing["track"]["left_out_s"] == 0.04
+    assert closing["track"]["remarks"] == ["the last 0.04 s, shorter than a dwell, are left out"]
     assert (closing["track"]["label"], closing["track"]["dwells"]) == ("uav", 2)
     assert (closing["track"]["declared"], closing["track"]["declared_s"]) == ("uav", 0.08)
     assert list(closing["track"]["probabilities"]) == NAMES
@@ -109,7 +110,7 @@ def test_outside_the_envelope_is_answered_unknown_with_the_cure(run_json, sigmf_
     }
     assert dwells[0]["probabilities"] == dict.fromkeys(NAMES, 0.333333)
     nothing = {"label": "unknown", "probabilities": dict.fromkeys(NAMES, 0.333333), "declared": None}
-    assert closing["track"] == nothing | {"dwells": 4, "declared_s": None, "left_out_s": 0.0} | STILL
+    assert closing["track"] == nothing | {"dwells": 4, "declared_s": None, "left_out_s": 0.0, "remarks": []} | STILL
 
 
 def test_a_dwell_too_short_is_unknown(run_json, sigmf_pair):
@@ -147,8 +148,19 @@ def test_a_silent_dwell_is_unknown_and_left_out_of_the_track(run_json, sigmf_pai
         "declared": "uav",
         "declared_s": 0.16,
         "left_out_s": 0.0,
+        "remarks": [],
         **STILL,
     }  # the silent dwell took its time
+
+
+def test_a_clipped_recording_is_answered_with_a_remark(run_json, sigmf_pair):
+    iq = noise(3200)
+    clipped = (iq.real.clip(-1, 1) + 1j * iq.imag.clip(-1, 1)).astype(np.complex64)
+    *_, closing = run_json(sigmf_pair(iq=clipped))
+    (remark,) = closing["track"]["remarks"]
+    many = sum(int((abs(part) == 1).sum()) for part in (clipped.real, clipped.imag))
+    assert remark.startswith(f"clipped: {many} values of I and Q stand at the converter's largest")
+    assert remark.endswith("lower the gain")
 
 
 def test_both_files_of_a_recording_are_answered_once(run_json, sigmf_pair):

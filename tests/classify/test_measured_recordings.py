@@ -70,3 +70,11 @@ def test_the_drone_has_a_comb_that_stays(answers, start, spacing_hz):
 def test_nothing_else_has_one(answers):
     for start in ("person", "vehicle", "sea"):
         assert {track["comb_hz"] for track in tracks(answers, start)} == {None}
+
+
+def test_the_one_whose_bytes_are_full_is_called_clipped(answers):
+    """It fills -128 to 127, its mean taken out afterwards: 52 values stand at its four ends."""
+    told = {track["remarks"][-1] for track in tracks(answers, "") if "clipped" in "".join(track["remarks"])}
+    assert len(told) == 1
+    assert told.pop().startswith("clipped: 52 values")
+    assert any("clipped" in track["remarks"][-1] for track in tracks(answers, "sea-target-30-clutter-only"))
