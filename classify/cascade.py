@@ -12,8 +12,9 @@ from bladewing.features.inputs import Dwells, in_blocks
 from numpy.typing import NDArray
 
 from .errors import BadInput
-from .inference import Classifier, read_model
+from .inference import Classifier
 from .ladder import CASCADE, STAGES_KEY, shipped_account
+from .model_file import read_model
 
 SURE = (0.95, 0.85, 0.85)
 """Probability of each class (uav, bird, clutter) from which on the fast model's answer stands. On records of the whole

@@ -267,7 +267,7 @@ def export(
 ) -> None:
     """Write one self-contained ONNX graph for a radar: raw IQ in, probabilities and label out, onnxruntime alone."""
     from .export import export_raw_iq
-    from .inference import chosen_name
+    from .model_file import chosen_name
 
     name = chosen_name(model, single=True)
     worst = export_raw_iq(out, carrier_hz=carrier_hz, prf_hz=prf_hz, pulses=pulses, model=name)

@@ -21,9 +21,10 @@ from scipy import fft
 
 from .errors import BadInput
 from .files import write_whole
-from .inference import EXPORTED, Classifier, chosen_name, read_model
+from .inference import Classifier
 from .labels import CLASSES, UNKNOWN
 from .ladder import CASCADE
+from .model_file import EXPORTED, chosen_name, read_model
 from .samples import positive
 
 TOLERANCE = 2e-3

@@ -3,61 +3,42 @@
 Imports numpy, scipy.fft (through the features) and onnxruntime, nothing else heavy.
 """
 
-import json
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib import resources
-from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-import onnxruntime
 from bladewing.features.allocator import keep_freed
 from bladewing.features.inputs import model_inputs
-from bladewing.features.schema import INPUT_SHAPES, schema_hash
 from bladewing.features.spectrum import LEAST_PART, largest_part
-from bladewing.models import DEFAULT_MODEL, KIND_SCORES
+from bladewing.models import KIND_SCORES
 from bladewing.models.calibration import softmax
-from bladewing.models.operating import OperatingCurve, OperatingPoint
+from bladewing.models.operating import OperatingPoint
 from bladewing.models.seal import read_metadata, verify
 from numpy.typing import ArrayLike, NDArray
 
-from .bounds import MOST_MODEL_BYTES
 from .envelope import Envelope
 from .errors import BadInput
-from .files import read_bounded
 from .labels import CLASSES, UNKNOWN, decide, decide_by_sets
-from .ladder import CASCADE, PLACES, by_budget, by_place, measured_fft_us, shipped_account
+from .ladder import CASCADE
+from .model_file import (
+    checked_inputs,
+    checked_kinds,
+    checked_metadata,
+    chosen_name,
+    open_session,
+    place_of_noise,
+    point_of_curve,
+    prediction_sets,
+    read_model,
+)
 from .samples import complex_samples, positive
-
-__all__ = ["Classifier", "Envelope", "Prediction", "model_names"]
-
-CURVE_KEY = "operating_curve"
-"""Metadata of the thresholds for every false-alarm rate; models of earlier versions hold none."""
-
-SETS_KEY = "prediction_sets"
-"""Metadata of the thresholds of prediction sets, rows of coverage and one a class; earlier models hold none."""
-
-COVERAGES = (0.8, 0.9, 0.95, 0.98, 0.99)
-"""Coverages that a training stores."""
-
-FORMAT = "1"
-"""Version of the metadata that this code reads."""
 
 # One step of the work: bounded in records and in samples, so that memory stays flat however large the batch is.
 _STEP_RECORDS = 256
 _STEP_SAMPLES = 1 << 21
 _STEP_INPUTS = 4096
-
-#: What the metadata of an exported graph call it.
-EXPORTED = "bladewing raw-IQ graph"
-
-KINDS_KEY = "kinds"
-"""Metadata of the kinds that a network tells apart inside, name to class in their order; some models know none."""
-
-NOISE = "noise"
-"""The kind of a record that holds nothing else."""
 
 _TOLD = len(CLASSES) + 1  # columns of what is told of a record: the classes' probabilities and that of mere noise
 
@@ -85,70 +66,6 @@ class Prediction:
     probabilities: NDArray[np.float32]
     reasons: NDArray[np.str_]
     noise: NDArray[np.float32]
-
-
-def model_names() -> tuple[str, ...]:
-    """Names of the shipped models, the default first."""
-    folder = resources.files("bladewing.models.pretrained")
-    names = {entry.name.removesuffix(".onnx") for entry in folder.iterdir() if entry.name.endswith(".onnx")}
-    return tuple(sorted(names, key=lambda name: (name != DEFAULT_MODEL, name)))
-
-
-def chosen_name(
-    name_or_path: str | os.PathLike[str] | None = None, budget_us: float | None = None, *, single: bool = False
-) -> str:
-    """Name or path of the model that is meant: the default's, or what a place on the ladder or a budget leads to.
-
-    Parameters
-    ----------
-    name_or_path, budget_us
-        As `Classifier.load` takes them.
-    single
-        Whether only models of one file are meant, not the cascade of two.
-
-    Raises
-    ------
-    BadInput
-        Both are given, or no model keeps to the budget.
-    """
-    given = DEFAULT_MODEL if name_or_path is None else os.fspath(name_or_path)
-    if budget_us is None and given not in PLACES:
-        return given
-    account = shipped_account()
-    if single:
-        account.pop(CASCADE, None)
-    if budget_us is None:
-        return by_place(given, account)
-    if name_or_path is not None:
-        raise BadInput(f"model {given!r} and a budget of {budget_us:g} us: give one of them")
-    return by_budget(positive(budget_us, "budget_us"), account, measured_fft_us())
-
-
-def read_model(given: str) -> tuple[bytes, str]:
-    """Read a shipped model by its name, or a file: the content, and what messages call it.
-
-    Raises
-    ------
-    BadInput
-        There is no such model, or it cannot be read.
-    """
-    if given in model_names():
-        return resources.files("bladewing.models.pretrained").joinpath(f"{given}.onnx").read_bytes(), given
-    if not given:
-        raise BadInput(f"the model's name is empty: give one of the shipped, {', '.join(model_names())}, or a file")
-    path = Path(given)
-    if path.is_dir():
-        raise BadInput(f"{given} is a directory: name the .onnx file in it")
-    try:
-        return read_bounded(path, MOST_MODEL_BYTES), given
-    except (FileNotFoundError, NotADirectoryError):
-        shipped = ", ".join(model_names()) or "none"
-        raise BadInput(
-            f"no model {given!r}: give the path of an .onnx file or one of the shipped: {shipped}; "
-            f"or {', '.join((CASCADE, *PLACES))}"
-        ) from None
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name, no file, too large
-        raise BadInput(f"{given}: the model cannot be read: {getattr(error, 'strerror', None) or error}") from None
 
 
 class Classifier:
@@ -222,21 +139,21 @@ class Classifier:
             self.metadata = MappingProxyType(read_metadata(onnx_bytes))
         except ValueError as error:
             raise BadInput(f"{source}: {error}") from None
-        self.envelope, self.accept = _read_metadata(self.metadata, source)
-        self._session = _open_session(onnx_bytes, source, threads)
+        self.envelope, self.accept = checked_metadata(self.metadata, source)
+        self._session = open_session(onnx_bytes, source, threads)
         keep_freed()
         if dict(self._session.get_modelmeta().custom_metadata_map) != dict(self.metadata):
             raise BadInput(f"{source}: damaged metadata: onnxruntime reads others: train it again")
-        self.inputs = self._reads = _read_inputs(self._session, source)
-        kinds = _read_kinds(self.metadata, self._session, source)
+        self.inputs = self._reads = checked_inputs(self._session, source)
+        kinds = checked_kinds(self.metadata, self._session, source)
         self._outputs = ["probabilities", *([KIND_SCORES] if kinds else [])]
-        self._noise = _place_of_noise(kinds)
+        self._noise = place_of_noise(kinds)
         self.operating_point = None
         if max_false_alarm is not None:
             self._keep_to(max_false_alarm, source)
         self.coverage = coverage
         if coverage is not None:
-            self._sets_hold = _prediction_sets(self.metadata, coverage, source)
+            self._sets_hold = prediction_sets(self.metadata, coverage, source)
 
     @classmethod
     def load(
@@ -290,7 +207,7 @@ class Classifier:
 
     def _keep_to(self, max_false_alarm: float, source: str, models: int = 1) -> OperatingPoint:
         """Choose the threshold on "uav" for a false-alarm rate that so many models share."""
-        self.operating_point = point = _operating_point(self.metadata, max_false_alarm, source, models)
+        self.operating_point = point = point_of_curve(self.metadata, max_false_alarm, source, models)
         self.accept = (point.threshold, *self.accept[1:])
         return point
 
@@ -441,113 +358,3 @@ def _rule(max_false_alarm: object, coverage: object) -> tuple[float | None, floa
     if rate is not None and share is not None:
         raise BadInput(f"a false-alarm rate of {rate:g} and a coverage of {share:g}: give one of them")
     return rate, share
-
-
-def _open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.InferenceSession:
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads
-    options.inter_op_num_threads = 1
-    options.log_severity_level = 4  # its messages come as exceptions; nothing else may reach the user's terminal
-    try:
-        return onnxruntime.InferenceSession(
-            onnx_bytes,
-            options,
-            providers=["CPUExecutionProvider"],
-            enable_fallback=0,  # which would print, and try the same again
-        )
-    except Exception as error:  # its exceptions share no base class
-        raise BadInput(f"{source}: onnxruntime {onnxruntime.__version__} cannot open the model: {error}") from None
-
-
-def _read_metadata(metadata: Mapping[str, str], source: str) -> tuple[Envelope, tuple[float, float, float]]:
-    """Check what a model says of itself against what this version can serve."""
-    product = metadata.get("product")
-    if product != "bladewing":
-        exported = "an exported graph, for onnxruntime alone: give the model that it was made of"
-        what = exported if product == EXPORTED else f"its product is {product!r}"
-        raise BadInput(f"{source}: not a bladewing model: {what}")
-    if metadata.get("format") != FORMAT:
-        raise BadInput(
-            f"{source}: model format {metadata.get('format')!r}, this version reads {FORMAT!r}: train it again"
-        )
-    if metadata.get("schema_sha256") != schema_hash():
-        raise BadInput(
-            f"{source}: trained on other measurements than this version makes (schema "
-            f"{metadata.get('schema_sha256', 'missing')[:12]}, here {schema_hash()[:12]}): train it again"
-        )
-    try:
-        classes, accept = json.loads(metadata["classes"]), json.loads(metadata["accept"])
-        envelope = Envelope.from_json(metadata["envelope"])
-        if tuple(classes) != CLASSES:
-            raise ValueError(f"classes are {classes}, they must be {list(CLASSES)}")
-        uav, bird, clutter = (float(limit) for limit in accept)
-        if not all(np.isfinite((uav, bird, clutter))):
-            raise ValueError(f"accept is {accept}, it must be three finite numbers")
-    except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise BadInput(f"{source}: damaged metadata: {error}: train it again") from None
-    return envelope, (uav, bird, clutter)
-
-
-def _operating_point(metadata: Mapping[str, str], max_false_alarm: float, source: str, models: int) -> OperatingPoint:
-    """The point of the model's curve that keeps to its part of a false-alarm rate."""
-    if CURVE_KEY not in metadata:
-        raise BadInput(f"{source}: holds no operating curve, so no false-alarm rate can be chosen: train it again")
-    try:
-        return OperatingCurve.from_json(metadata[CURVE_KEY]).at(max_false_alarm, models)
-    except ValueError as error:
-        raise BadInput(f"{source}: {error}") from None
-
-
-def _prediction_sets(metadata: Mapping[str, str], coverage: float, source: str) -> tuple[float, ...]:
-    """The thresholds of the model's prediction sets of one coverage."""
-    if SETS_KEY not in metadata:
-        raise BadInput(f"{source}: holds no prediction sets, so no coverage can be chosen: train it again")
-    try:
-        rows = {float(row[0]): tuple(map(float, row[1:])) for row in json.loads(metadata[SETS_KEY])}
-        if any(len(limits) != len(CLASSES) or not np.isfinite(limits).all() for limits in rows.values()):
-            raise ValueError(f"there must be {len(CLASSES)} finite thresholds a coverage")
-    except (TypeError, KeyError, IndexError, ValueError, OverflowError, RecursionError) as error:
-        raise BadInput(f"{source}: damaged prediction sets: {error}: train it again") from None
-    if coverage not in rows:
-        held = ", ".join(f"{value:g}" for value in rows) or "none"
-        raise BadInput(f"{source}: a coverage of {coverage:g} is not among those that it holds: {held}: ask for one")
-    return rows[coverage]
-
-
-def _read_inputs(session: onnxruntime.InferenceSession, source: str) -> tuple[str, ...]:
-    """Names of the graph's inputs, checked against what the features give."""
-    for node in session.get_inputs():
-        if INPUT_SHAPES.get(node.name) != tuple(node.shape[1:]):
-            raise BadInput(
-                f"{source}: input {node.name!r} of shape {tuple(node.shape)}: this version gives "
-                f"{ {name: ('records', *shape) for name, shape in INPUT_SHAPES.items()} }: train it again"
-            )
-    if not session.get_inputs():
-        raise BadInput(f"{source}: no input: not a complete bladewing model, train it again")
-    if "probabilities" not in [node.name for node in session.get_outputs()]:
-        raise BadInput(f"{source}: no output 'probabilities': not a complete bladewing model, train it again")
-    return tuple(node.name for node in session.get_inputs())
-
-
-def _read_kinds(metadata: Mapping[str, str], session: onnxruntime.InferenceSession, source: str) -> Mapping[str, str]:
-    """The kinds that a model tells apart inside, name to class; none where it knows none."""
-    try:
-        kinds = json.loads(metadata.get(KINDS_KEY, "{}"))
-        if not isinstance(kinds, dict) or list(kinds.values()) != sorted(kinds.values(), key=CLASSES.index):
-            raise ValueError(f"each kind must be of a class, in the order {', '.join(CLASSES)}")
-    except (TypeError, ValueError, RecursionError) as error:
-        raise BadInput(f"{source}: damaged kinds: {error}: train it again") from None
-    widths = {node.name: node.shape[1:] for node in session.get_outputs()}
-    if kinds and widths.get(KIND_SCORES) != [len(kinds)]:
-        raise BadInput(f"{source}: no output {KIND_SCORES!r} of its {len(kinds)} kinds: train it again")
-    return kinds
-
-
-def _place_of_noise(kinds: Mapping[str, str]) -> tuple[int, slice, int] | None:
-    """The class that noise is of, the columns of that class's kinds, which stand together, and its place among them."""
-    if NOISE not in kinds:
-        return None
-    names, classes = list(kinds), list(kinds.values())
-    first = classes.index(kinds[NOISE])
-    kin = slice(first, first + classes.count(kinds[NOISE]))
-    return CLASSES.index(kinds[NOISE]), kin, names.index(NOISE) - first

@@ -21,9 +21,10 @@ from .envelope import Envelope
 from .errors import BadInput
 from .files import result_folder, write_together
 from .gather import TASK_RECORDS, Gathered, Sets, gather, gather_from, inputs_digest
-from .inference import COVERAGES, CURVE_KEY, KINDS_KEY, SETS_KEY, Classifier
+from .inference import Classifier
 from .labels import CLASSES
 from .ladder import CASCADE
+from .model_file import COVERAGES, CURVE_KEY, KINDS_KEY, SETS_KEY
 from .parts import Parts
 from .progress import Progress
 from .train_network import OnFraction, ScoresOf, Taught, parts_of, train_net

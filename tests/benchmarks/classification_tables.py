@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 from bladewing.classify import Classifier
 from bladewing.classify.fusion import ODDS
-from bladewing.classify.inference import COVERAGES, Prediction
+from bladewing.classify.inference import Prediction
 from bladewing.classify.labels import CLASSES, decide, decide_by_sets
 from bladewing.classify.ladder import COST_KEY, by_place, shipped_account
+from bladewing.classify.model_file import COVERAGES
 from bladewing.classify.predict import answer
 from bladewing.classify.recording import Recording, load_recording
 from bladewing.classify.training_account import figures

@@ -8,7 +8,7 @@ import onnxruntime
 import pytest
 from bladewing.classify import Classifier
 from bladewing.classify.export import export_raw_iq
-from bladewing.classify.inference import model_names
+from bladewing.classify.model_file import model_names
 from bladewing.features import model_inputs
 from bladewing.simulate import Radar, draw_records
 from scipy import fft

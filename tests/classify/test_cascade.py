@@ -5,10 +5,10 @@ import re
 
 import numpy as np
 import pytest
-from bladewing.classify import BadInput, Classifier, inference
+from bladewing.classify import BadInput, Classifier, model_file
 from bladewing.classify.cascade import SURE, Cascade
-from bladewing.classify.inference import CURVE_KEY, model_names
 from bladewing.classify.ladder import CASCADE, STAGES_KEY, shipped_account
+from bladewing.classify.model_file import CURVE_KEY, model_names
 from bladewing.features import model_inputs
 from bladewing.models.operating import OperatingCurve
 from bladewing.simulate import Radar, draw_records
@@ -87,14 +87,14 @@ def test_a_rate_that_a_cascade_cannot_keep_is_told_as_it_was_asked_for():
 
 
 def test_a_budget_leads_to_one_model_where_a_coverage_is_asked_for(monkeypatch):
-    monkeypatch.setattr(inference, "measured_fft_us", lambda: 1.0)
+    monkeypatch.setattr(model_file, "measured_fft_us", lambda: 1.0)
     enough = shipped_account()[CASCADE]["cost_ffts"] + 0.01
     assert isinstance(Classifier.load(budget_us=enough), Cascade)
     assert Classifier.load(budget_us=enough, coverage=0.9).coverage == 0.9
 
 
 def test_a_budget_leads_to_one_model_where_two_cannot_share_the_rate(monkeypatch):
-    monkeypatch.setattr(inference, "measured_fft_us", lambda: 1.0)
+    monkeypatch.setattr(model_file, "measured_fft_us", lambda: 1.0)
     enough = 1000.0
     rate = 1.5 * OperatingCurve.from_json(Classifier.load().metadata[CURVE_KEY]).points[-1].false_alarm
     with pytest.raises(BadInput, match=r"cascade: false-alarm rate .* cannot be supported"):
@@ -126,9 +126,9 @@ def test_what_a_cascade_cannot_do_is_told_in_one_line(tmp_path, monkeypatch):
 def test_places_lead_to_the_cascade_but_not_to_export_it(monkeypatch):
     test = {"cheap": (5, 0.5), "dear": (9, 0.6), CASCADE: (7, 0.7)}
     accounts = {name: {"cost_ffts": cost, "test": {"balanced_accuracy": value}} for name, (cost, value) in test.items()}
-    monkeypatch.setattr(inference, "shipped_account", lambda: dict(accounts))
-    assert inference.chosen_name("best") == CASCADE
-    assert inference.chosen_name("best", single=True) == "dear"
+    monkeypatch.setattr(model_file, "shipped_account", lambda: dict(accounts))
+    assert model_file.chosen_name("best") == CASCADE
+    assert model_file.chosen_name("best", single=True) == "dear"
 
 
 def test_the_shipped_account_tells_of_the_cascade_what_holds():

@@ -4,8 +4,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from bladewing.classify import BadInput, Classifier, inference
-from bladewing.classify.inference import model_names
+from bladewing.classify import BadInput, Classifier, inference, model_file
+from bladewing.classify.model_file import model_names
 from bladewing.features import model_inputs
 from bladewing.simulate import Radar, draw_records
 from hypothesis import given, settings
@@ -233,7 +233,7 @@ def test_an_altered_model_is_refused_before_a_session_is_made(make_model, monkey
     def no_session(*_, **__):
         raise AssertionError("a session was made of an unverified file")
 
-    monkeypatch.setattr(inference.onnxruntime, "InferenceSession", no_session)
+    monkeypatch.setattr(model_file.onnxruntime, "InferenceSession", no_session)
     content = make_model()
     with pytest.raises(BadInput, match=r"x\.onnx: the model was altered after it was written"):
         Classifier(_flip(content, int(where * len(content) * 0.5)), source="x.onnx")

@@ -5,10 +5,10 @@ from importlib import resources
 
 import numpy as np
 import pytest
-from bladewing.classify import BadInput, Classifier, inference, ladder
+from bladewing.classify import BadInput, Classifier, ladder, model_file
 from bladewing.classify.cli import main
-from bladewing.classify.inference import model_names
 from bladewing.classify.ladder import by_budget, by_place, front
+from bladewing.classify.model_file import model_names
 
 
 def account(**models: tuple[float, float]) -> dict:
@@ -47,8 +47,8 @@ def test_models_without_costs_are_refused_by_one_line():
 
 def test_the_classifier_loads_by_place_and_by_budget(monkeypatch):
     shipped = account(**{"spectrum-cnn-fast": (40, 0.5), "spectrum-cnn": (50, 0.7)})
-    monkeypatch.setattr(inference, "shipped_account", lambda: shipped)
-    monkeypatch.setattr(inference, "measured_fft_us", lambda: 2.0)
+    monkeypatch.setattr(model_file, "shipped_account", lambda: shipped)
+    monkeypatch.setattr(model_file, "measured_fft_us", lambda: 2.0)
     assert Classifier.load("fast").name == "spectrum-cnn-fast"
     assert Classifier.load("best").name == "spectrum-cnn"
     assert Classifier.load(budget_us=99).name == "spectrum-cnn-fast"
@@ -59,7 +59,7 @@ def test_the_classifier_loads_by_place_and_by_budget(monkeypatch):
 
 
 def test_predict_says_what_a_budget_buys(monkeypatch, sigmf_pair, capsys):
-    monkeypatch.setattr(inference, "measured_fft_us", lambda: 1.0)
+    monkeypatch.setattr(model_file, "measured_fft_us", lambda: 1.0)
     account = ladder.shipped_account()
     for enough, name in ((15, by_place("fast", account)), (1000, by_place("best", account))):
         assert main(["predict", str(sigmf_pair()), "--budget-us", str(enough)]) == 0

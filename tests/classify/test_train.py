@@ -11,8 +11,8 @@ import pytest
 from bladewing.classify import Classifier, train
 from bladewing.classify.errors import BadInput
 from bladewing.classify.gather import Gathered, Sets, gather
-from bladewing.classify.inference import COVERAGES
 from bladewing.classify.labels import CLASSES
+from bladewing.classify.model_file import COVERAGES
 from bladewing.classify.train import run_training
 from bladewing.classify.train_network import CLASS_OF_KIND, kinds_of, train_net
 from bladewing.classify.training_account import alarm_threshold, figures

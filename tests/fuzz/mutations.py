@@ -126,10 +126,10 @@ MUTATIONS = (
     Mutation(
         "a model is judged before it is opened",
         "classify/inference.py",
-        "        self.envelope, self.accept = _read_metadata(self.metadata, source)\n"
-        "        self._session = _open_session(onnx_bytes, source, threads)\n",
-        "        self._session = _open_session(onnx_bytes, source, threads)\n"
-        "        self.envelope, self.accept = _read_metadata(self.metadata, source)\n",
+        "        self.envelope, self.accept = checked_metadata(self.metadata, source)\n"
+        "        self._session = open_session(onnx_bytes, source, threads)\n",
+        "        self._session = open_session(onnx_bytes, source, threads)\n"
+        "        self.envelope, self.accept = checked_metadata(self.metadata, source)\n",
         "tests/classify/test_hostile_files.py -k foreign_model",
     ),
     Mutation(
