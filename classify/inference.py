@@ -56,10 +56,10 @@ class Prediction:
     reasons
         Shape (...): why a label is "unknown" (rule and cure), "" for the others.
     noise
-        Shape (...), float32: probability that there is nothing but noise, a part of that of "clutter"; NaN where a
-        record could not be judged, and from models without kinds. Against noise alone the share of "uav" in "uav" and
-        this, `probabilities[..., 0] / (probabilities[..., 0] + noise)`, finds more UAVs than the probability of "uav",
-        which every other thing that might be there lowers.
+        Shape (...), float32: probability that there is nothing but noise, no background either, a part of that of
+        "clutter"; NaN where a record could not be judged, and from models without kinds. Against noise alone the share
+        of "uav" in "uav" and this, `probabilities[..., 0] / (probabilities[..., 0] + noise)`, finds more UAVs than the
+        probability of "uav", which every other thing that might be there lowers.
     """
 
     labels: NDArray[np.str_]

@@ -27,7 +27,7 @@ from .ladder import CASCADE
 from .model_file import COVERAGES, CURVE_KEY, KINDS_KEY, SETS_KEY
 from .parts import Parts
 from .progress import Progress
-from .train_network import OnFraction, ScoresOf, Taught, parts_of, train_net
+from .train_network import OnFraction, ScoresOf, Taught, epochs_of, train_net
 from .training_account import ACCOUNT, alarm_threshold, covered, figures, print_table
 from .training_config import TrainingConfig, training_config
 from .training_costs import add_costs
@@ -98,7 +98,7 @@ def run_training(
     started = time.perf_counter()
     resumed = parts.begun
     for name in settings.models:  # what is damaged is told before any record is drawn
-        for part in (name, *parts_of(name)):
+        for part in (name, epochs_of(name)):
             parts.arrays(part)
     with Progress(visible=progress) as bars:
         if resumed:

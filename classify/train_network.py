@@ -1,7 +1,7 @@
-"""A network's part of a training: its generations, its teachers, and what an interruption leaves of it."""
+"""A network's part of a training: its kinds, its teacher, and what an interruption leaves of it."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -32,28 +32,20 @@ Taught = Callable[[], NDArray[np.floating]]
 
 
 def kinds_of(part: Gathered) -> NDArray[np.int64]:
-    """Kind of each record, a place in `KIND_CLASS`."""
-    place = {kind: number for number, kind in enumerate(KIND_CLASS)}
-    return np.array([place[kind] for kind in part.truth["kind"]], np.int64)
+    """Kind of each record, a place in `KIND_CLASS`.
 
-
-def parts_of(name: str) -> Iterator[str]:
-    """Names of the parts that hold what is done of a network: each generation's epochs, and the answers of all but one.
-
-    The last generation's answers are those of the finished network.
+    A cell that is empty but for its background is ground: were it noise, a rotor that hovers, whose body's line is at
+    rest as the ground's is, would be too.
     """
-    for generation in range(LADDER[name].generations):
-        yield _epochs_of(name, generation)
-        if generation:
-            yield _answers_of(name, generation - 1)
+    place = {kind: number for number, kind in enumerate(KIND_CLASS)}
+    kinds = np.array([place[kind] for kind in part.truth["kind"]], np.int64)
+    kinds[(kinds == place["noise"]) & np.isfinite(part.truth["background_db"])] = place["ground"]
+    return kinds
 
 
-def _epochs_of(name: str, generation: int) -> str:
-    return f"{name}-{generation}-epochs"
-
-
-def _answers_of(name: str, generation: int) -> str:
-    return f"{name}-{generation}-answers"
+def epochs_of(name: str) -> str:
+    """Name of the part that holds what is done of a network."""
+    return f"{name}-epochs"
 
 
 def train_net(
@@ -64,7 +56,7 @@ def train_net(
     parts: Parts | None,
     taught: Taught | None = None,
 ) -> tuple[ScoresOf, Callable[[Any], bytes], dict[str, Any]]:
-    """Train a network as often as the ladder says, each time but the first by the answers of the one before.
+    """Train a network, from its last whole epoch on where some are kept.
 
     Returns
     -------
@@ -72,30 +64,16 @@ def train_net(
         What gives the scores of records, what exports it with a calibration, and its part of the account.
     """
     from bladewing.models.export import export_network
-    from bladewing.models.training import network_scores, network_shares
+    from bladewing.models.training import network_scores
 
-    rung, earlier_s = LADDER[name], 0.0
-    told = taught
-    for generation in range(rung.generations - 1):
-        kept = parts.arrays(_answers_of(name, generation)) if parts else None
-        if kept is None:
-            net, result = _generation(name, generation, told, settings, sets, on_fraction, parts)
-            answers = network_shares(net, _inputs(name, sets.train)).astype(np.float16)
-            kept = {"answers": answers, "seconds": np.array(result.seconds)}
-            if parts:
-                parts.keep_arrays(_answers_of(name, generation), kept)
-        earlier_s += float(kept["seconds"])
-        told = partial(_whole, kept["answers"])
-    net, result = _generation(name, rung.generations - 1, told, settings, sets, on_fraction, parts)
+    net, result = _trained(name, taught, settings, sets, on_fraction, parts)
     net.compact()
     detail = {
         "device": result.device,
-        "teacher": rung.teacher if taught else "",
-        "generations": rung.generations,
+        "teacher": LADDER[name].teacher if taught else "",
         "best_epoch": result.best_epoch,
         "stopped_early": result.stopped_early,
-        # of all generations and epochs, those before an interruption too
-        "seconds": round(earlier_s + result.seconds, 1),
+        "seconds": round(result.seconds, 1),  # of all epochs, those before an interruption too
         "epochs": [{key: _told(key, value) for key, value in epoch.items()} for epoch in result.epochs],
     }
     return (
@@ -105,22 +83,20 @@ def train_net(
     )
 
 
-def _generation(
+def _trained(
     name: str,
-    generation: int,
-    told: Taught | None,
+    taught: Taught | None,
     settings: TrainingConfig,
     sets: Sets,
     on_fraction: OnFraction,
     parts: Parts | None,
 ) -> tuple["EvidenceNet", "TrainingResult"]:
-    """Train a network once, from weights of its own."""
     from bladewing.models.augment import VelocityMirror
     from bladewing.models.cnn import ImageNet, SpectrumNet
     from bladewing.models.training import train_network
     from bladewing.models.training_state import ForeignSnapshot
 
-    rung, seed = LADDER[name], settings.seed + generation
+    rung, seed = LADDER[name], settings.seed
     shapes = {key: INPUT_SHAPES[key] for key in rung.inputs}
     signal = rung.inputs[0]
     image = len(shapes[signal]) == 3
@@ -129,7 +105,7 @@ def _generation(
         if image
         else SpectrumNet(shapes, seed=seed, widen=rung.widen, kinds=CLASS_OF_KIND)
     )
-    epochs_part = _epochs_of(name, generation)
+    epochs_part = epochs_of(name)
     try:
         result = train_network(
             net,
@@ -145,11 +121,11 @@ def _generation(
             bfloat16=settings.bfloat16,
             # no measurement is signed, so only the picture is mirrored
             augment=VelocityMirror(axes={signal: -2 if image else -1}, odd={}),
-            teacher=told() if told else None,
+            teacher=taught() if taught else None,
             kinds=kinds_of(sets.train),
             snapshot=parts.arrays(epochs_part) if parts else None,
             on_snapshot=partial(parts.keep_arrays, epochs_part) if parts else None,
-            on_epoch=lambda epoch, epochs, _: on_fraction((generation + epoch / epochs) / rung.generations),
+            on_epoch=lambda epoch, epochs, _: on_fraction(epoch / epochs),
         )
     except ForeignSnapshot as error:
         assert parts
@@ -159,12 +135,6 @@ def _generation(
 
 def _inputs(name: str, part: Gathered) -> dict[str, NDArray]:
     return {key: part.inputs[key] for key in LADDER[name].inputs}
-
-
-def _whole(answers: NDArray[np.float16]) -> NDArray[np.float32]:
-    """Shares that were stored in half precision, 1 in sum again."""
-    shares = answers.astype(np.float32)
-    return shares / shares.sum(axis=1, keepdims=True)
 
 
 def _told(metric: str, value: float) -> float | None:

@@ -37,15 +37,12 @@ class Rung:
         Factor on the channels of a network.
     teacher
         Network whose answers it learns from besides the labels, where that is trained in the same run; "": none.
-    generations
-        How often a network is trained: from the second time on it learns from the answers of the one before.
     """
 
     learner: Literal["linear", "boosted", "network"]
     inputs: tuple[str, ...]
     widen: float = 1.0
     teacher: str = ""
-    generations: int = 1
 
 
 LADDER: dict[str, Rung] = {
@@ -53,7 +50,7 @@ LADDER: dict[str, Rung] = {
     "features-boosted": Rung("boosted", ("features",)),
     "spectrum-cnn-fast": Rung("network", ("levels", "cadence", "combs"), teacher="spectrum-cnn-wide"),
     "spectrum-cnn": Rung("network", ("spectrum", "cadence", "combs", "features"), teacher="spectrum-cnn-wide"),
-    "spectrum-cnn-wide": Rung("network", ("spectrum", "cadence", "combs", "features"), widen=2, generations=2),
+    "spectrum-cnn-wide": Rung("network", ("spectrum", "cadence", "combs", "features"), widen=2),
     "joint-boosted": Rung("boosted", ("joint_features",)),
     "image-cnn": Rung("network", ("image", "joint_features"), teacher="spectrum-cnn-wide"),
 }

@@ -42,10 +42,13 @@ def test_training_writes_every_model_and_its_account(trained):
     assert not list(out.glob(".bladewing*"))
 
 
-def test_every_record_has_the_kind_that_was_drawn_and_its_class():
-    drawn = gather(0, "train", 96, names=("levels",), workers=1)
+def test_every_record_has_the_kind_that_was_drawn_and_its_class_and_ground_alone_is_no_noise():
+    drawn = gather(0, "train", 240, names=("levels",), workers=1)
     kinds = kinds_of(drawn)
-    np.testing.assert_array_equal(np.array(list(KIND_CLASS))[kinds], drawn.truth["kind"])
+    background = (drawn.truth["kind"] == "noise") & np.isfinite(drawn.truth["background_db"])
+    assert 0 < background.sum() < (drawn.truth["kind"] == "noise").sum()
+    as_drawn = np.where(background, "ground", drawn.truth["kind"])
+    np.testing.assert_array_equal(np.array(list(KIND_CLASS))[kinds], as_drawn)
     np.testing.assert_array_equal(np.array(CLASS_OF_KIND)[kinds], drawn.labels)
     assert len(np.unique(kinds)) > len(CLASS_OF_KIND) / 2
 
@@ -175,7 +178,7 @@ def test_a_killed_and_interrupted_training_goes_on_to_the_same_files(whole, tmp_
     )
     root = Path(__file__).parents[2]
     with subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], cwd=root) as process:
-        while process.poll() is None and not list(tmp_path.glob("train-parts/*/spectrum-cnn-0-epochs.npz")):
+        while process.poll() is None and not list(tmp_path.glob("train-parts/*/spectrum-cnn-epochs.npz")):
             time.sleep(0.01)
         process.kill()
     assert process.returncode == -signal.SIGKILL
@@ -226,31 +229,7 @@ def test_a_pupil_learns_from_its_teacher_after_it_and_an_interruption_changes_no
     assert [straight[name]["teacher"] for name in names] == ["spectrum-cnn-wide", ""]
     taught = (outs[0] / "spectrum-cnn.onnx").read_bytes()
     assert taught != (whole / "spectrum-cnn.onnx").read_bytes()
-    assert "spectrum-cnn-wide" in _stopped_once(outs[1], "spectrum-cnn-0-epochs", after=2, models=names)
-    _same_models(names, *outs)
-
-
-def test_a_network_of_two_generations_goes_on_between_them_to_the_same_bytes(tmp_path, monkeypatch):
-    names = ("spectrum-cnn-wide",)
-    taught = []
-    real = training.train_network
-
-    def train_network(*given, teacher, **options):
-        taught.append(teacher)
-        return real(*given, teacher=teacher, **options)
-
-    monkeypatch.setattr(training, "train_network", train_network)
-    outs = tmp_path / "straight", tmp_path / "interrupted"
-    for out in outs:
-        out.mkdir()
-    account = _run(outs[0], models=names)["models"][names[0]]
-    assert account["generations"] == len(taught) == 2
-    assert taught[0] is None
-    assert taught[1].shape == (192, len(CLASS_OF_KIND))
-    np.testing.assert_allclose(taught[1].sum(axis=1), 1, atol=1e-6)
-    left = _stopped_once(outs[1], "spectrum-cnn-wide-1-epochs", after=1, models=names)
-    assert "spectrum-cnn-wide-0-answers" in left
-    assert len(taught) == 5  # twice whole, the second generation from its first epoch on
+    assert "spectrum-cnn-wide" in _stopped_once(outs[1], "spectrum-cnn-epochs", after=2, models=names)
     _same_models(names, *outs)
 
 
@@ -272,7 +251,7 @@ def test_what_a_model_tells_of_kinds_adds_up_to_its_classes_and_noise_is_one_of_
 def test_a_resumed_networks_seconds_hold_those_before_the_interruption(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         _run(tmp_path, after=2, then=_interrupt)
-    (file,) = tmp_path.glob("train-parts/*/spectrum-cnn-0-epochs.npz")
+    (file,) = tmp_path.glob("train-parts/*/spectrum-cnn-epochs.npz")
     with np.load(file) as kept:
         arrays = dict(kept)
     arrays["history/seconds"] += 1000
@@ -289,10 +268,10 @@ def test_other_settings_and_runs_of_other_lengths_do_not_take_what_was_kept(tmp_
     for after in (1, 2):
         with pytest.raises(KeyboardInterrupt):  # its first epoch comes, so nothing of the other was taken
             _run(tmp_path, after=after, then=_interrupt)
-    assert len(list(tmp_path.glob("train-parts/*/spectrum-cnn-0-epochs.npz"))) == 2
+    assert len(list(tmp_path.glob("train-parts/*/spectrum-cnn-epochs.npz"))) == 2
 
 
-@pytest.mark.parametrize("name", ["features-linear", "spectrum-cnn-0-epochs"])
+@pytest.mark.parametrize("name", ["features-linear", "spectrum-cnn-epochs"])
 def test_what_is_damaged_or_foreign_is_refused_in_one_line(tmp_path, name):
     with pytest.raises(KeyboardInterrupt):
         _run(tmp_path, after=1, then=_interrupt)
