@@ -42,9 +42,9 @@ def gathered(purpose: str, count: int) -> tuple[Gathered, dict[str, NDArray[np.f
         for name, baseline in BASELINES.items():
             theirs[name].append(baseline.read(records.iq, radar))
         labels.append(records.label_indices)
-        kinds.append(records.truth["kind"])
+        kinds.append({name: records.truth[name] for name in ("kind", "background_db")})
     whole = {name: np.concatenate(parts) for name, parts in ours.items()}
-    truth = {"kind": np.concatenate(kinds)}
+    truth = {name: np.concatenate([one[name] for one in kinds]) for name in kinds[0]}
     return Gathered(whole, np.concatenate(labels), truth), {name: np.concatenate(rows) for name, rows in theirs.items()}
 
 

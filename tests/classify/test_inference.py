@@ -124,13 +124,18 @@ def test_a_model_without_kinds_tells_of_no_noise(mixed):
 def test_shipped_models_tell_of_noise_where_there_is_nothing_else(name):
     model = Classifier.load(name)
     radar = Radar(9.85e9, 25e3, 2048)
-    empty, uav = (draw_records(radar, 60, 0, purpose="bench", kind=kind).iq for kind in ("noise", "quadcopter"))
-    iq = np.concatenate([empty, uav, np.zeros((1, 2048), np.complex64)])
+    drawn, uav = (draw_records(radar, 200, 0, purpose="bench", kind=kind) for kind in ("noise", "quadcopter"))
+    nothing = np.isnan(drawn.truth["background_db"])
+    iq = np.concatenate(
+        [drawn.iq[nothing][:60], drawn.iq[~nothing][:60], uav.iq[:60], np.zeros((1, 2048), np.complex64)]
+    )
     answer = model.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
     assert np.isnan(answer.noise[-1])
     told, rest = answer.noise[:-1], answer.probabilities[:-1]
     assert np.all((told >= 0) & (told <= rest[:, 2] + 1e-6))
-    assert np.median(told[:60]) > 0.3 > 30 * np.median(told[60:])
+    empty, ground, uav_told = told.reshape(3, 60)
+    assert np.median(empty) > 0.3 > 30 * np.median(uav_told)
+    assert np.median(empty) > 3 * np.median(ground)
     alone = model.predict(iq[7], carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
     assert alone.noise.shape == ()
     np.testing.assert_array_equal(alone.noise, told[7])

@@ -283,7 +283,7 @@ def test_reason_shows_that_the_probability_is_below_the_limit():
 )
 def test_what_the_whole_track_shows_multiplies_odds_at_the_end_alone(shown, name, factor):
     # a little ahead, and limits so low that what is found lets the class be declared
-    p = [[0.42 if other == name else 0.29 for other in CLASSES]] * 4
+    p = [[0.45 if other == name else 0.275 for other in CLASSES]] * 4
     plain, more = (fuse(p, ["unknown"] * 4, accept=(0.3,) * 3, shown=found) for found in ((), shown))
     best = CLASSES.index(name)
     odds = [track.probabilities / (1 - track.probabilities) for track in (plain, more)]

@@ -138,7 +138,7 @@ def _few_sets(*_):
             values = rng.normal(size=(count, *INPUT_SHAPES[name]))
             inputs[name] = (values + 0.3 * labels.reshape(-1, *[1] * (values.ndim - 1))).astype(np.float32)
         kinds = np.array([next(kind for kind, of in KIND_CLASS.items() if of == CLASSES[label]) for label in labels])
-        return Gathered(inputs, labels, {"kind": kinds})
+        return Gathered(inputs, labels, {"kind": kinds, "background_db": np.full(count, np.nan)})
 
     return Sets(gathered(192), gathered(96), gathered(300), gathered(300))
 
