@@ -31,21 +31,15 @@ TIMED = Radar(9.85e9, 25e3, 2048)
 def gathered(purpose: str, count: int) -> tuple[Gathered, dict[str, NDArray[np.float32]]]:
     """Records of every radar: our inputs of them, and what each baseline reads."""
     names = tuple(dict.fromkeys(name for model in OURS for name in LADDER[model].inputs))
-    ours: dict[str, list[NDArray]] = {name: [] for name in names}
     theirs: dict[str, list[NDArray]] = {name: [] for name in BASELINES}
-    labels, kinds = [], []
+    runs = []
     for records in stream(5, purpose, count):
         radar = records.radar
         given = model_inputs(records.iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz, names=names)
-        for name in names:
-            ours[name].append(given[name])
+        runs.append(Gathered(given, records.label_indices, records.truth))
         for name, baseline in BASELINES.items():
             theirs[name].append(baseline.read(records.iq, radar))
-        labels.append(records.label_indices)
-        kinds.append({name: records.truth[name] for name in ("kind", "background_db")})
-    whole = {name: np.concatenate(parts) for name, parts in ours.items()}
-    truth = {name: np.concatenate([one[name] for one in kinds]) for name in kinds[0]}
-    return Gathered(whole, np.concatenate(labels), truth), {name: np.concatenate(rows) for name, rows in theirs.items()}
+    return Gathered.joined(runs, count), {name: np.concatenate(rows) for name, rows in theirs.items()}
 
 
 def judged(scores: NDArray[np.floating], labels: NDArray[np.int64]) -> tuple[float, float, float]:
