@@ -55,6 +55,9 @@ VALUES = (
 #: What a recording's JSON object holds of the wingbeat and of the body's course.
 WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std", "acceleration_mps2", "acceleration_mps2_std")
 
+#: Where the middle half of so many combs and more reaches over this ratio, they are not the same in all dwells.
+LEAST_COMBS, UNSTEADY = 4, 1.25
+
 #: No rotor has more; eight is the most that fly.
 MOST_BLADES = 64
 
@@ -129,7 +132,7 @@ class Measured:
     def json_objects(self) -> Iterator[dict[str, Any]]:
         """One object a dwell and a closing one; what has no value is null."""
         for n in range(len(self.iq)):
-            rates = self.values.rotor_rates_hz[n]
+            seen = np.isfinite(self.values.rotor_rates_hz[n])
             yield {
                 "file": self.recording.name,
                 "start_s": round(float(self.start_s[n]), 9),
@@ -137,7 +140,8 @@ class Measured:
                 **{name: _number(getattr(self.values, name)[n]) for name in VALUES},
                 "acceleration_mps2": _number(self.acceleration_mps2[n]),
                 "acceleration_mps2_std": _number(self.acceleration_mps2_std[n]),
-                "rotor_rates_hz": [float(rate) for rate in rates[np.isfinite(rates)]],
+                "rotor_rates_hz": self.values.rotor_rates_hz[n][seen].tolist(),
+                "rotor_rates_hz_std": self.values.rotor_rates_hz_std[n][seen].tolist(),
                 "rotors_resolved": bool(self.values.rotors_resolved[n]),
                 "length_is_lower_bound": self.values.length_is_lower_bound,
                 "alternatives": [
@@ -249,7 +253,15 @@ class Measured:
             rotor = "blades x rate: " + " or ".join(options)
         where = f"comb in {all_together['with_comb']} of {counted(all_together['dwells'])}"
         folded = str(v.band_reason[clear])
-        return f"{where}; {rotor}; {body}{self.gear()}{self.wheel()}{folded and '; ' + folded}"
+        return f"{where}; {rotor}; {body}{self.gear()}{self.wheel()}{self.unsteady()}{folded and '; ' + folded}"
+
+    def unsteady(self) -> str:
+        """Words of caution where the combs of the dwells are not one rotor's: most differ by more than it changes."""
+        chopping_hz = self.values.chopping_hz[np.isfinite(self.values.chopping_hz)]
+        low, high = np.quantile(chopping_hz, [0.25, 0.75])
+        if len(chopping_hz) < LEAST_COMBS or high < UNSTEADY * low:
+            return ""
+        return f"; the dwells do not agree: half of their combs lie within {low:.4g} to {high:.4g} Hz"
 
     def wheel(self) -> str:
         """Words of caution where the lines of most combs reach no further from the body than that moves; or ""."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .arrays import ARRAY_SUFFIXES, read_array
 from .clipping import clipped_values
+from .dropouts import lost_pulses
 from .errors import BadInput
 from .samples import complex_samples, positive
 from .sigmf_file import find_sigmf, read_sigmf
@@ -86,13 +87,19 @@ class Recording:
         return f"the last {left_out_s:.2g} s, shorter than a dwell, are left out" if left_out_s else ""
 
     def remarks(self, dwell_s: float, dwells: NDArray[np.complex64]) -> tuple[str, ...]:
-        """What is to be known of the recording beside its answer: `cut_sentence`, and clipping."""
-        clipped = clipped_values(self.iq)
-        said = (
-            f"clipped: {clipped} values of I and Q stand at the converter's largest, which makes lines that are no "
-            "target's: lower the gain"
-        )
-        return tuple(sentence for sentence in (self.cut_sentence(dwell_s, dwells), said if clipped else "") if sentence)
+        """What is to be known of the recording beside its answer: `cut_sentence`, clipping, and lost pulses."""
+        said = [self.cut_sentence(dwell_s, dwells)]
+        if clipped := clipped_values(self.iq):
+            said.append(
+                f"clipped: {clipped} values of I and Q stand at the converter's largest, which makes lines that are no "
+                "target's: lower the gain"
+            )
+        if lost := lost_pulses(self.iq):
+            said.append(
+                f"lost: {lost} of {len(self.iq)} pulses are exactly 0, which draws lines that are no target's beside "
+                "every line: interpolate them from their neighbours"
+            )
+        return tuple(sentence for sentence in said if sentence)
 
 
 def load_recording(

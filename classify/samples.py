@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from bladewing.features.spectrum import FILL_IN
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import BadInput
@@ -24,11 +25,11 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
     Raises
     ------
     BadInput
-        The samples are not complex numbers, or one is not finite as complex64.
+        The samples are not complex numbers, one is not finite as complex64, or all vanish in it.
     """
     if np.ma.is_masked(values):
         hidden = np.ma.count_masked(values)
-        raise BadInput(f"{name}: {hidden} samples are masked: every sample counts: cut them out or replace them by 0")
+        raise BadInput(f"{name}: {hidden} samples are masked: every sample counts: {FILL_IN}")
     given = np.asarray(values)
     if given.dtype.names is not None:
         raise BadInput(f"{name}: a structured array with fields {list(given.dtype.names)}: store complex samples")
@@ -45,13 +46,16 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
     if given.dtype != _COMPLEX64:
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows is found below, with its index
             iq = given.astype(np.complex64)
+        if iq.size and not iq.any() and given.any():
+            largest = float(np.abs(given).max())
+            raise BadInput(f"{name}: samples of at most {largest:.2g}, which complex64 holds as 0: raise the gain")
     if not np.isfinite(np.ascontiguousarray(iq).view(np.float32)).all():  # real numbers: a quarter of the time
         finite = np.isfinite(iq)
         first = np.unravel_index(int(np.argmin(finite)), iq.shape)
         where = int(first[0]) if iq.ndim == 1 else tuple(int(i) for i in first)
         with np.errstate(invalid="ignore"):  # a signalling NaN is cast to be shown
             shown = str(given[first])
-        cure = "lower the gain" if np.isfinite(given[first]) else "cut them out or replace them by 0"
+        cure = "lower the gain" if np.isfinite(given[first]) else FILL_IN
         raise BadInput(
             f"{name}: sample {where} is {shown}: every sample must be finite in complex64 "
             f"({int(np.sum(~finite))} of {iq.size} are not): {cure}"

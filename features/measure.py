@@ -12,7 +12,7 @@ from .bandwidth import half_empty, threshold_band_hz
 from .body_velocity import body_velocity, folded
 from .chopping import Chopping
 from .comb import LEAST_REACH_MPS, find_comb
-from .family_edge import SPAN, edge_around, edge_of_lines, span_of, surer_edge
+from .family_edge import FASTEST_TIP_MPS, SPAN, edge_around, edge_of_lines, span_of, surer_edge
 from .helicopter import find_gear
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .one_thread import one_thread
@@ -92,7 +92,8 @@ class Measurements:
         Why there is no second comb; empty where there is one.
     band_reason : ndarray of str
         Why there is a comb but no band, tip speed and blade length: its lines fill the unambiguous span, or a single
-        channel has both sides of the body folded onto one; else empty.
+        channel has both sides of the body folded onto one. Or why there is a band but neither tip speed nor blade
+        length: at the beta given the tips were faster than any blade's. Else empty.
     """
 
     body_velocity_mps: NDArray[np.float64]
@@ -199,7 +200,7 @@ def measure(
         its range.
     """
     if beyond := beyond_radars(carrier_hz, prf_hz):
-        raise ValueError(f"{beyond}: 9.85 GHz is 9.85e9")
+        raise ValueError(f"{beyond}: give 9.85 GHz as 9.85e9, 20 kHz as 20e3")
     if blades is not None and (blades != int(blades) or blades < 1):
         raise ValueError(f"blades is {blades!r}: it must be a whole number of at least 1")
     if beta_rad is not None and not 0 <= beta_rad < np.pi / 2:
@@ -330,6 +331,12 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     out["bandwidth_hz"], out["bandwidth_hz_std"] = 2 * edge * prf_hz, 2 * edge_std * prf_hz
     cosine = 1.0 if beta_rad is None else float(np.cos(beta_rad))
     tip, tip_std = (value * prf_hz * wavelength_m / 2 / cosine for value in (edge, edge_std))
+    if tip - EDGE_DEVIATIONS * tip_std > FASTEST_TIP_MPS:
+        out["band_reason"] = (
+            f"no tip speed: beta of {np.rad2deg(beta_rad or 0.0):.4g} deg makes it {tip:.0f} m/s, faster than any "
+            "blade's tip: give another angle, or none"
+        )
+        tip = tip_std = np.nan
     out["tip_speed_mps"], out["tip_speed_mps_std"] = tip, tip_std
     if known is not None:
         rotation = out["chopping_hz"] / known

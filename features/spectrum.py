@@ -242,8 +242,11 @@ def power_of(transform: NDArray[np.complex64]) -> NDArray[np.float32]:
     return np.multiply(power, power, out=power)
 
 
-#: What is said of samples that are not.
-NOT_FINITE = "iq holds values that are not finite: cut them out or replace them by 0"
+#: What is to be done about samples that are missing.
+FILL_IN = "interpolate them from their neighbours (zeros in their place, or a cut, would draw lines beside every line)"
+
+#: What is said of samples that are not finite.
+NOT_FINITE = f"iq holds values that are not finite: {FILL_IN}"
 
 #: A record whose largest part is below this has lost its digits among float32's denormal numbers: 9 bits are left here.
 LEAST_PART = 2.0**-140
@@ -347,7 +350,7 @@ def as_complex(iq: ArrayLike) -> NDArray[np.complex64]:
         If they are not complex, or some are masked.
     """
     if np.ma.is_masked(iq):
-        raise ValueError("iq holds masked samples: cut them out or replace them by 0")
+        raise ValueError(f"iq holds masked samples: {FILL_IN}")
     samples = np.asarray(iq)
     if samples.dtype.kind != "c":
         raise ValueError(f"iq holds {samples.dtype}: its samples must be complex, I + jQ")

@@ -193,7 +193,7 @@ def test_a_record_of_zeros_is_unknown_and_leaves_the_others_alone(always_uav):
         (noise(0, (3,)), r"iq has shape \(3, 0\)"),
         (np.array([1j] * 100, dtype=object), "iq: an array of Python objects"),
         ("drone.npy", "iq: samples of type <U9"),
-        (np.ma.masked_less(noise(200).real, 0) + 0j, r"iq: \d+ samples are masked: .*cut them out"),
+        (np.ma.masked_less(noise(200).real, 0) + 0j, r"iq: \d+ samples are masked: .*interpolate them"),
     ],
 )
 def test_bad_samples_are_refused(always_uav, iq, said):

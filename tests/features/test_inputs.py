@@ -221,5 +221,5 @@ def test_no_records_give_no_rows(name):
 def test_samples_that_are_not_finite_are_refused(name, value):
     iq = white(np.random.default_rng(0), 3, 500).astype(np.complex64)
     iq[1, 77] = value
-    with pytest.raises(ValueError, match="values that are not finite: cut them out or replace them by 0"):
+    with pytest.raises(ValueError, match="values that are not finite: interpolate them"):
         model_inputs(iq, **RADAR, names=(name,))

@@ -40,6 +40,15 @@ def test_no_tip_is_faster_than_any_blades():
     assert not (tips > 300).any()
 
 
+def test_an_angle_that_makes_the_tip_faster_than_any_blades_leaves_the_band_alone():
+    iq = comb(PRF_HZ, PULSES, 130.0, np.append(20, np.full(60, 1.0)))
+    seen, turned = (measure(iq, **RADAR, blades=2, beta_rad=beta_rad) for beta_rad in (0.0, 1.5))
+    assert seen.tip_speed_mps < 250 < seen.tip_speed_mps / np.cos(1.5)
+    assert turned.bandwidth_hz == seen.bandwidth_hz
+    assert np.isnan([turned.tip_speed_mps, turned.tip_speed_mps_std, turned.blade_length_m]).all()
+    assert "beta of 85.94 deg" in str(turned.band_reason)
+
+
 def test_no_rotor_is_left_whose_band_ends_below_those_of_rotors():
     radar = Radar(1e11, 1e5, 6000)
     birds = draw_records(radar, 12, 11, start=12, kind="flapping_bird").iq
