@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 #: Samples without steps differ by next to nothing, and next to none is nearly 0.
 NEAR_STEPS, NEAR_SHARE, LEAST_LOST = 2.1, 0.5, 3
 
+#: More zeros in a row are silence, which is no comb, and too long to be filled in.
+MOST_IN_A_ROW = 32
+
 #: Fewer sizes that differ are a converter's that hardly steps at all: it gives 0 most of the time.
 LEAST_DISTINCT = 8
 
@@ -27,12 +30,13 @@ def lost_pulses(iq: NDArray[np.complex64]) -> int:
     -------
     int
         0 where nothing speaks of lost ones: no zeros, no more than a converter of coarse steps gives of noise, or
-        nothing else.
+        nothing else. Zeros of longer silences are not counted.
     """
     size = np.maximum(np.abs(iq.real), np.abs(iq.imag))
     there = size > 0
-    zeros = len(size) - int(there.sum())
-    if zeros < LEAST_LOST or zeros == len(size):
+    runs = np.diff(np.flatnonzero(np.concatenate([[True], there, [True]]))) - 1  # of zeros between those that are there
+    zeros = int(runs[runs <= MOST_IN_A_ROW].sum())
+    if zeros < LEAST_LOST or not there.any():
         return 0
     held = np.sort(size[there])
     steps = np.diff(held)
