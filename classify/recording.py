@@ -87,7 +87,7 @@ class Recording:
         return f"the last {left_out_s:.2g} s, shorter than a dwell, are left out" if left_out_s else ""
 
     def remarks(self, dwell_s: float, dwells: NDArray[np.complex64]) -> tuple[str, ...]:
-        """What is to be known of the recording beside its answer: `cut_sentence`, clipping, and lost pulses."""
+        """What is to be known of the recording beside its answer: `cut_sentence`, and what ails its samples."""
         said = [self.cut_sentence(dwell_s, dwells)]
         if clipped := clipped_values(self.iq):
             said.append(
@@ -98,6 +98,12 @@ class Recording:
             said.append(
                 f"lost: {lost} of {len(self.iq)} pulses are exactly 0, which draws lines that are no target's beside "
                 "every line: interpolate them from their neighbours"
+            )
+        if self.iq.real.any() != self.iq.imag.any():
+            said.append(
+                f"one channel: {'Q' if self.iq.real.any() else 'I'} is 0 in every pulse, so that both sides of the "
+                "spectrum are one and noise may pass for a comb: record I and Q, or make it analytic "
+                "(scipy.signal.hilbert)"
             )
         return tuple(sentence for sentence in said if sentence)
 

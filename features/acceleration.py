@@ -8,6 +8,7 @@ from .inputs import in_blocks
 from .spectrum import (
     LEAST_PART,
     SPEED_OF_LIGHT_MPS,
+    as_complex,
     finite_complex,
     largest_part,
     require_radar,
@@ -15,7 +16,8 @@ from .spectrum import (
     unit_scale,
 )
 
-#: Accelerations that are tried [m/s^2]: five times gravity.
+#: Accelerations that are tried [m/s^2]: five times gravity; in long dwells of short waves fewer, up to those that smear
+#: a line over an eighth of the span.
 MAX_MPS2 = 50.0
 
 #: A body line must stand so high over the median of the spectrum [dB].
@@ -110,7 +112,7 @@ def body_acceleration(
             continue
         value[index] = at * step
         # the line's height is pulses^2 A^2, the noise's pulses sigma^2
-        snr = height / max(noise, beside) / pulses
+        snr = height / beside / pulses
         std[index] = np.sqrt(90 / (snr * float(pulses) ** 5)) * prf_hz**2 * wavelength_m / (2 * np.pi)
         smeared[index] = risen and abs(value[index]) > max(step, SURE_DEVIATIONS * std[index])
     lead = samples.shape[:-1]
@@ -134,8 +136,14 @@ def without_acceleration(
     Returns
     -------
     ndarray of complex64, shape (..., pulses)
+
+    Raises
+    ------
+    ValueError
+        If `iq` is not complex, or the frequencies are not positive.
     """
-    samples = np.asarray(iq, np.complex64)
+    samples = as_complex(iq)
+    require_radar(carrier_hz, prf_hz)
     acceleration = np.asarray(acceleration_mps2, np.float64)[..., None]
     return _steadied(samples, acceleration, SPEED_OF_LIGHT_MPS / carrier_hz, prf_hz)
 
@@ -156,7 +164,8 @@ def _beside(
     """Power of the noise that moves the strongest line of one dwell as what lies beside it does.
 
     An acceleration and the line are taken out first. What lies k bins off bends the line's phase by the second Legendre
-    polynomial's part of it, which falls with 1 / k^2: the nearest bins count most, all alike where it is noise.
+    polynomial's part of it, which falls with 1 / k^2: the nearest bins count most, all alike where it is noise. It is
+    no less than the noise of the whole span.
     """
     pulses = len(samples)
     steady = _steadied(samples, np.asarray(acceleration_mps2), wavelength_m, prf_hz)
@@ -165,10 +174,15 @@ def _beside(
     left, middle, right = np.log(np.abs(spectrum[np.array([top - 1, top, top + 1]) % size]))
     turns = (top + (right - left) / (2 * (2 * middle - left - right))) / size
     still = steady * np.exp(-2j * np.pi * turns * np.arange(pulses))
+    half = pulses // 2
+    for _ in range(2):  # the parabola is off by a hundredth of a bin, at which strong lines leave much of themselves
+        turn = np.angle(still[-half:].sum() * still[:half].sum().conj()) / (pulses - half)
+        still = still * np.exp(-1j * turn * np.arange(pulses))
     rest = fft.fft(still - still.mean())
     bins = np.arange(1, BESIDE_BINS + 1)
     power = (np.abs(rest[bins]) ** 2 + np.abs(rest[-bins]) ** 2) / 2
-    return float(max(power.mean(), np.average(power, weights=bins**-4.0)))
+    floor = np.median(np.abs(rest) ** 2) / np.log(2)
+    return float(max(power.mean(), np.average(power, weights=bins**-4.0), floor))
 
 
 def _sharpened(

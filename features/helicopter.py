@@ -17,7 +17,7 @@ from .comb_search import FINE_STEPS, Candidate, heights, score, spacing_limits
 from .comb_sums import MOST_SNRS, running_sums
 from .evidence import line_evidence
 from .lines import sum_of_lines
-from .periodogram import BLOCK_BINS, LEAST_LEVEL, Periodogram, local_level
+from .periodogram import LEAST_LEVEL, Periodogram, local_level
 from .rotors import Rotors, judged, separate_rotors
 from .slow_lines import remove_bands
 
@@ -170,8 +170,7 @@ def _left_over(data: Periodogram, comb: Comb) -> tuple[Periodogram, NDArray[np.b
     rest = data.left(comb.rest)
     hidden = _hidden(rest, comb.fit)
     power = rest.power * rest.level
-    block = int(BLOCK_BINS * len(power) / rest.pulses)
-    level = np.maximum(local_level(power, ~hidden, 1.0, block), LEAST_LEVEL)
+    level = np.maximum(local_level(power, ~hidden, 1.0, rest.block), LEAST_LEVEL)
     return replace(rest, power=(power / level).astype(np.float32), level=level), hidden
 
 
@@ -186,8 +185,7 @@ def _hidden(rest: Periodogram, first: CombFit) -> NDArray[np.bool_]:
 
 def _evidence(rest: Periodogram, hidden: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Evidence of a line in every bin [nats], 0 where it is hidden."""
-    block = int(BLOCK_BINS * len(rest.power) / rest.pulses)
-    evidence = line_evidence(np.where(hidden, 1.0, rest.power), block)
+    evidence = line_evidence(np.where(hidden, 1.0, rest.power), rest.block)
     evidence[:, hidden] = 0.0
     return evidence
 

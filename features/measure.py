@@ -201,7 +201,7 @@ def measure(
     """
     if beyond := beyond_radars(carrier_hz, prf_hz):
         raise ValueError(f"{beyond}: give 9.85 GHz as 9.85e9, 20 kHz as 20e3")
-    if blades is not None and (blades != int(blades) or blades < 1):
+    if blades is not None and not (math.isfinite(blades) and blades == int(blades) >= 1):
         raise ValueError(f"blades is {blades!r}: it must be a whole number of at least 1")
     if beta_rad is not None and not 0 <= beta_rad < np.pi / 2:
         raise ValueError(f"beta_rad is {beta_rad!r}: it must be at least 0 and below pi/2 [rad]")

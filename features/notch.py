@@ -77,8 +77,8 @@ def body_line(spectrum: Spectrum) -> Body:
 
 
 def parabola_offset(
-    left: NDArray[np.float32], middle: NDArray[np.float32], right: NDArray[np.float32]
-) -> NDArray[np.float32]:
+    left: NDArray[np.floating], middle: NDArray[np.floating], right: NDArray[np.floating]
+) -> NDArray[np.floating]:
     """Where a parabola through three neighbours has its top, -0.5..0.5 from the middle one; 0 where it has none."""
     curve = 2 * middle - left - right
     # of equal neighbours the curve is rounding alone

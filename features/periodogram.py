@@ -126,14 +126,14 @@ class Periodogram:
     @cached_property
     def contrast(self) -> NDArray[np.float32]:
         """The same over what any place near by has, where lines fill that: see `octaves.over_neighbours`."""
-        return over_neighbours(self._evidence, self._block) * self.seen
+        return over_neighbours(self._evidence, self.block) * self.seen
 
     @cached_property
     def _evidence(self) -> NDArray[np.float32]:
-        return line_evidence(self.power, self._block)
+        return line_evidence(self.power, self.block)
 
     @property
-    def _block(self) -> int:
+    def block(self) -> int:
         """Bins of a neighbourhood."""
         return int(BLOCK_BINS * len(self.power) / self.pulses)
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .chopping import CHOPPING_RANGE_HZ
-from .notch import NOTCH_MPS
+from .notch import NOTCH_MPS, parabola_offset
 from .spectrum import SPEED_OF_LIGHT_MPS
 
 #: Window length [s] and overlap [1] of the paper's Fig. 21: 20, 80 and 200 samples at 20 kHz, 50 to 90 %.
@@ -202,9 +202,7 @@ def _period(row: NDArray[np.float64], first: int, last: int, least: float) -> fl
 
 def _top(row: NDArray[np.float64], peak: int) -> float:
     """Place of a peak below the bin, by a parabola."""
-    left, middle, right = row[peak - 1 : peak + 2]
-    curve = 2 * middle - left - right
-    return peak + (float(np.clip((right - left) / (2 * curve), -0.5, 0.5)) if curve > 0 else 0.0)
+    return peak + float(parabola_offset(*row[peak - 1 : peak + 2]))
 
 
 def flash_bandwidth_hz(frames: Stft, threshold_db: float = 20.0) -> NDArray[np.float64]:

@@ -26,6 +26,9 @@ FRAME_S, CELL_MPS, HOP_S = (0.012, 0.024), 1.0, 0.003
 #: Wings move within this of the body [m/s], and birds fly no faster.
 WING_MPS = 25.0
 
+#: Cells of speed that wings must reach over for what repeats in them to be seen.
+LEAST_CELLS = 4
+
 #: A repetition must have this much evidence [standard deviations], and this share of it must move through the
 #: velocities: what rises and falls at all of them alike is fading, or lines that beat.
 LEAST_EVIDENCE, LEAST_MOVING_SHARE = 40.0, 0.08
@@ -162,6 +165,8 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     # closing on the radar is a positive Doppler shift, and a velocity below the body's
     velocities = velocity - frames.frequency_hz * wavelength_m / 2
     near = np.abs(velocities - velocity) <= WING_MPS
+    if near.sum() < LEAST_CELLS:  # the frames are too short for so long a wave
+        return (*nothing[:3], *body, "no wingbeat: wings are slower than this carrier tells apart")
     levels = level_spectrum(frames.power[:, near], floor, frames.frame_rate_hz, HIGHEST_HZ)
     if levels is None:
         return (np.nan, np.nan, np.nan, *body, "no wingbeat: nothing moves")

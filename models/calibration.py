@@ -272,7 +272,7 @@ def conformal_thresholds(probabilities: ArrayLike, labels: NDArray[np.integer], 
     thresholds = np.zeros(CLASS_COUNT)
     for index in range(CLASS_COUNT):
         truth = np.sort(table[labels == index, index])
-        rank = int((1 - coverage) * (len(truth) + 1) * (1 + 1e-9))
+        rank = min(int((1 - coverage) * (len(truth) + 1) * (1 + 1e-9)), len(truth))
         if rank:
             thresholds[index] = truth[rank - 1]
     return thresholds

@@ -159,8 +159,8 @@ def uav_truth(part: UavPart) -> dict[str, Any]:
 
 
 def _flashes(rotor: RotorPart) -> int:
-    """Flashes a turn on each side (the paper's eq. 25): one a blade, or one where a single blade reflects at all."""
-    return rotor.blades if sum(amplitude > 0 for amplitude in rotor.amplitudes) > 1 else 1
+    """Flashes a turn on each side (the paper's eq. 25): one for each blade that reflects at all."""
+    return max(1, sum(amplitude > 0 for amplitude in rotor.amplitudes))
 
 
 def _repeats(rotor: RotorPart) -> int:

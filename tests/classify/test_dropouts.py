@@ -51,6 +51,15 @@ def test_a_silence_is_no_lost_pulses() -> None:
     assert lost_pulses(iq) == 10
 
 
+def test_a_recording_tells_of_a_channel_that_is_missing() -> None:
+    iq = noise(np.random.default_rng(6), 2000)
+    for part, name in ((iq.real + 0j, "Q"), (1j * iq.imag, "I")):
+        recording = Recording("walk", part.astype(np.complex64), 24e9, 1e4)
+        (said,) = recording.remarks(0.1, recording.dwells(0.1))
+        assert said.startswith(f"one channel: {name} is 0 in every pulse")
+    assert not Recording("walk", iq, 24e9, 1e4).remarks(0.1, iq.reshape(2, -1))
+
+
 def test_a_recording_tells_of_them_and_how_many() -> None:
     iq = noise(np.random.default_rng(4), 2000)
     iq[100:110] = 0

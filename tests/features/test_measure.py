@@ -178,7 +178,7 @@ def test_bad_arguments_are_refused():
         with pytest.raises(ValueError, match="must be"):
             measure(iq, **RADAR, **wrong)
     for radar in ({"carrier_hz": 9.85}, {"prf_hz": 0.5}, {"carrier_hz": np.nan}):  # in GHz; in MHz; none
-        with pytest.raises(ValueError, match=r"is .*: it must be .* Hz: 9\.85 GHz is 9\.85e9"):
+        with pytest.raises(ValueError, match=r"is .*: it must be .* Hz: give 9\.85 GHz as 9\.85e9"):
             measure(iq, **RADAR | radar)
     with pytest.raises(ValueError, match="not finite"):
         measure(np.where(np.arange(PULSES) == 5, np.nan, iq), **RADAR)

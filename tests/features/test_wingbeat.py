@@ -59,6 +59,15 @@ def test_clutter_noise_and_silence_do_not_beat():
     assert "less than" in str(wingbeat(white(rng, 2000), **LONG).reason)
 
 
+@pytest.mark.parametrize("carrier_hz", [1e8, 2.45e8, 3e8])
+def test_a_wave_too_long_for_wings_gets_a_reason(carrier_hz):
+    rng = np.random.default_rng(1)
+    iq = np.exp(2j * np.pi * 3 * np.arange(1700) / 1e3) + 0.1 * white(rng, 1700)
+    found = wingbeat(iq, carrier_hz=carrier_hz, prf_hz=1e3)
+    assert np.isnan(found.wingbeat_hz)
+    assert "no wingbeat" in str(found.reason)
+
+
 def test_fading_does_not_beat():
     # a gain that swings at the rate of a gull's wings, over a body and a wide echo about it
     rng = np.random.default_rng(6)

@@ -473,6 +473,14 @@ def test_a_bird_is_lowest_where_its_wings_are_highest():
     np.testing.assert_allclose(heave_range_m(part, times, one), -0.02 * np.cos(cycle), atol=1e-12)
 
 
+@pytest.mark.parametrize(("amplitudes", "flashes"), [([1.0, 0.0, 1.0, 0.0], 2), ([1.0, 0.0, 0.0], 1), ([0.5, 1.0], 2)])
+def test_blades_that_do_not_reflect_do_not_flash(amplitudes, flashes):
+    rotor = {**ROTOR, "blades": len(amplitudes), "blade_amplitudes": amplitudes}
+    radar = {"carrier_hz": 9.85e9, "prf_hz": 20e3, "pulses": 2000}
+    rendered = Scene.build({"radar": radar, "uav": [uav(rotors=[rotor])]}).render()
+    assert rendered.truth[0]["chopping_hz"] == [pytest.approx(ROTOR["rotation_hz"] * flashes)]
+
+
 @pytest.mark.parametrize(
     ("amplitudes", "repeats"),
     [([1.0] * 4, 4), ([1.0, 0.5, 1.0, 0.5], 2), ([1.0, 0.5, 0.5, 0.5], 1), ([1.0, 1.0, 0.5], 1), ([1.0], 1)],
