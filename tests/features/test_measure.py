@@ -281,6 +281,19 @@ def test_a_long_dwell_of_a_short_wave_takes_out_no_wider_band_than_memory_holds(
     assert np.abs(np.fft.fft(data.samples)[:MOST_NOTCH_BINS]).max() < 1e-3 * np.abs(np.fft.fft(iq)).max()
 
 
+def test_many_clicks_are_taken_out_where_they_come_at_random_and_not_as_flashes_do():
+    rng = np.random.default_rng(4)
+    noise = white(rng, PULSES).astype(complex)
+    random, steady = noise.copy(), noise.copy()
+    places = rng.choice(PULSES, 20, replace=False)
+    random[places] += 30 * np.exp(2j * np.pi * rng.random(20))
+    assert np.count_nonzero(without_clicks(random)[places]) <= 2  # two may stand side by side
+    steady[100 :: PULSES // 21] += 30
+    np.testing.assert_array_equal(without_clicks(steady), steady)
+    lines = np.array([random + 30 * np.exp(1j * turn) for turn in (0.0, 1.0, 2.0, 3.0)])
+    assert np.isnan(measure(lines.astype(np.complex64), **RADAR).chopping_hz).all()
+
+
 def test_clicks_are_taken_out_and_flashes_are_not():
     rng = np.random.default_rng(5)
     noise = white(rng, PULSES)
