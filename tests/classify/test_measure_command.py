@@ -42,6 +42,8 @@ def test_json_gives_a_line_a_dwell_and_one_a_recording(folder, capsys):
         assert dwell["blade_length_m"] == pytest.approx(LENGTH_M, rel=0.02)
         assert not dwell["length_is_lower_bound"]
         assert [a["blades"] for a in dwell["alternatives"]] == [2]
+        assert len(dwell["rotor_rates_hz_std"]) == len(dwell["rotor_rates_hz"]) == 1
+        assert 0 < dwell["rotor_rates_hz_std"][0] < 0.1
         assert dwell["reason"] is None
 
 
@@ -211,6 +213,25 @@ def test_no_number_of_the_table_is_cut(folder, capsys, monkeypatch, columns):
     for line in lines[head + 1 : head + 3]:
         assert line.count(" +- ") == 4
         assert "…" not in line
+
+
+@pytest.mark.parametrize("other_hz", [RATE_HZ, 1.6 * RATE_HZ])
+def test_dwells_whose_combs_are_not_one_rotors_are_told(other_hz, tmp_path, capsys):
+    rng = np.random.default_rng(3)
+    times_s = np.arange(2800) / PRF_HZ
+    parts = []
+    for rate_hz in (RATE_HZ, other_hz) * 2:
+        blades = rotor_echo(
+            RotorMotion(rate_hz).angle_rad(times_s), wavelength_m=299_792_458.0 / CARRIER_HZ, blade_length_m=LENGTH_M
+        )
+        noise = (rng.standard_normal(2800) + 1j * rng.standard_normal(2800)) * np.sqrt(0.5)
+        parts.append(blades / np.sqrt(np.mean(np.abs(blades) ** 2)) + 10 + noise)
+    np.save(tmp_path / "two.npy", np.concatenate(parts).astype(np.complex64))
+    assert main(["measure", str(tmp_path / "two.npy"), *RADAR, "--dwell", "0.08"]) == 0
+    said = capsys.readouterr().out
+    assert "comb in 4 of 4 dwells" in said
+    both = f"half of their combs lie within {2 * RATE_HZ:.4g} to {2 * other_hz:.4g} Hz"
+    assert ("do not agree" in said) == (both in said) == (other_hz != RATE_HZ)
 
 
 def test_a_comb_that_ends_where_the_body_s_speed_does_is_called_a_wheel_s(tmp_path, capsys):
