@@ -155,10 +155,15 @@ class Measured:
         yield {"file": self.recording.name, "recording": self.together()}
 
     def together(self) -> dict[str, Any]:
-        """Medians over the dwells that hold a comb, or both of a helicopter's, and how many those are."""
+        """Medians over the dwells that hold a comb, or both of a helicopter's, and how many those are.
+
+        Without any comb, the body's velocity is that of all dwells.
+        """
         held = np.isfinite(self.values.chopping_hz)
         names = ("body_velocity_mps", "chopping_hz", "bandwidth_hz", "tip_speed_mps", "rotation_hz", "blade_length_m")
         medians = {name: _median(getattr(self.values, name)[held]) for name in names}
+        if not held.any():
+            medians["body_velocity_mps"] = _median(self.values.body_velocity_mps)
         geared = np.isfinite(self.values.gear_ratio)
         pair = ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
         gear = {name: _median(getattr(self.values, name)[geared]) for name in pair}
@@ -230,14 +235,15 @@ class Measured:
     def sentence(self) -> str:
         """The recording in one line: the answer an engineer wants."""
         all_together = self.together()
+        velocity_mps = all_together["body_velocity_mps"]
+        body = "" if velocity_mps is None else f"; body {round(velocity_mps, 2) + 0.0:+.2f} m/s"  # not -0.00
         if not all_together["with_comb"]:
-            return f"no rotor in {counted(all_together['dwells'])}"
+            return f"no rotor in {counted(all_together['dwells'])}{body}"
         clear = self.clearest()
         v = self.values
         rates = v.rotor_rates_hz[clear]
         rates = rates[np.isfinite(rates)]
         turns = v.chopping_hz[clear] / v.rotation_hz[clear]
-        body = f"body {round(all_together['body_velocity_mps'], 2) + 0.0:+.2f} m/s"  # not -0.00
         bound = "at least " if v.length_is_lower_bound else ""
         if np.isfinite(turns):
             rpm = ", ".join(f"{60 * rate / turns:.0f}" for rate in rates)
@@ -253,7 +259,7 @@ class Measured:
             rotor = "blades x rate: " + " or ".join(options)
         where = f"comb in {all_together['with_comb']} of {counted(all_together['dwells'])}"
         folded = str(v.band_reason[clear])
-        return f"{where}; {rotor}; {body}{self.gear()}{self.wheel()}{self.unsteady()}{folded and '; ' + folded}"
+        return f"{where}; {rotor}{body}{self.gear()}{self.wheel()}{self.unsteady()}{folded and '; ' + folded}"
 
     def unsteady(self) -> str:
         """Words of caution where the combs of the dwells are not one rotor's: most differ by more than it changes."""

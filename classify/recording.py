@@ -144,8 +144,8 @@ def load_recording(
     else:
         samples, file_carrier_hz, file_prf_hz, first = read_sigmf(found)
     iq = _one_range_cell(samples, name)
-    carrier = _agreed(name, "carrier", carrier_hz, file_carrier_hz)
-    prf = _agreed(name, "PRF", prf_hz, file_prf_hz)
+    carrier = _agreed(name, "carrier", "--carrier-hz", carrier_hz, file_carrier_hz)
+    prf = _agreed(name, "PRF", "--prf-hz", prf_hz, file_prf_hz)
     if carrier is None and prf is None:
         of_array = found.suffix.lower() in ARRAY_SUFFIXES
         says = "of arrays the samples alone are read" if of_array else "the file says no carrier and no PRF"
@@ -204,10 +204,10 @@ def _one_range_cell(samples: NDArray[np.generic], name: str) -> NDArray[np.compl
     return complex_samples(samples.reshape(-1), name)
 
 
-def _agreed(name: str, what: str, given: float | None, in_file: float | None) -> float | None:
+def _agreed(name: str, what: str, option: str, given: float | None, in_file: float | None) -> float | None:
     """Take the file's number or the one given; two that differ are an error, because one of them is wrong."""
     if given is not None:
-        given = positive(given, f"{what} given")
+        given = positive(given, f"{what} given ({option})")
     if given is None or in_file is None:
         return in_file if given is None else given
     if abs(given - in_file) > _SAME * in_file:

@@ -13,6 +13,7 @@ _SOUND_MPS = 340.0
 
 #: A PRF below this may have been given in kHz [Hz].
 _LEAST_PRF_HZ = 100.0
+_MOST_JITTER = 0.25  # of the time between pulses, rms: from there on one in 400 comes after the next
 
 #: Names that random streams of the receiver go by.
 _RESERVED = ("noise", "jitter", "receiver")
@@ -102,6 +103,11 @@ class Setting(BaseModel):
         radar, said = self.sight, []
         if radar.prf_hz < _LEAST_PRF_HZ:
             said.append(f"radar.prf_hz is {radar.prf_hz:g}: in Hz, so that {radar.prf_hz:g} kHz is {radar.prf_hz:g}e3")
+        if self.receiver.jitter_s * radar.prf_hz > _MOST_JITTER:
+            said.append(
+                f"receiver.jitter_s is {self.receiver.jitter_s:g} s: pulses come {1 / radar.prf_hz:g} s apart, and "
+                "change places"
+            )
         for part in self.uavs:
             for number, rotor in enumerate(part.rotors):
                 where = f"{part.name}: rotors[{number}]"

@@ -239,7 +239,7 @@ def test_names_are_never_taken_for_markup_or_escape_codes(run, sigmf_pair):
         (("{rec}", "--dwell", "nan"), "--dwell [s] is nan"),
         (("{rec}", "--dwell", "long"), "--dwell is 'long': it must be a number"),
         (("{rec}", "--carrier-hz", "9e9"), "carrier 9000000000 Hz given, but the file says 10000000000 Hz"),
-        (("{rec}", "--carrier-hz", "0"), "carrier given is 0"),
+        (("{rec}", "--carrier-hz", "0"), "carrier given (--carrier-hz) is 0"),
         (("{rec}", "--prf-hz", "x"), "--prf-hz is 'x': it must be a number"),
         (("{rec}", "--variable", "x"), "variable 'x' given"),
         (("{rec}", "--no-such-option"), "No such option: --no-such-option"),

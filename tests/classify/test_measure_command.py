@@ -58,6 +58,15 @@ def test_noise_has_nulls_and_a_reason(folder, capsys):
     assert closing["recording"]["with_comb"] == 0
 
 
+def test_a_body_without_a_rotor_has_its_velocity(tmp_path, capsys):
+    rng = np.random.default_rng(4)
+    line = np.exp(-4j * np.pi * VELOCITY_MPS / 299_792_458.0 * CARRIER_HZ * np.arange(2 * PULSES) / PRF_HZ)
+    noise = (rng.standard_normal(2 * PULSES) + 1j * rng.standard_normal(2 * PULSES)) * np.sqrt(0.5)
+    np.save(tmp_path / "line.npy", (line + noise).astype(np.complex64))
+    assert main(["measure", str(tmp_path / "line.npy"), *RADAR]) == 0
+    assert f"no rotor in 2 dwells; body {VELOCITY_MPS:+.2f} m/s" in capsys.readouterr().out
+
+
 def test_what_is_shorter_than_a_dwell_is_said_to_be_left_out(folder, capsys):
     given = ["measure", str(folder / "drone.npy"), *RADAR, "--dwell", "0.08"]
     left_out_s = 2 * PULSES / PRF_HZ - 2 * 0.08

@@ -84,10 +84,10 @@ def test_samples_that_are_refused(npy, array, said):
         ({}, "of arrays the samples alone are read: give --carrier-hz and --prf-hz"),
         ({"prf_hz": PRF_HZ}, "no carrier .*: give --carrier-hz"),
         ({"carrier_hz": CARRIER_HZ}, "no PRF .*: give --prf-hz"),
-        (RADAR | {"prf_hz": 0.0}, "PRF given is 0: it must be a finite number above 0"),
-        (RADAR | {"prf_hz": -5.0}, "PRF given is -5"),
-        (RADAR | {"carrier_hz": float("nan")}, "carrier given is nan"),
-        (RADAR | {"carrier_hz": float("inf")}, "carrier given is inf"),
+        (RADAR | {"prf_hz": 0.0}, r"PRF given \(--prf-hz\) is 0: it must be a finite number above 0"),
+        (RADAR | {"prf_hz": -5.0}, r"PRF given \(--prf-hz\) is -5"),
+        (RADAR | {"carrier_hz": float("nan")}, r"carrier given \(--carrier-hz\) is nan"),
+        (RADAR | {"carrier_hz": float("inf")}, r"carrier given \(--carrier-hz\) is inf"),
     ],
 )
 def test_carrier_and_prf_must_be_known(npy, options, said):

@@ -156,6 +156,12 @@ def test_a_prf_in_khz_is_warned_of():
     assert said == ["radar.prf_hz is 25: in Hz, so that 25 kHz is 25e3"]
 
 
+def test_a_jitter_that_pulses_change_places_by_is_warned_of():
+    for jitter_s, warned in ((0.1e-4, False), (1.0, True)):
+        said = Scene.build({"radar": {**RADAR, "prf_hz": 1e4}, "receiver": {"jitter_s": jitter_s}}).warnings()
+        assert any("change places" in line for line in said) == warned
+
+
 def test_ninety_degrees_is_right_and_warned_of():
     flat = Scene.build(scene(uav=[uav(beta_deg=90.0, range_m=1e5)])).without("noise")
     assert any("90 degrees" in line for line in flat.warnings())
