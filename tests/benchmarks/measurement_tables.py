@@ -377,7 +377,8 @@ def recordings(_draws: int) -> None:
         text = f"{path.stem[:36]:36s} rotor in {held.sum():3d} of {count} dwells, {1e3 * spent / count:.0f} ms"
         if held.any():
             text += f", lines {np.median(found.chopping_hz[held]):.1f} Hz"
-            text += f", edge {np.nanmedian(found.tip_speed_mps[held]):.1f} m/s"
+            tips = found.tip_speed_mps[np.isfinite(found.tip_speed_mps)]
+            text += f", edge {np.median(tips):.1f} m/s" if len(tips) else ", no edge"
         print(text, flush=True)
 
 
