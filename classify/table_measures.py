@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from bladewing.features.bandwidth import threshold_band_hz
 from bladewing.features.chopping import cepstral_chopping
-from bladewing.features.notch import body_line, notch_mask
+from bladewing.features.notch import body_line, notch_mask, parabola_offset
 from bladewing.features.spectrum import centred_power, doppler_spectrum, noise_floor, unit_scale
 from bladewing.simulate.analytic import rotor_lines
 from bladewing.simulate.render import Rendering
@@ -62,11 +62,9 @@ def first_lines_hz(rendering: Rendering) -> float:
     peaks = 1 + np.flatnonzero((side[1:-1] > side[:-2]) & (side[1:-1] >= side[2:]) & (side[1:-1] > LINE_DB))
     if len(peaks) < 2:
         return float("nan")
-    places = []
-    for peak in peaks[:2]:  # the window's lobe is close to a Gaussian, whose logarithm is a parabola
-        left, middle, right = side[peak - 1 : peak + 2]
-        places.append(peak + (right - left) / (2 * (2 * middle - left - right)))
-    return float((places[1] - places[0]) * radar.prf_hz / bins)
+    # the window's lobe is close to a Gaussian, whose logarithm is a parabola
+    first, second = (peak + parabola_offset(*side[peak - 1 : peak + 2]) for peak in peaks[:2])
+    return float((second - first) * radar.prf_hz / bins)
 
 
 def theory(scene: Scene) -> tuple[float, float, float]:

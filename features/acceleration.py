@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .inputs import in_blocks
+from .notch import parabola_offset
 from .spectrum import (
     LEAST_PART,
     SPEED_OF_LIGHT_MPS,
@@ -171,9 +172,8 @@ def _beside(
     steady = _steadied(samples, np.asarray(acceleration_mps2), wavelength_m, prf_hz)
     spectrum = fft.fft(steady, n=size)
     top = int((spectrum.real**2 + spectrum.imag**2).argmax())
-    left, middle, right = np.log(np.abs(spectrum[np.array([top - 1, top, top + 1]) % size]))
-    turns = (top + (right - left) / (2 * (2 * middle - left - right))) / size
-    still = steady * np.exp(-2j * np.pi * turns * np.arange(pulses))
+    offset = parabola_offset(*np.log(np.abs(spectrum[np.array([top - 1, top, top + 1]) % size])))
+    still = steady * np.exp(-2j * np.pi * ((top + offset) / size) * np.arange(pulses))
     half = pulses // 2
     for _ in range(2):  # the parabola is off by a hundredth of a bin, at which strong lines leave much of themselves
         turn = np.angle(still[-half:].sum() * still[:half].sum().conj()) / (pulses - half)

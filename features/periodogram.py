@@ -139,7 +139,7 @@ class Periodogram:
     @property
     def block(self) -> int:
         """Bins of a neighbourhood."""
-        return int(BLOCK_BINS * len(self.power) / self.pulses)
+        return _block(len(self.power), self.pulses)
 
     @cached_property
     def seen(self) -> NDArray[np.bool_]:
@@ -178,7 +178,7 @@ class Periodogram:
         size = fft.next_fast_len(LEVEL_PADDING * self.pulses)
         power = squared(fft.fft(rest.astype(np.complex64), size)) * np.float32(1 / self.pulses)
         keep = _kept(size, self.blocked, THINNED_BINS / self.pulses)
-        level = _level_at_bins(power, keep, 1.0, int(BLOCK_BINS * size / self.pulses))
+        level = _level_at_bins(power, keep, 1.0, _block(size, self.pulses))
         return lambda frequency: np.maximum(level(np.rint(frequency * size) % size), LEAST_LEVEL)
 
     def left(self, samples: NDArray[np.complex128]) -> "Periodogram":
@@ -188,6 +188,11 @@ class Periodogram:
         power = squared(amplitude)
         power[~_kept(size, self.blocked)] = 1.0
         return replace(self, samples=samples, amplitude=amplitude, power=power)
+
+
+def _block(size: int, pulses: int) -> int:
+    """Bins of a neighbourhood in a transform of that size."""
+    return int(BLOCK_BINS * size / pulses)
 
 
 @lru_cache(maxsize=16)
@@ -392,7 +397,7 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
 
     size = fft.next_fast_len(PADDING * pulses)
     keep, full = _kept(size, blocked), _kept(size, blocked, THINNED_BINS / pulses)
-    block = int(BLOCK_BINS * size / pulses)
+    block = _block(size, pulses)
     for tapered in (False, True):
         amplitude = _spectrum(samples, size, tapered=tapered)
         power = squared(amplitude)

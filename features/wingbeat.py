@@ -166,7 +166,7 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     velocities = velocity - frames.frequency_hz * wavelength_m / 2
     near = np.abs(velocities - velocity) <= WING_MPS
     if near.sum() < LEAST_CELLS:  # the frames are too short for so long a wave
-        return (*nothing[:3], *body, "no wingbeat: wings are slower than this carrier tells apart")
+        return (np.nan, np.nan, np.nan, *body, "no wingbeat: wings are slower than this carrier tells apart")
     levels = level_spectrum(frames.power[:, near], floor, frames.frame_rate_hz, HIGHEST_HZ)
     if levels is None:
         return (np.nan, np.nan, np.nan, *body, "no wingbeat: nothing moves")

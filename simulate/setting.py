@@ -13,7 +13,9 @@ _SOUND_MPS = 340.0
 
 #: A PRF below this may have been given in kHz [Hz].
 _LEAST_PRF_HZ = 100.0
-_MOST_JITTER = 0.25  # of the time between pulses, rms: from there on one in 400 comes after the next
+
+#: From this rms jitter on, of the time between pulses, one in 400 comes after the next.
+_MOST_JITTER = 0.25
 
 #: Names that random streams of the receiver go by.
 _RESERVED = ("noise", "jitter", "receiver")

@@ -14,18 +14,31 @@ RADAR = ["--carrier-hz", "9.85e9", "--prf-hz", "35e3"]
 RATE_HZ, LENGTH_M, VELOCITY_MPS = 57.7, 0.15, -20.0
 
 
+WAVELENGTH_M = 299_792_458.0 / CARRIER_HZ
+
+
+def white(rng, pulses):
+    """Complex noise of unit power a sample."""
+    return (rng.standard_normal(pulses) + 1j * rng.standard_normal(pulses)) * np.sqrt(0.5)
+
+
+def spinning(rate_hz, pulses):
+    """Echo of a rotor's blades, of unit power a sample."""
+    angle_rad = RotorMotion(rate_hz).angle_rad(np.arange(pulses) / PRF_HZ)
+    blades = rotor_echo(angle_rad, wavelength_m=WAVELENGTH_M, blade_length_m=LENGTH_M).astype(complex)
+    return blades / np.sqrt(np.mean(np.abs(blades) ** 2))
+
+
+def moving(pulses):
+    """A line at `VELOCITY_MPS`, of unit power a sample."""
+    return np.exp(-4j * np.pi * VELOCITY_MPS * (np.arange(pulses) / PRF_HZ) / WAVELENGTH_M)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("measure")
-    rng = np.random.default_rng(1)
-    times_s = np.arange(2 * PULSES) / PRF_HZ
-    wavelength_m = 299_792_458.0 / CARRIER_HZ
-    blades = rotor_echo(
-        RotorMotion(RATE_HZ).angle_rad(times_s), wavelength_m=wavelength_m, blade_length_m=LENGTH_M
-    ).astype(complex)
-    blades /= np.sqrt(np.mean(np.abs(blades) ** 2))
-    noise = (rng.standard_normal(2 * PULSES) + 1j * rng.standard_normal(2 * PULSES)) * np.sqrt(0.5)
-    moved = (blades + 10) * np.exp(-4j * np.pi * VELOCITY_MPS * times_s / wavelength_m)
+    noise = white(np.random.default_rng(1), 2 * PULSES)
+    moved = (spinning(RATE_HZ, 2 * PULSES) + 10) * moving(2 * PULSES)
     np.save(path / "drone.npy", (moved + noise).astype(np.complex64))
     np.save(path / "noise.npy", noise.astype(np.complex64))
     return path
@@ -59,10 +72,8 @@ def test_noise_has_nulls_and_a_reason(folder, capsys):
 
 
 def test_a_body_without_a_rotor_has_its_velocity(tmp_path, capsys):
-    rng = np.random.default_rng(4)
-    line = np.exp(-4j * np.pi * VELOCITY_MPS / 299_792_458.0 * CARRIER_HZ * np.arange(2 * PULSES) / PRF_HZ)
-    noise = (rng.standard_normal(2 * PULSES) + 1j * rng.standard_normal(2 * PULSES)) * np.sqrt(0.5)
-    np.save(tmp_path / "line.npy", (line + noise).astype(np.complex64))
+    line = moving(2 * PULSES) + white(np.random.default_rng(4), 2 * PULSES)
+    np.save(tmp_path / "line.npy", line.astype(np.complex64))
     assert main(["measure", str(tmp_path / "line.npy"), *RADAR]) == 0
     assert f"no rotor in 2 dwells; body {VELOCITY_MPS:+.2f} m/s" in capsys.readouterr().out
 
@@ -227,14 +238,7 @@ def test_no_number_of_the_table_is_cut(folder, capsys, monkeypatch, columns):
 @pytest.mark.parametrize("other_hz", [RATE_HZ, 1.6 * RATE_HZ])
 def test_dwells_whose_combs_are_not_one_rotors_are_told(other_hz, tmp_path, capsys):
     rng = np.random.default_rng(3)
-    times_s = np.arange(2800) / PRF_HZ
-    parts = []
-    for rate_hz in (RATE_HZ, other_hz) * 2:
-        blades = rotor_echo(
-            RotorMotion(rate_hz).angle_rad(times_s), wavelength_m=299_792_458.0 / CARRIER_HZ, blade_length_m=LENGTH_M
-        )
-        noise = (rng.standard_normal(2800) + 1j * rng.standard_normal(2800)) * np.sqrt(0.5)
-        parts.append(blades / np.sqrt(np.mean(np.abs(blades) ** 2)) + 10 + noise)
+    parts = [spinning(rate_hz, 2800) + 10 + white(rng, 2800) for rate_hz in (RATE_HZ, other_hz) * 2]
     np.save(tmp_path / "two.npy", np.concatenate(parts).astype(np.complex64))
     assert main(["measure", str(tmp_path / "two.npy"), *RADAR, "--dwell", "0.08"]) == 0
     said = capsys.readouterr().out

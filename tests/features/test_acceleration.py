@@ -56,11 +56,9 @@ def test_the_acceleration_of_a_long_dwell_is_as_sure(height_db, truth):
 @pytest.mark.parametrize("snr_db", [0, 20, 40])
 def test_the_deviation_is_the_bound_at_any_snr(pulses, snr_db):
     rng = np.random.default_rng(pulses + snr_db)
-    time_s = np.arange(pulses) / PRF_HZ
-    wavelength_m = 299_792_458 / CARRIER_HZ
-    line = 10 ** (snr_db / 20) * np.exp(-4j * np.pi / wavelength_m * (3.3 * time_s + 4.0 * time_s**2 / 2))
+    line = accelerated(10 ** (snr_db / 20) * tone(-216.8, pulses), 4.0)
     found, std, _ = body_acceleration(line + np.array([white(rng, pulses) for _ in range(8)]), **RADAR)
-    bound = np.sqrt(90 / (10 ** (snr_db / 10) * pulses**5)) * PRF_HZ**2 * wavelength_m / (2 * np.pi)
+    bound = np.sqrt(90 / (10 ** (snr_db / 10) * pulses**5)) * PRF_HZ**2 * WAVELENGTH_M / (2 * np.pi)
     assert 0.9 < np.median(std / bound) < 1.4
     assert np.all((std > 0.9 * bound) & (std < 3 * bound))
     assert np.all(np.abs(found - 4.0) < 5 * bound)
