@@ -80,8 +80,10 @@ class Comb:
         return self.fit.spacing_std * self.per_turn
 
 
-def strong_multiple(orders: NDArray[np.intp], power: NDArray[np.float64]) -> int:
-    """Every how many-th line is strong: 1, 2, 3 or 4.
+def strong_multiple(
+    orders: NDArray[np.intp], power: NDArray[np.float64], most: int = 4, least_nats: float = UNEQUAL_NATS
+) -> int:
+    """Every how many-th line is strong: 1 to `most`.
 
     Parameters
     ----------
@@ -89,10 +91,14 @@ def strong_multiple(orders: NDArray[np.intp], power: NDArray[np.float64]) -> int
         Orders.
     power : ndarray, shape (lines,)
         Power of each line over the noise [1].
+    most : int
+        The largest multiple tried: a rotor has up to four blades.
+    least_nats : float
+        What must speak for two kinds of lines [nats].
     """
     best, factor = 1, UNEQUAL_FACTOR
     outer = np.abs(orders) > np.median(np.abs(orders))
-    for multiple in (2, 3, 4):
+    for multiple in range(2, most + 1):
         strong = orders % multiple == 0
         # the outermost lines are edges; four of each kind tell them apart
         if strong.sum() < 4 or (~strong).sum() < 4:
@@ -105,7 +111,7 @@ def strong_multiple(orders: NDArray[np.intp], power: NDArray[np.float64]) -> int
             ratio = ratio if parted > OUTER_FACTOR else 0.0
         # log likelihood ratio of two means of exponentials against one
         nats = len(power) * np.log(power.mean()) - strong.sum() * np.log(means[0]) - (~strong).sum() * np.log(means[1])
-        if ratio > factor and nats > UNEQUAL_NATS:
+        if ratio > factor and nats > least_nats:
             best, factor = multiple, ratio
     return best
 

@@ -31,6 +31,16 @@ def test_both_combs_and_the_gear_are_within_their_error_bars(tail_db):
     assert found.gear_reason == ""
 
 
+@pytest.mark.parametrize("gear", [2.87, 3.1, 3.87, 5.14])
+def test_a_tail_is_no_further_rotor_at_a_fraction_of_its_rate(gear):
+    """At a third or a fifth, which lies among the rates of one airframe's rotors, every so many-th line is there."""
+    for seed in range(3):
+        iq = helicopter(33.0, gear, snr_db=20.0, seed=seed, body=30.0)
+        found = measure(iq, **RADAR)
+        np.testing.assert_allclose(values(found), (66, 66 * gear, gear), rtol=1e-3)
+        assert found.chopping_hz == found.main_chopping_hz
+
+
 def test_normalised_errors_have_unit_variance():
     rng = np.random.default_rng(3)
     errors = []
