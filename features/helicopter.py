@@ -124,7 +124,6 @@ def _second_comb(data: Periodogram, comb: Comb) -> tuple[Gear | None, str]:
     """The second comb of a record, or why there is none."""
     if comb.fit.spacing * data.pulses < 2 * SHADOW_BINS + 1:
         return None, "dwell too short: a second comb could not be told from the first one's lines"
-    comb = _about_body(data, comb)
     rest, hidden = _left_over(data, comb)
     evidence = _evidence(rest, hidden)
     limits = spacing_limits(data.pulses, data.prf_hz)
@@ -152,17 +151,6 @@ def _second_comb(data: Periodogram, comb: Comb) -> tuple[Gear | None, str]:
     if off * outer / tail * data.pulses < MEETING_BINS:
         return None, f"no second comb: {gear.ratio:.3f} to 1 is a whole ratio, as of unequal blades"
     return gear, ""
-
-
-def _about_body(data: Periodogram, comb: Comb) -> Comb:
-    """The comb counted from the body's line: any of its lines serves itself as centre, but not the other rotor."""
-    fit = comb.fit
-    for centre in data.centres:
-        shift = round((centre - fit.centre) / fit.spacing)
-        if abs(fit.centre + shift * fit.spacing - centre) * data.pulses < 1.0:
-            fit = replace(fit, centre=fit.centre + shift * fit.spacing, orders=fit.orders - shift)
-            break
-    return replace(comb, fit=fit)
 
 
 def _left_over(data: Periodogram, comb: Comb) -> tuple[Periodogram, NDArray[np.bool_]]:

@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
+from bladewing.simulate import Scene
+from bladewing.simulate.catalogue import AIRFRAMES
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, rotors, white
 
@@ -39,6 +41,19 @@ def test_a_tail_is_no_further_rotor_at_a_fraction_of_its_rate(gear):
         found = measure(iq, **RADAR)
         np.testing.assert_allclose(values(found), (66, 66 * gear, gear), rtol=1e-3)
         assert found.chopping_hz == found.main_chopping_hz
+
+
+def test_the_body_is_in_the_middle_of_its_rotors_lines_though_one_of_them_is_stronger():
+    """Blades seen at a long wavelength: the outermost lines are the strongest."""
+    fields = AIRFRAMES["helicopter_41cm"].fields
+    radar = {"carrier_hz": 3.3e9, "prf_hz": 9000.0}
+    rotors = [rotor | {"beta_deg": 15.0} for rotor in fields["rotors"]]
+    for seed, velocity_mps in enumerate((-10.5, -3.0, 14.4)):
+        uav = fields | {"name": "uav", "velocity_mps": velocity_mps, "rotors": rotors}
+        scene = Scene.build({"radar": radar | {"pulses": 720}, "uav": [uav]})
+        found = measure(scene.render(seed).iq, **radar)
+        assert abs(found.body_velocity_mps - velocity_mps) < 4.5 * found.body_velocity_mps_std < 0.1
+        assert found.gear_ratio == pytest.approx(4.73, rel=1e-3)
 
 
 def test_normalised_errors_have_unit_variance():
