@@ -50,18 +50,19 @@ def body_velocity(
     Returns
     -------
     velocity_mps, std_mps : float
-        Positive when the range grows; NaN where no line stands out.
+        Positive when the range grows. Without a comb, that of the strongest line, if one moves of that; NaN where none
+        stands out.
     """
     own, level_db = data.centres[0], data.centres_db[0]
-    if fit is None and level_db < LINE_DB:
-        return np.nan, np.nan
+    if fit is None:
+        if level_db < LINE_DB:
+            return np.nan, np.nan
+        own, level_db, open_std = _likeliest(data, spectrum)
     noise_bins = NOISE_BINS * 10 ** (-level_db / 20)
     at_rest_bins = BACKGROUND_BINS if abs(own) < data.rest_half else 0.0
     own_std = float(np.linalg.norm([noise_bins, INTERPOLATION_BINS, at_rest_bins, _pulled_bins(spectrum, own)]))
     turns, std = own, own_std / data.pulses
-    if fit is None:
-        open_std = _rivals_std(spectrum, own)
-    else:
+    if fit is not None:
         offset = abs(folded(own - fit.centre))
         # rotors that were taken for one move its comb
         apart = offset if offset > APART_DEVIATIONS * np.hypot(std, fit.centre_std) else 0.0
@@ -71,6 +72,20 @@ def body_velocity(
             turns, std = fit.centre, float(np.hypot(fit.centre_std, apart))
     scale = data.prf_hz * data.wavelength_m / 2
     return -folded(turns) * scale, float(np.hypot(std, open_std)) * scale
+
+
+def _likeliest(data: Periodogram, spectrum: Spectrum) -> tuple[float, float, float]:
+    """The line that is the body's most likely where no comb tells, its level [dB], and its deviation by the others.
+
+    It is the strongest that leaves do not make in a wind, if there is any: what stands at rest is a background then, or
+    a rival where it is hardly stronger. Places in [cycles a sample].
+    """
+    lines = list(zip(data.centres, data.centres_db, strict=True))
+    moving = [line for line in lines if abs(line[0]) >= data.rest_half and line[1] >= LINE_DB]
+    own, level_db = (moving or lines)[0]
+    rest = data.rest_half if moving else 0.0
+    at_rest = [place for place, other_db in lines if abs(place) < rest and other_db < level_db + WEAKEST_DB]
+    return own, level_db, _rivals_std(spectrum, own, rest, at_rest)
 
 
 def folded(turns: float) -> float:
@@ -107,12 +122,15 @@ def _pulled_bins(spectrum: Spectrum, own: float) -> float:
     return share / (2 * curve)
 
 
-def _rivals_std(spectrum: Spectrum, own: float) -> float:
-    """Deviation of a line's place, where others may be the body's as well [cycles a sample]."""
+def _rivals_std(spectrum: Spectrum, own: float, rest: float, at_rest: list[float]) -> float:
+    """Deviation of a line's place, where others may be the body's: so far from rest and further, or at these places."""
     power, level_db = spectrum.relative_power, spectrum.level_db
     away = _bins_from(spectrum, own)
     tops = (power >= np.roll(power, 1)) & (power >= np.roll(power, -1)) & (np.abs(away) > LOBE_BINS)
     highest_db = float(level_db[np.abs(away) <= 1].max())
+    tops &= np.abs(spectrum.frequency_hz) >= rest * spectrum.prf_hz
+    for place in at_rest:
+        tops[np.where(np.abs(_bins_from(spectrum, place)) < LOBE_BINS, power, 0).argmax()] = True
     rivals = tops & (level_db > max(highest_db - WEAKEST_DB, LINE_DB))
     likely = np.exp((np.minimum(level_db[rivals], highest_db) - highest_db) / RIVAL_DB)
     return float(np.sqrt((likely * away[rivals] ** 2).sum() / (1 + likely.sum()))) / spectrum.bins

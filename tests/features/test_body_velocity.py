@@ -72,6 +72,20 @@ def test_without_a_comb_a_line_as_strong_may_be_the_body_as_well():
     assert np.median(alone.body_velocity_mps_std) < 0.05
 
 
+@pytest.mark.parametrize(("ground", "unsure"), [(30.0, False), (1.5, True)])
+def test_without_a_comb_the_body_moves_in_front_of_a_stronger_background(ground, unsure):
+    """What stands at rest is the background where it is far stronger, and may be the body where it hardly is."""
+    pulses, rng = 4 * PULSES, np.random.default_rng(6)
+    slow = np.cumsum(white(rng, pulses)) * np.hanning(pulses)
+    for velocity_mps in (-17.0, 8.0, 25.0):
+        turns = -2 * velocity_mps / WAVELENGTH_M * np.arange(pulses) / PRF_HZ
+        iq = np.exp(2j * np.pi * turns) + ground * (1 + 0.1 * slow / np.abs(slow).max()) + 0.3 * white(rng, pulses)
+        found = measure(iq, **RADAR)
+        assert np.isnan(found.chopping_hz)
+        assert found.body_velocity_mps == pytest.approx(velocity_mps, abs=0.01)
+        assert (found.body_velocity_mps_std > abs(velocity_mps) / 4) == unsure
+
+
 @pytest.mark.parametrize("velocity_mps", [-88.0, 70.0])
 def test_a_body_weaker_than_its_blades_stays_within_the_unambiguous_span(velocity_mps):
     """Its comb's centre may be fitted beyond: there it is the same line as on the other side."""
