@@ -30,7 +30,13 @@ NOISE_BESIDE = 4.0
 
 
 def body_velocity(
-    data: Periodogram, spectrum: Spectrum, fit: CombFit | None, *, steady: bool = True, open_std: float = 0.0
+    data: Periodogram,
+    spectrum: Spectrum,
+    fit: CombFit | None,
+    *,
+    steady: bool = True,
+    open_std: float = 0.0,
+    blades: bool = False,
 ) -> tuple[float, float]:
     """The body's velocity: from its own line, or from the comb's centre where background may hide that line.
 
@@ -46,6 +52,8 @@ def body_velocity(
         False for unresolved rotors, or a rate that is not steady: the comb's centre has no true deviation then.
     open_std : float
         What the choice of the comb's centre adds to the deviation [cycles a sample].
+    blades : bool
+        Where no comb is given: that one is there, and lines that move are blades'.
 
     Returns
     -------
@@ -57,7 +65,7 @@ def body_velocity(
     if fit is None:
         if level_db < LINE_DB:
             return np.nan, np.nan
-        own, level_db, open_std = _likeliest(data, spectrum)
+        own, level_db, open_std = _likeliest(data, spectrum, blades)
     noise_bins = NOISE_BINS * 10 ** (-level_db / 20)
     at_rest_bins = BACKGROUND_BINS if abs(own) < data.rest_half else 0.0
     own_std = float(np.linalg.norm([noise_bins, INTERPOLATION_BINS, at_rest_bins, _pulled_bins(spectrum, own)]))
@@ -74,14 +82,14 @@ def body_velocity(
     return -folded(turns) * scale, float(np.hypot(std, open_std)) * scale
 
 
-def _likeliest(data: Periodogram, spectrum: Spectrum) -> tuple[float, float, float]:
+def _likeliest(data: Periodogram, spectrum: Spectrum, blades: bool) -> tuple[float, float, float]:
     """The line that is the body's most likely where no comb tells, its level [dB], and its deviation by the others.
 
-    It is the strongest that leaves do not make in a wind, if there is any: what stands at rest is a background then, or
-    a rival where it is hardly stronger. Places in [cycles a sample].
+    It is the strongest that leaves do not make in a wind, if there is any and blades do not: what stands at rest is a
+    background then, or a rival where it is hardly stronger. Places in [cycles a sample].
     """
     lines = list(zip(data.centres, data.centres_db, strict=True))
-    moving = [line for line in lines if abs(line[0]) >= data.rest_half and line[1] >= LINE_DB]
+    moving = [line for line in lines if abs(line[0]) >= data.rest_half and line[1] >= LINE_DB and not blades]
     own, level_db = (moving or lines)[0]
     rest = data.rest_half if moving else 0.0
     at_rest = [place for place, other_db in lines if abs(place) < rest and other_db < level_db + WEAKEST_DB]

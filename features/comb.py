@@ -81,7 +81,7 @@ class Comb:
 
 
 def strong_multiple(
-    orders: NDArray[np.intp], power: NDArray[np.float64], most: int = 4, least_nats: float = UNEQUAL_NATS
+    orders: NDArray[np.intp], power: NDArray[np.float64], most: int = 4, factor: float = UNEQUAL_FACTOR
 ) -> int:
     """Every how many-th line is strong: 1 to `most`.
 
@@ -93,10 +93,10 @@ def strong_multiple(
         Power of each line over the noise [1].
     most : int
         The largest multiple tried: a rotor has up to four blades.
-    least_nats : float
-        What must speak for two kinds of lines [nats].
+    factor : float
+        By which the strong ones are stronger in power.
     """
-    best, factor = 1, UNEQUAL_FACTOR
+    best = 1
     outer = np.abs(orders) > np.median(np.abs(orders))
     for multiple in range(2, most + 1):
         strong = orders % multiple == 0
@@ -111,7 +111,7 @@ def strong_multiple(
             ratio = ratio if parted > OUTER_FACTOR else 0.0
         # log likelihood ratio of two means of exponentials against one
         nats = len(power) * np.log(power.mean()) - strong.sum() * np.log(means[0]) - (~strong).sum() * np.log(means[1])
-        if ratio > factor and nats > least_nats:
+        if ratio > factor and nats > UNEQUAL_NATS:
             best, factor = multiple, ratio
     return best
 

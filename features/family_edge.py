@@ -123,7 +123,14 @@ def edge_of_lines(
         return np.inf, np.inf
     leak = SEVERAL_LEAK if len(fits) > 1 else LEAK_SHARE
     edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades, leak=leak)
+    std = float(np.hypot(std, _unseen_about(order[seen], edge) / np.sqrt(12)))
     return edge * fastest, std * fastest
+
+
+def _unseen_about(seen: NDArray[np.intp], edge: float) -> int:
+    """How many orders that are not seen lie in one row about an edge: it may be anywhere among them."""
+    above = int(np.searchsorted(seen, edge))
+    return int(seen[above] - seen[above - 1]) - 1 if 0 < above < len(seen) else 0
 
 
 def _covered(spacings: NDArray[np.float64], order: NDArray[np.intp], pulses: int) -> NDArray[np.bool_]:
@@ -192,7 +199,8 @@ def _amplitudes_at(fit: CombFit, orders: NDArray[np.intp]) -> NDArray[np.complex
 def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple[float, float]:
     """Of unresolved rotors, the edge of the lines and its deviation, if it is the surer one; or that of all about them.
 
-    Rotors that were not told apart show in the second alone. It is known to its own deviation, whatever the first says.
+    Rotors that were not told apart show in the second alone. It is known to its own deviation, whatever the first says;
+    the first no better than both agree, since lines of rotors that were not found may pass for some past the edge.
 
     Parameters
     ----------
@@ -201,8 +209,9 @@ def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple
     """
     if not np.isfinite(lines[0] + around[0]):
         return np.inf, np.inf
-    agreed = abs(around[0] - lines[0]) < AGREED_DEVIATIONS * around[1]
-    return lines if agreed and lines[1] < around[1] else around
+    apart = abs(around[0] - lines[0])
+    std = float(np.hypot(lines[1], apart))
+    return (lines[0], std) if apart < AGREED_DEVIATIONS * around[1] and std < around[1] else around
 
 
 def _uneven_past(order: NDArray[np.intp], mean: NDArray[np.float64], bins: NDArray[np.float64], edge: float) -> bool:

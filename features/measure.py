@@ -288,7 +288,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     middle = rotors.fits[0] if count > 1 else comb.fit
     one_channel = bool(half_empty(spectrum.relative_power))
     if one_channel:  # about a body whose sides lie in one another nothing is even: its own line tells
-        velocity = body_velocity(whole, spectrum, None)
+        velocity = body_velocity(whole, spectrum, None, blades=True)
     else:
         velocity = body_velocity(data, spectrum, middle, steady=rotors.resolved, open_std=comb.body_std)
     out |= dict(zip(BODY, velocity, strict=True))

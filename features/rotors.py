@@ -40,9 +40,9 @@ LEAST_POWER_SHARE = 0.12
 JOINT_STEPS, LAST_STEPS = 2, 3
 
 #: A helicopter's tail rotor turns at most so many times as fast as its main rotor: at a fraction of its rate every so
-#: many-th line is there, and that fraction may lie among the rates of rotors like the first one. So much speaks for it
-#: [nats]: 67 and more of a tail 8 dB under a main rotor of 5 dB, 16 of six rotors' lines in one another.
-MOST_GEAR, GEAR_NATS = 9, 30.0
+#: many-th line is there, and that fraction may lie among the rates of rotors like the first one. By so much are these
+#: stronger: 20 times and more where a tail is 8 dB under a main rotor of 5 dB, up to 8 where rotors' lines cross.
+MOST_GEAR, GEAR_FACTOR = 9, 12.0
 
 #: A rotor flashes once a period on each side of the body. A second flash of this share of the first one's power is
 #: another rotor's, of a rate that the dwell does not tell apart; so far from the first it is no part of it [1 / lines].
@@ -181,7 +181,7 @@ def _strongest_apart(
 
 def _holds_another(fit: CombFit, pulses: int) -> bool:
     """True where only every so many-th line of a comb is there: a tail rotor's, whose rate is that multiple."""
-    return strong_multiple(fit.orders, 1 + pulses * np.abs(fit.amplitudes) ** 2, MOST_GEAR, GEAR_NATS) > 1
+    return strong_multiple(fit.orders, 1 + pulses * np.abs(fit.amplitudes) ** 2, MOST_GEAR, GEAR_FACTOR) > 1
 
 
 #: Of each bin: how far from a centre it is [cycles a sample], its power, whether it can be seen.
