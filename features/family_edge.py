@@ -28,6 +28,9 @@ AROUND_SCATTER, AROUND_LINES = 0.4, 0.035
 #: [lines].
 MIXED_LINES = 0.25
 
+#: With fewer orders seen below an edge the level is not known from which a family falls there.
+LEVEL_ORDERS = 4
+
 #: Lines of unlike orders nearer than this [bins] cover one another.
 COVERED_BINS = 1.5
 
@@ -128,8 +131,10 @@ def edge_of_lines(
 
 
 def _unseen_about(seen: NDArray[np.intp], edge: float) -> int:
-    """How many orders that are not seen lie in one row about an edge: it may be anywhere among them."""
+    """How many orders that are not seen lie in one row about an edge, or below it: it may be anywhere among them."""
     above = int(np.searchsorted(seen, edge))
+    if above < LEVEL_ORDERS:
+        return int(seen[0]) - 1
     return int(seen[above] - seen[above - 1]) - 1 if 0 < above < len(seen) else 0
 
 
