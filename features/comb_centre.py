@@ -10,6 +10,10 @@ from .periodogram import LINE_DB, Periodogram
 STRONG_LINE, STRONG_OVER_DB = 10.0, 6.0
 STRONG_LINE_DB = 1.0
 
+#: Counted from its outermost line, a family that takes up most of the unambiguous span reaches around all of it but for
+#: so many orders.
+AROUND_ORDERS = 4
+
 #: What speaks for the order about which all that shows within so much of the strongest line is even, where that stands
 #: so high over the noise that both ends show [nats, dB, dB].
 EVEN, ENDS_DB, CLEAR_DB = 20.0, 20.0, 30.0
@@ -85,6 +89,8 @@ def _bonuses(data: Periodogram, found: Candidate) -> dict[float, float]:
     """Places where the body's line may be [cycles a sample], and what speaks for each besides the comb [nats]."""
     middle = found.centre + found.spacing * round((found.high + found.low) / 2)
     out = [(found.centre, 0.0), (middle, 0.0)]
+    if (found.high - found.low + AROUND_ORDERS) * found.spacing > 1:  # all around the circle: it has no middle
+        out += [(found.centre + found.spacing * order, 0.0) for order in range(found.low, found.high + 1)]
     places = found.centre + found.spacing * np.arange(found.low, found.high + 1)
     power = data.at(places) * data.level_at(places) * data.usable(places)
     highest_db = 10 * float(np.log10(power.max(initial=1.0)))

@@ -56,6 +56,21 @@ def test_the_body_is_in_the_middle_of_its_rotors_lines_though_one_of_them_is_str
         assert found.gear_ratio == pytest.approx(4.73, rel=1e-3)
 
 
+def test_the_body_is_not_the_outermost_line_of_a_family_that_takes_up_most_of_the_span():
+    """Counted from there the lines reach all around the circle of velocities, and no place was its middle."""
+    fields = AIRFRAMES["helicopter_41cm"].fields
+    radar = {"carrier_hz": 3.3e9, "prf_hz": 6310.0}
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        rotors = [r | {"beta_deg": 8.0, "phase_deg": rng.uniform(0, 360)} for r in fields["rotors"]]
+        uav = fields | {"name": "uav", "velocity_mps": 8.4, "rotors": rotors}
+        body = [part | {"level_db": part["level_db"] - 20} for part in fields["body"]]
+        scene = Scene.build({"radar": radar | {"pulses": 504}, "uav": [uav | {"body": body}]})
+        found = measure(scene.render(seed).iq, **radar)
+        assert abs(found.body_velocity_mps - 8.4) < max(0.1, 4.5 * found.body_velocity_mps_std)
+        assert abs(found.body_velocity_mps - 8.4) < 20
+
+
 def test_normalised_errors_have_unit_variance():
     rng = np.random.default_rng(3)
     errors = []
