@@ -215,7 +215,7 @@ def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple
     if not np.isfinite(lines[0] + around[0]):
         return np.inf, np.inf
     apart = abs(around[0] - lines[0])
-    std = float(np.hypot(lines[1], apart))
+    std = float(np.hypot(lines[1], max(apart, around[1] / 2)))  # that both agree may be chance
     return (lines[0], std) if apart < AGREED_DEVIATIONS * around[1] and std < around[1] else around
 
 
@@ -321,4 +321,6 @@ def edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | Non
     fastest = float(max(nominal, rotors.rates.max()))
     # where the orders mix at the edge, the tips of the fastest and of the slowest are all that is told apart
     mixed = edge * relative / 2
-    return edge * fastest, float(np.hypot(std, mixed if mixed > MIXED_LINES else AROUND_LINES)) * fastest
+    # and the fastest of rotors that were not found turns by so much faster than any that was
+    hidden = edge * max(spread - float(np.ptp(rotors.rates)), 0.0) / nominal / 2
+    return edge * fastest, float(np.hypot(std, mixed if mixed > MIXED_LINES else max(hidden, AROUND_LINES))) * fastest
