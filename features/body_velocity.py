@@ -89,7 +89,7 @@ def _likeliest(data: Periodogram, spectrum: Spectrum, blades: bool) -> tuple[flo
     background then, or a rival where it is hardly stronger. Places in [cycles a sample].
     """
     lines = list(zip(data.centres, data.centres_db, strict=True))
-    moving = [line for line in lines if abs(line[0]) >= data.rest_half and line[1] >= LINE_DB and not blades]
+    moving = [] if blades else [line for line in lines if abs(line[0]) >= data.rest_half and line[1] >= LINE_DB]
     own, level_db = (moving or lines)[0]
     rest = data.rest_half if moving else 0.0
     at_rest = [place for place, other_db in lines if abs(place) < rest and other_db < level_db + WEAKEST_DB]

@@ -89,9 +89,9 @@ def _bonuses(data: Periodogram, found: Candidate) -> dict[float, float]:
     """Places where the body's line may be [cycles a sample], and what speaks for each besides the comb [nats]."""
     middle = found.centre + found.spacing * round((found.high + found.low) / 2)
     out = [(found.centre, 0.0), (middle, 0.0)]
-    if (found.high - found.low + AROUND_ORDERS) * found.spacing > 1:  # all around the circle: it has no middle
-        out += [(found.centre + found.spacing * order, 0.0) for order in range(found.low, found.high + 1)]
     places = found.centre + found.spacing * np.arange(found.low, found.high + 1)
+    if (found.high - found.low + AROUND_ORDERS) * found.spacing > 1:  # all around the circle: it has no middle
+        out += [(float(place), 0.0) for place in places]
     power = data.at(places) * data.level_at(places) * data.usable(places)
     highest_db = 10 * float(np.log10(power.max(initial=1.0)))
     if highest_db > CLEAR_DB:

@@ -135,7 +135,7 @@ def _unseen_about(seen: NDArray[np.intp], edge: float) -> int:
     above = int(np.searchsorted(seen, edge))
     if above < LEVEL_ORDERS:
         return int(seen[0]) - 1
-    return int(seen[above] - seen[above - 1]) - 1 if 0 < above < len(seen) else 0
+    return int(seen[above] - seen[above - 1]) - 1 if above < len(seen) else 0
 
 
 def _covered(spacings: NDArray[np.float64], order: NDArray[np.intp], pulses: int) -> NDArray[np.bool_]:

@@ -18,11 +18,11 @@ from .comb_sums import MOST_SNRS, running_sums
 from .evidence import line_evidence
 from .lines import sum_of_lines
 from .periodogram import LEAST_LEVEL, Periodogram, local_level
-from .rotors import Rotors, judged, separate_rotors
+from .rotors import MOST_GEAR, Rotors, judged, separate_rotors
 from .slow_lines import remove_bands
 
 #: Ratio of tail to main chopping frequency: 4.73 in the paper, 4 to 6 in general, and some room.
-GEAR_RANGE = (2.5, 9.0)
+GEAR_RANGE = (2.5, float(MOST_GEAR))
 
 #: Score a second comb must exceed [nats]. Checked by tests/benchmarks/measurement_tables.py.
 THRESHOLD = 16.0

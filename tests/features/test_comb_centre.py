@@ -13,22 +13,33 @@ VELOCITY_MPS = 5.0
 SEEDS = 12
 
 
-def hexacopter(seed: int) -> Scene:
-    """Six rotors whose blades' lines hide the body's, each turned as chance has it."""
+def turned(airframe: str, seed: int, radar: dict, velocity_mps: float, **given: float) -> Scene:
+    """A UAV of the catalogue with its rotors turned as chance has it, and with what is given of them."""
     rng = np.random.default_rng(seed)
-    fields = AIRFRAMES["hexacopter_30cm"].fields
-    turned = [
-        rotor | {"phase_deg": rng.uniform(0, 360), "hub_phase_deg": rng.uniform(0, 360)} for rotor in fields["rotors"]
+    fields = AIRFRAMES[airframe].fields
+    rotors = [
+        rotor | {"phase_deg": rng.uniform(0, 360), "hub_phase_deg": rng.uniform(0, 360)} | given
+        for rotor in fields["rotors"]
     ]
-    uav = fields | {"name": "drone", "velocity_mps": VELOCITY_MPS, "rotors": turned}
-    return Scene.build({"radar": RADAR | {"pulses": 1486}, "uav": [uav]})
+    uav = fields | {"name": "drone", "velocity_mps": velocity_mps, "rotors": rotors}
+    return Scene.build({"radar": radar, "uav": [uav]})
+
+
+def fastest_tip_mps(airframe: str) -> float:
+    """Speed of the fastest rotor's tips [m/s]."""
+    rotors = AIRFRAMES[airframe].fields["rotors"]
+    return max(2 * np.pi * abs(rotor["rotation_hz"]) * rotor["blade_length_m"] for rotor in rotors)
+
+
+def hexacopter(seed: int) -> Scene:
+    """Six rotors whose blades' lines hide the body's."""
+    return turned("hexacopter_30cm", seed, RADAR | {"pulses": 1486}, VELOCITY_MPS)
 
 
 @pytest.fixture(scope="module")
 def found():
     """Velocity and its deviation [m/s], tip speed and its over the true one, of each seed, as drawn and mirrored."""
-    rotors = hexacopter(0).uav[0].rotors
-    tip_mps = max(2 * np.pi * abs(rotor.rotation_hz) * rotor.blade_length_m for rotor in rotors)
+    tip_mps = fastest_tip_mps("hexacopter_30cm")
     iq = np.stack([hexacopter(seed).render(seed).iq for seed in range(SEEDS)])
     measured = measure(np.stack([iq, iq.conj()]), **RADAR, blades=2, beta_rad=0.0)
     velocity = np.stack([measured.body_velocity_mps, measured.body_velocity_mps_std])
@@ -62,19 +73,11 @@ def test_a_mirrored_record_has_the_mirrored_body(found):
 
 def test_the_tip_of_rotors_whose_high_orders_cross_is_not_too_high():
     # at 77 GHz the fastest rotor's order 180 lies where the slowest one's 185 would: all tips came out 2.3 % too high
-    fields = AIRFRAMES["type5"].fields
-    tip_mps = max(2 * np.pi * abs(rotor["rotation_hz"]) * rotor["blade_length_m"] for rotor in fields["rotors"])
+    radar = {"carrier_hz": 77e9, "prf_hz": 115e3}
     for seed in range(3):
-        rng = np.random.default_rng(seed)
-        turned = [
-            rotor | {"phase_deg": rng.uniform(0, 360), "hub_phase_deg": rng.uniform(0, 360), "beta_deg": 40.0}
-            for rotor in fields["rotors"]
-        ]
-        radar = {"carrier_hz": 77e9, "prf_hz": 115e3}
-        uav = fields | {"name": "drone", "velocity_mps": 5.0, "rotors": turned}
-        iq = Scene.build({"radar": radar | {"pulses": 6000}, "uav": [uav]}).render(seed).iq
+        iq = turned("type5", seed, radar | {"pulses": 6000}, 5.0, beta_deg=40.0).render(seed).iq
         found = measure(iq, **radar, blades=2, beta_rad=np.radians(40))
-        assert found.tip_speed_mps == pytest.approx(tip_mps, rel=0.005)
+        assert found.tip_speed_mps == pytest.approx(fastest_tip_mps("type5"), rel=0.005)
 
 
 @pytest.mark.parametrize(
@@ -83,17 +86,10 @@ def test_the_tip_of_rotors_whose_high_orders_cross_is_not_too_high():
 )
 def test_the_tip_is_as_sure_as_the_orders_about_it_are_seen(airframe, carrier_hz, prf_hz, within):
     """Where rotors' lines cover one another at the edge it was 6 to 17 % off; where one was not found 2 to 4 %."""
-    fields = AIRFRAMES[airframe].fields
-    tip_mps = max(2 * np.pi * abs(rotor["rotation_hz"]) * rotor["blade_length_m"] for rotor in fields["rotors"])
-    radar = {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
+    tip_mps, radar = fastest_tip_mps(airframe), {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
+    pulses = min(int(0.08 * prf_hz), 6000)
     for seed in range(4):
-        rng = np.random.default_rng(seed)
-        turned = [
-            rotor | {"phase_deg": rng.uniform(0, 360), "hub_phase_deg": rng.uniform(0, 360), "beta_deg": 7.0}
-            for rotor in fields["rotors"]
-        ]
-        uav = fields | {"name": "drone", "velocity_mps": 12.0, "rotors": turned}
-        iq = Scene.build({"radar": radar | {"pulses": min(int(0.08 * prf_hz), 6000)}, "uav": [uav]}).render(seed).iq
+        iq = turned(airframe, seed, radar | {"pulses": pulses}, 12.0, beta_deg=7.0).render(seed).iq
         found = measure(iq, **radar, blades=2, beta_rad=np.radians(7))
         off = abs(found.tip_speed_mps - tip_mps)
         assert off < within * tip_mps
