@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from .comb_centre import AT_REST_BINS
 from .comb_fit import CombFit
 from .notch import LOBE_BINS
 from .periodogram import LINE_DB, Periodogram
@@ -21,6 +22,9 @@ APART_DEVIATIONS = 3.0
 #: Without a comb that tells which line is the body's, one that is so much weaker than the strongest is as likely
 #: beside it as 1 to e, and none that is weaker by more than the second [dB].
 RIVAL_DB, WEAKEST_DB = 2.0, 8.0
+
+#: Nor one that noise alone might be: the highest bin of 10 000 spectra stood at 13 dB.
+NOISE_TOP_DB = 13.5
 
 #: Lines from and up to so far off pull at the body's [bins]: nearer ones are one with it, the lobe ends further out.
 BESIDE_BINS = (1.5, 8.0)
@@ -75,7 +79,9 @@ def body_velocity(
         # rotors that were taken for one move its comb
         apart = offset if offset > APART_DEVIATIONS * np.hypot(std, fit.centre_std) else 0.0
         if offset * data.pulses > 1.0:
-            turns, std = fit.centre, fit.centre_std
+            # no background lies beside rest: a line there is as likely a slow body's
+            slow = AT_REST_BINS < abs(own) * data.pulses <= data.rest_half * data.pulses
+            turns, std = fit.centre, float(np.hypot(fit.centre_std, offset * slow))
         elif steady and fit.centre_std < std:
             turns, std = fit.centre, float(np.hypot(fit.centre_std, apart))
     scale = data.prf_hz * data.wavelength_m / 2
@@ -139,6 +145,6 @@ def _rivals_std(spectrum: Spectrum, own: float, rest: float, at_rest: list[float
     tops &= np.abs(spectrum.frequency_hz) >= rest * spectrum.prf_hz
     for place in at_rest:
         tops[np.where(np.abs(_bins_from(spectrum, place)) < LOBE_BINS, power, 0).argmax()] = True
-    rivals = tops & (level_db > max(highest_db - WEAKEST_DB, LINE_DB))
+    rivals = tops & (level_db > max(highest_db - WEAKEST_DB, NOISE_TOP_DB))
     likely = np.exp((np.minimum(level_db[rivals], highest_db) - highest_db) / RIVAL_DB)
     return float(np.sqrt((likely * away[rivals] ** 2).sum() / (1 + likely.sum()))) / spectrum.bins

@@ -31,6 +31,9 @@ MAINS_SHARE = 0.0055
 #: supplies click.
 MAINS_SCORE = 70.0
 
+#: A rotor has up to so many blades, if its number is not known.
+MOST_BLADES = 4
+
 #: Every k-th line stronger than the others by this factor in power: unequal blades, k to a turn.
 UNEQUAL_FACTOR = 4.0
 
@@ -81,7 +84,7 @@ class Comb:
 
 
 def strong_multiple(
-    orders: NDArray[np.intp], power: NDArray[np.float64], most: int = 4, factor: float = UNEQUAL_FACTOR
+    orders: NDArray[np.intp], power: NDArray[np.float64], most: int = MOST_BLADES, factor: float = UNEQUAL_FACTOR
 ) -> int:
     """Every how many-th line is strong: 1 to `most`.
 
@@ -92,7 +95,7 @@ def strong_multiple(
     power : ndarray, shape (lines,)
         Power of each line over the noise [1].
     most : int
-        The largest multiple tried: a rotor has up to four blades.
+        The largest multiple tried.
     factor : float
         By which the strong ones are stronger in power.
     """
@@ -169,13 +172,15 @@ def _too_short(data: Periodogram) -> str:
     return f"dwell too short: no chopping frequency can be told in less than {1e3 * least_s:.1f} ms at this PRF"
 
 
-def find_comb(data: Periodogram) -> tuple[Comb | None, str]:
+def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None, str]:
     """Find the comb of a record.
 
     Parameters
     ----------
     data : Periodogram
         From `prepare`.
+    blades : int, optional
+        Of a rotor.
 
     Returns
     -------
@@ -207,7 +212,7 @@ def find_comb(data: Periodogram) -> tuple[Comb | None, str]:
     seen = fit.amplitudes + LineSpace(fitted[1]).at(fit.frequencies)[0]
     power = np.abs(seen) ** 2 * data.pulses / data.level_of(fitted[1])(fit.frequencies)
     within = (fit.orders >= start.low) & (fit.orders <= start.high)
-    per_turn = strong_multiple(fit.orders[within], power[within])
+    per_turn = strong_multiple(fit.orders[within], power[within], max(MOST_BLADES, blades or 0))
     for number in sorted({1, per_turn}):
         if of_mains(fit, data, start.score, number):
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"

@@ -18,6 +18,10 @@ AROUND_ORDERS = 4
 #: so high over the noise that both ends show [nats, dB, dB].
 EVEN, ENDS_DB, CLEAR_DB = 20.0, 20.0, 30.0
 
+#: Levels to both sides are never more alike than by this variance [nats^2]; what an order says that is less even than
+#: another is so many times that of Gaussian levels, which are those of several rotors' lines.
+LEAST_UNEVEN, UNEVEN_WEIGHT = 0.05, 3.0
+
 #: A family goes on over so many orders that do not show. So far about the middle of its ends [orders] the one about
 #: which it is even is sought.
 ENDS_GAP, MIDDLE_REACH = 2, 3
@@ -26,6 +30,9 @@ ENDS_GAP, MIDDLE_REACH = 2, 3
 #: strong as a body's [nats]: a background is strong whatever hovers in it, and a line of the comb comes as near to it
 #: by chance, but many do hover. Where no line stands out that moves, the body hides in what was taken out there.
 REST, HOVERS = 8.0, 11.0
+
+#: A line is at rest so near to it [bins].
+AT_REST_BINS = 1.0
 
 #: Other orders that have at most so much less [nats] leave the choice open; asked are those within so many of the best.
 OPEN_NATS, NEAR_ORDERS = 3.0, 3
@@ -55,13 +62,14 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
     best, most = found, -np.inf
     totals: dict[int, float] = {}
     steps = found.spacing * (1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * data.pulses))
-    for centre, bonus in _bonuses(data, found).items():
+    bonuses, even = _bonuses(data, found)
+    for centre, bonus in bonuses.items():
         shift = round((centre - found.centre) / found.spacing)
         # one comb for several rotors may pass a little beside the body's line: either place will do
         beside = found.centre + found.spacing * shift
         scores, _ = even_scores(evidence, np.repeat(steps, 2), np.tile([centre, beside], len(steps)))
         index = int(scores.argmax())
-        total = float(scores[index]) + bonus
+        total = float(scores[index]) + bonus + even.get(shift, 0.0)
         totals[shift] = max(totals.get(shift, -np.inf), total)
         if total > most:
             most = total
@@ -85,8 +93,8 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
     return best, float(np.sqrt((likely * away**2).sum() / likely.sum()))
 
 
-def _bonuses(data: Periodogram, found: Candidate) -> dict[float, float]:
-    """Places where the body's line may be [cycles a sample], and what speaks for each besides the comb [nats]."""
+def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], dict[int, float]]:
+    """What speaks for the body's line besides the comb [nats]: by place [cycles a sample], and by order of the comb."""
     middle = found.centre + found.spacing * round((found.high + found.low) / 2)
     out = [(found.centre, 0.0), (middle, 0.0)]
     places = found.centre + found.spacing * np.arange(found.low, found.high + 1)
@@ -94,11 +102,15 @@ def _bonuses(data: Periodogram, found: Candidate) -> dict[float, float]:
         out += [(float(place), 0.0) for place in places]
     power = data.at(places) * data.level_at(places) * data.usable(places)
     highest_db = 10 * float(np.log10(power.max(initial=1.0)))
+    even: dict[int, float] = {}
     if highest_db > CLEAR_DB:
-        order = _even_order(data, found, 10 ** ((highest_db - ENDS_DB) / 10))
-        out.append((found.centre + found.spacing * order, EVEN))
+        unlikely = _even_orders(data, found, 10 ** ((highest_db - ENDS_DB) / 10))
+        even = {order: EVEN - nats for order, nats in unlikely if nats < EVEN}
+        out += [(found.centre + found.spacing * order, 0.0) for order in even]
     others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
-    moving, hides = 0.0, all(abs(centre) <= data.rest_half for centre in data.centres)
+    moving = 0.0
+    # a line beside rest is a slow body's own, and hides no other
+    hides = abs(data.centres[0]) * data.pulses < AT_REST_BINS and max(map(abs, data.centres)) <= data.rest_half
     for centre, level_db in sorted(zip(data.centres, data.centres_db, strict=True), key=lambda line: -abs(line[0])):
         over_db = max(level_db - others_db, 0.0)
         nats = STRONG_LINE * min(over_db / STRONG_OVER_DB, 1.0)
@@ -117,13 +129,17 @@ def _bonuses(data: Periodogram, found: Candidate) -> dict[float, float]:
         off = (orders - round(orders)) * found.spacing * data.pulses / (1 + 0.2 * abs(orders))
         if abs(off) < 1.5 and level_db > LINE_DB:
             out.append((centre, nats - 16 * off**2))
-    return dict(out)
+    most: dict[float, float] = {}
+    for place, nats in out:  # a place may come in twice, as a line's and as one that hides
+        most[place] = max(most.get(place, -np.inf), nats)
+    return most, even
 
 
-def _even_order(data: Periodogram, found: Candidate, least: float) -> int:
-    """Order about which what shows of this power is even.
+def _even_orders(data: Periodogram, found: Candidate, least: float) -> list[tuple[int, float]]:
+    """Orders about which what shows of this power is about even, and what the evenest has before each [nats].
 
-    All that lies about each order counts, the lines of several rotors too that it has parted from.
+    All that lies about each order counts, the lines of several rotors too that it has parted from. The levels of two
+    places as far to both sides differ by what the blades' echoes make of it and by chance, of one variance for all.
     """
     size, furthest = len(data.power), int(0.49 / found.spacing)
     order = np.arange(-furthest, furthest + 1)
@@ -136,7 +152,7 @@ def _even_order(data: Periodogram, found: Candidate, least: float) -> int:
     groups = np.split(shows, np.flatnonzero(np.diff(shows) > 1 + ENDS_GAP) + 1)
     own = [group for group in groups if np.any((order[group] >= found.low) & (order[group] <= found.high))]
     if not own:
-        return 0
+        return [(0, 0.0)]
     first, last = int(own[0][0]), int(own[-1][-1])
     half = (last - first) // 2 + ENDS_GAP
     nats = np.pad(np.log(np.maximum(highest, least)), half, constant_values=np.log(least))
@@ -145,5 +161,7 @@ def _even_order(data: Periodogram, found: Candidate, least: float) -> int:
     tried = np.clip(tried, 0, len(order) - 1)
     after, before = (half + tried[:, None] + sign * np.arange(1, half + 1) for sign in (1, -1))
     both = seen[after] & seen[before]
-    uneven = (both * (nats[after] - nats[before]) ** 2).sum(axis=1) / np.maximum(both.sum(axis=1), 1)
-    return int(order[tried[int(uneven.argmin())]])
+    count = np.maximum(both.sum(axis=1), 1)
+    uneven = (both * (nats[after] - nats[before]) ** 2).sum(axis=1) / count + LEAST_UNEVEN
+    unlikely = UNEVEN_WEIGHT * count / 2 * np.log(uneven / uneven.min())
+    return [(int(order[place]), float(much)) for place, much in zip(tried, unlikely, strict=True)]

@@ -259,7 +259,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     out["notch_residual_db"] = float(notch_residual_db(spectrum, mask))
     low, high = threshold_band_hz(spectrum, PAPER_THRESHOLD_DB)
     out["threshold_bandwidth_hz"] = float(high - low)
-    comb, why = find_comb(data)
+    comb, why = find_comb(data, blades)
     prf_hz, wavelength_m = data.prf_hz, data.wavelength_m
     blank, whole = dict(out), data
 

@@ -10,7 +10,7 @@ FILLED_NATS = 0.2
 
 #: A comb at a multiple of the best one's spacing, so near to it, relative, is taken from this share of its score where
 #: that is so much [nats], and chance little of it.
-MULTIPLE_OFF, MULTIPLE_SHARE, MULTIPLE_FROM = 0.025, 0.9, 100.0
+MULTIPLE_OFF, MULTIPLE_SHARE, MULTIPLE_FROM = 0.025, 0.85, 50.0
 
 
 def over_neighbours(evidence: NDArray[np.float32], block: int) -> NDArray[np.float32]:

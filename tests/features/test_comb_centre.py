@@ -52,7 +52,7 @@ def test_the_body_is_where_the_rotors_lines_are_even_on_both_sides(found):
     # lines are 1.06 m/s apart: before they were weighed by what is even about them, 5 of 12 were off by 1 to 6
     assert (error_mps < 0.2).sum(axis=1).min() >= SEEDS - 1
     # where two orders are about as likely, the deviation says so
-    assert (std_mps > 1.0).any()
+    assert (std_mps > 0.5).any()
     assert np.median(std_mps) < 0.2
 
 

@@ -58,6 +58,15 @@ def test_a_body_line_50_db_up_does_not_hide_the_comb():
     assert found.chopping_hz == pytest.approx(2 * rate_hz, rel=1e-3)
 
 
+@pytest.mark.parametrize("blades", [5, 6])
+def test_as_many_unlike_blades_as_are_told_repeat_once_a_turn(blades):
+    amplitudes = 1 + 0.28 * np.random.default_rng(0).uniform(-1, 1, blades)
+    iq = drone([120.0], amplitudes=amplitudes, length_m=0.12, snr_db=20, velocity_mps=20.0)
+    found = measure(iq, **RADAR, blades=blades)
+    assert found.rotation_hz == pytest.approx(120.0, rel=1e-3)  # a fifth of it, as long as four blades were the most
+    assert found.chopping_hz == pytest.approx(blades * 120.0, rel=1e-3)
+
+
 def test_bandwidth_tip_and_blade_follow_eq_26():
     rate_hz, length_m = 58.61, 0.15
     found = measure(drone([rate_hz], length_m=length_m, velocity_mps=3.0), **RADAR, blades=2, beta_rad=0.0)

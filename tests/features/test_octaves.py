@@ -12,16 +12,22 @@ from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, white
 RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 
 
+def together(rng, rates_hz, points=None):
+    """Echo of rotors of these rates at phases of chance, unit power a sample."""
+    times_s = np.arange(PULSES) / PRF_HZ
+    echo = np.zeros(PULSES, complex)
+    for rate_hz in rates_hz:
+        angle_rad = RotorMotion(rate_hz, rng.uniform(0, 2 * np.pi)).angle_rad(times_s)
+        one = rotor_echo(angle_rad, wavelength_m=WAVELENGTH_M, blade_length_m=0.15, points=points)
+        echo += one * np.exp(2j * np.pi * rng.uniform())
+    return echo / np.sqrt(np.mean(np.abs(echo) ** 2))
+
+
 def four_rotors(seed):
     """Rates within 3 %, 20 dB over the noise, at phases and a velocity of chance; with the mean rate [Hz]."""
     rng = np.random.default_rng(seed)
     rates_hz, times_s = 57.5 * (1 + rng.uniform(-0.015, 0.015, 4)), np.arange(PULSES) / PRF_HZ
-    echo = np.zeros(PULSES, complex)
-    for rate_hz in rates_hz:
-        angle_rad = RotorMotion(rate_hz, rng.uniform(0, 2 * np.pi)).angle_rad(times_s)
-        one = rotor_echo(angle_rad, wavelength_m=WAVELENGTH_M, blade_length_m=0.15)
-        echo += one * np.exp(2j * np.pi * rng.uniform())
-    iq = echo * 10 / np.sqrt(np.mean(np.abs(echo) ** 2)) + 100
+    iq = together(rng, rates_hz) * 10 + 100
     iq *= np.exp(-4j * np.pi * rng.uniform(-30, 30) * times_s / WAVELENGTH_M)
     return (iq + white(rng, PULSES)).astype(np.complex64), rates_hz.mean()
 
@@ -38,6 +44,16 @@ def test_four_rotors_have_no_comb_at_a_fraction_or_a_multiple(seed):
     assert comb.chopping * PRF_HZ == pytest.approx(2 * rate_hz, rel=0.02)
 
 
+def test_tips_of_rotors_that_turn_evenly_apart_have_no_comb_at_a_third():
+    # at 0 dB, a third of the spacing had 55 nats where the whole had 53
+    rng = np.random.default_rng(60)
+    rates_hz = (np.array([3400.0, 3424.0, 3448.0, 3472.0]) + rng.uniform(0, 20, 4)) / 60
+    iq = together(rng, rates_hz, points=1) + 10 + white(rng, PULSES)
+    comb, reason = find_comb(prepare(iq.astype(np.complex64), **RADAR))
+    assert comb is not None, reason
+    assert comb.chopping * PRF_HZ == pytest.approx(2 * rates_hz.mean(), rel=0.02)
+
+
 def test_what_any_place_has_is_no_evidence_and_single_lines_keep_theirs():
     evidence = np.full((1, 4000), -1.0, np.float32)
     evidence[0, ::40] = 5.0  # lines ten bins apart
@@ -51,6 +67,7 @@ def test_the_coarser_of_two_combs_that_speak_alike():
     # a fraction whose lines are there has far more; near the noise the likelihood decides
     assert coarsest([3.3, 10.0], [200.0, 70.0]) == 0
     assert coarsest([3.3, 10.0], [30.0, 28.5]) == 0
+    assert coarsest([3.3, 10.0], [55.3, 53.4]) == 1
 
 
 def test_lines_that_cancel_at_the_low_orders_only_make_no_unequal_blades():
