@@ -417,10 +417,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if error.errno not in _DISK_ERRORS:
             return _unexpected(error)
         name = f"{error.filename}: " if error.filename else ""
+        if not name and _output_is_full():
+            _complain(
+                f"standard output: {error.strerror}: what was to be printed is lost; files are written whole or not"
+            )
+            return 2
         _complain(f"{name}{error.strerror}: make room or give another place; what stood there is unchanged")
         return 2
     except Exception as error:
         return _unexpected(error)
+
+
+def _output_is_full() -> bool:
+    """Whether nothing more can be printed."""
+    try:
+        print(flush=True)
+    except OSError:
+        return True
+    return False
 
 
 def _usage(error: Exception) -> int:

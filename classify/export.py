@@ -66,11 +66,13 @@ def export_raw_iq(
     Raises
     ------
     BadInput
-        The name ends in something else, the radar or the dwell lies outside the model's envelope, the model reads an
-        image, or the file cannot be written.
+        The name ends in something else or is that of another file, the radar or the dwell lies outside the model's
+        envelope, the model reads an image, or the file cannot be written.
     """
     if Path(out).suffix.lower() != ".onnx":
         raise BadInput(f"{os.fspath(out)}: a graph's name ends in .onnx: give it such a name")
+    if Path(out).is_file() and EXPORTED.encode() not in Path(out).read_bytes():
+        raise BadInput(f"{os.fspath(out)} is there and is no exported graph: it is not written over: give another file")
     name = chosen_name(model, single=True)
     if name == CASCADE:
         raise BadInput(

@@ -52,8 +52,14 @@ VALUES = (
     "gear_ratio_std",
 )
 
+#: Of these, and of the alternatives, those that count something.
+WHOLE = ("comb_order", "rotor_count", "blades")
+
 #: What a recording's JSON object holds of the wingbeat and of the body's course.
 WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std", "acceleration_mps2", "acceleration_mps2_std")
+
+#: What it holds of the body, of which no dwell knows more than the least.
+BODY, LEAST_STD_MPS = ("body_velocity_mps", "body_velocity_mps_std"), 1e-6
 
 #: Where the middle half of so many combs and more reaches over this ratio, they are not the same in all dwells.
 LEAST_COMBS, UNSTEADY = 4, 1.25
@@ -137,7 +143,7 @@ class Measured:
                 "file": self.recording.name,
                 "start_s": round(float(self.start_s[n]), 9),
                 "stop_s": round(float(self.stop_s[n]), 9),
-                **{name: _number(getattr(self.values, name)[n]) for name in VALUES},
+                **{name: _number(getattr(self.values, name)[n], whole=name in WHOLE) for name in VALUES},
                 "acceleration_mps2": _number(self.acceleration_mps2[n]),
                 "acceleration_mps2_std": _number(self.acceleration_mps2_std[n]),
                 "rotor_rates_hz": self.values.rotor_rates_hz[n][seen].tolist(),
@@ -145,7 +151,7 @@ class Measured:
                 "rotors_resolved": bool(self.values.rotors_resolved[n]),
                 "length_is_lower_bound": self.values.length_is_lower_bound,
                 "alternatives": [
-                    {name: _number(value) for name, value in choice.items()}
+                    {name: _number(value, whole=name in WHOLE) for name, value in choice.items()}
                     for choice in self.values.alternatives((n,))
                 ],
                 "reason": str(self.values.reason[n]) or None,
@@ -157,19 +163,37 @@ class Measured:
     def together(self) -> dict[str, Any]:
         """Medians over the dwells that hold a comb, or both of a helicopter's, and how many those are.
 
-        Without any comb, the body's velocity is that of all dwells.
+        Without any comb, the body's velocity is that of all dwells; see `body`.
         """
         held = np.isfinite(self.values.chopping_hz)
-        names = ("body_velocity_mps", "chopping_hz", "bandwidth_hz", "tip_speed_mps", "rotation_hz", "blade_length_m")
-        medians = {name: _median(getattr(self.values, name)[held]) for name in names}
-        if not held.any():
-            medians["body_velocity_mps"] = _median(self.values.body_velocity_mps)
+        names = ("chopping_hz", "bandwidth_hz", "tip_speed_mps", "rotation_hz", "blade_length_m")
+        medians: dict[str, Any] = {name: _median(getattr(self.values, name)[held]) for name in names}
+        medians |= self.body(held if held.any() else ~held)
         geared = np.isfinite(self.values.gear_ratio)
         pair = ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
         gear = {name: _median(getattr(self.values, name)[geared]) for name in pair}
         counts = {"dwells": len(self.iq), "with_comb": int(held.sum()), "with_second_comb": int(geared.sum())}
         beside = {"left_out_s": self.recording.left_out_s(self.iq), "remarks": list(self.remarks)}
         return {**counts, **beside, **medians, **gear, **self.over_all()}
+
+    def body(self, dwells: np.ndarray) -> dict[str, float | None]:
+        """The body's velocity over some of the dwells and its deviation; nothing where none of them tells it.
+
+        The median of their values, each weighed by its own variance: where several lines may be the body's a dwell says
+        little. Where they differ by more than their deviations the mean's grows by as much (Birge 1932).
+        """
+        value, std = self.values.body_velocity_mps[dwells], self.values.body_velocity_mps_std[dwells]
+        known = np.isfinite(value) & np.isfinite(std)
+        if not known.any():
+            return dict.fromkeys(BODY)
+        order = np.argsort(value[known])
+        value, weight = value[known][order], 1 / np.maximum(std[known][order], LEAST_STD_MPS) ** 2
+        # between the two on either side of the half, as a median of equal weights
+        upto = np.cumsum(weight) / weight.sum()
+        pair = np.searchsorted(upto, [0.5 - 1e-9, 0.5 + 1e-9])
+        middle = float(value[np.minimum(pair, len(value) - 1)].mean())
+        unlike = float((weight * (value - middle) ** 2).sum()) / max(len(value) - 1, 1)
+        return dict(zip(BODY, (middle, float(np.sqrt(max(unlike, 1.0) / weight.sum()))), strict=True))
 
     def over_all(self) -> dict[str, Any]:
         """Wingbeat and acceleration over the whole recording; nothing where that is too short.
@@ -235,8 +259,8 @@ class Measured:
     def sentence(self) -> str:
         """The recording in one line: the answer an engineer wants."""
         all_together = self.together()
-        velocity_mps = all_together["body_velocity_mps"]
-        body = "" if velocity_mps is None else f"; body {round(velocity_mps, 2) + 0.0:+.2f} m/s"  # not -0.00
+        velocity_mps, std_mps = (all_together[name] for name in BODY)
+        body = "" if velocity_mps is None else f"; body {signed(velocity_mps, std_mps)} m/s"
         if not all_together["with_comb"]:
             return f"no rotor in {counted(all_together['dwells'])}{body}"
         clear = self.clearest()
@@ -249,7 +273,8 @@ class Measured:
             rpm = ", ".join(f"{60 * rate / turns:.0f}" for rate in rates)
             error_cm = 100 * v.blade_length_m_std[clear]
             blade = f", blade {bound}{with_error(100 * v.blade_length_m[clear], error_cm)} cm"
-            rotor = f"{turns:.0f}-blade rotors at {rpm} rpm{'' if np.isnan(error_cm) else blade}"
+            more = "" if v.rotors_resolved[clear] else " and perhaps more"
+            rotor = f"{turns:.0f}-blade rotors at {rpm} rpm{more}{'' if np.isnan(error_cm) else blade}"
         else:
             options = (
                 f"{c['blades']} x {c['rpm']:.0f} rpm"
@@ -352,6 +377,21 @@ def with_error(value: float, std: float) -> str:
     return f"{value:.{digits}f} +- {std:.{digits}f}"
 
 
+def signed(velocity_mps: float, std_mps: float) -> str:
+    """A velocity with its sign and its standard deviation, to the hundredth where it is known to 1 m/s.
+
+    Examples
+    --------
+    >>> signed(-0.0001, 0.0002)
+    '+0.00 +- 0.01'
+    >>> signed(-98.5, 84.7)
+    '-98 +- 85'
+    """
+    if std_mps >= 1:
+        return with_error(velocity_mps, std_mps)
+    return f"{round(velocity_mps, 2) + 0.0:+.2f} +- {max(std_mps, 0.01):.2f}"  # not -0.00
+
+
 def counted(dwells: int) -> str:
     """A number of dwells in words."""
     return f"{dwells} dwell{'s' * (dwells != 1)}"
@@ -436,8 +476,8 @@ def measured(
             yield error
 
 
-def _number(value: Any) -> float | None:
-    return float(value) if math.isfinite(value) else None
+def _number(value: Any, *, whole: bool = False) -> float | None:
+    return (int if whole else float)(value) if math.isfinite(value) else None
 
 
 def _median(values: np.ndarray) -> float | None:

@@ -80,6 +80,7 @@ def run_training(
     if stored is not None and stored.plan != Plan.of(settings):
         raise BadInput(f"{data}: holds sets of {stored.plan.records}, a training takes {settings.sets}: write it again")
     result_folder(out)
+    _alone(out, settings)
     versions = _versions()
     simulator = simulator_digest() if stored is None else stored.simulator_sha256
     parts = Parts(
@@ -142,6 +143,16 @@ def run_training(
     if progress:
         print_table(account, out)
     return account
+
+
+def _alone(out: Path, settings: TrainingConfig) -> None:
+    """Refuse a folder that holds models which this run would not replace: one account would stand beside two runs'."""
+    others = [name for name in LADDER if name not in settings.models and (out / f"{name}.onnx").exists()]
+    if others:
+        raise BadInput(
+            f"{out} holds {others[0]}.onnx of another training, which this one does not make: name another folder, or "
+            "move that file away"
+        )
 
 
 def _gather(settings: TrainingConfig, stored: DataSet | None, bars: Progress, parts: Parts | None = None) -> Sets:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, PercentFormatter
 
 from .series import looks
@@ -18,12 +19,15 @@ _BLUE = SERIES[2]
 
 def _log_times(axes: Axes, label: str) -> None:
     axes.set_xscale("log")
-    # Every decade alone would leave a short axis without any number.
-    low, high = axes.get_xlim()
-    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 100 * low else (1,)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    _numbered(axes.xaxis, axes.get_xlim())
     axes.set_xlabel(label)
+
+
+def _numbered(axis: Axis, ends: tuple[float, float]) -> None:
+    """Numbers on a logarithmic axis: every decade alone would leave a short one without any."""
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5) if ends[1] < 100 * ends[0] else (1,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def front(report: Mapping[str, Any]) -> list[Panel]:
@@ -155,8 +159,7 @@ def time_law(report: Mapping[str, Any]) -> list[Panel]:
             axes.set_yscale("log")
             axes.set_xlabel("operations, 5 N log₂ N a transform")
             axes.set_ylabel("time [µs]")
-            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
-            axes.yaxis.set_minor_formatter(NullFormatter())
+            _numbered(axes.yaxis, axes.get_ylim())
             axes.xaxis.set_minor_formatter(NullFormatter())
             said = f"{micros(law['call_us'])} and {number(law['ns_each'])} ns an operation"
             alt = f"{title}: {said}; the farthest point lies {number(law['worst_factor'])} times off this law."

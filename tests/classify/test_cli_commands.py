@@ -125,3 +125,14 @@ def test_a_closed_output_is_read_by_nobody_and_nothing_goes_to_the_other(tmp_pat
     assert done.returncode == 2
     assert done.stdout == ""
     assert "AttributeError" not in done.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_an_output_that_is_full_is_told_from_the_files_that_are_written(tmp_path):
+    python = "import sys; from bladewing.classify.cli import main; sys.exit(main())"
+    command = [sys.executable, "-c", python, "simulate", "quadcopter", "--out", "cell"]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert "standard output: No space left on device: what was to be printed is lost" in done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cell.sigmf-data", "cell.sigmf-meta"]

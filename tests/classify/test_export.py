@@ -12,6 +12,7 @@ import pytest
 from bladewing.classify import BadInput, Classifier
 from bladewing.classify.cli import main
 from bladewing.classify.export import EXPORTED, TOLERANCE, export_raw_iq
+from bladewing.classify.model_file import read_model
 from bladewing.features.graph.inputs import IN_GRAPH, IQ, input_graph
 from bladewing.features.graph.operators import Graph
 from bladewing.features.inputs import model_inputs
@@ -228,6 +229,20 @@ def test_what_is_no_graph_is_not_written_over(tmp_path):
     with pytest.raises(BadInput, match=r"cell.npy: a graph's name ends in .onnx: give it such a name"):
         export_raw_iq(recording, carrier_hz=10e9, prf_hz=20e3, pulses=200, model="spectrum-cnn-fast")
     assert recording.read_bytes() == b"samples"
+
+
+def test_a_trained_model_is_not_written_over_and_an_older_graph_is(small, tmp_path):
+    radar = {"carrier_hz": 10e9, "prf_hz": 25e3, "pulses": 200, "model": "spectrum-cnn-fast"}
+    content, _ = read_model("spectrum-cnn-fast")
+    model = tmp_path / "model.onnx"
+    model.write_bytes(content)
+    with pytest.raises(BadInput, match=r"model\.onnx is there and is no exported graph: it is not written over"):
+        export_raw_iq(model, **radar)
+    assert model.read_bytes() == content
+    graph = tmp_path / "graph.onnx"
+    graph.write_bytes(small[0].read_bytes())
+    export_raw_iq(graph, **radar)
+    assert graph.read_bytes() != small[0].read_bytes()
 
 
 def test_an_exported_graph_is_told_from_a_model(small):

@@ -1,12 +1,13 @@
 import json
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from bladewing.classify.cli import main
-from bladewing.classify.measure import Measured, with_error
+from bladewing.classify.measure import Measured, Settings, measured, with_error
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 
 CARRIER_HZ, PRF_HZ, PULSES = 9.85e9, 35e3, 3000
@@ -58,6 +59,10 @@ def test_json_gives_a_line_a_dwell_and_one_a_recording(folder, capsys):
         assert len(dwell["rotor_rates_hz_std"]) == len(dwell["rotor_rates_hz"]) == 1
         assert 0 < dwell["rotor_rates_hz_std"][0] < 0.1
         assert dwell["reason"] is None
+        for whole in (dwell["rotor_count"], dwell["comb_order"], dwell["alternatives"][0]["blades"]):
+            assert isinstance(whole, int)
+    assert abs(closing["recording"]["body_velocity_mps"] - VELOCITY_MPS) < 0.1
+    assert 0 < closing["recording"]["body_velocity_mps_std"] < 0.1
 
 
 def test_noise_has_nulls_and_a_reason(folder, capsys):
@@ -75,7 +80,20 @@ def test_a_body_without_a_rotor_has_its_velocity(tmp_path, capsys):
     line = moving(2 * PULSES) + white(np.random.default_rng(4), 2 * PULSES)
     np.save(tmp_path / "line.npy", line.astype(np.complex64))
     assert main(["measure", str(tmp_path / "line.npy"), *RADAR]) == 0
-    assert f"no rotor in 2 dwells; body {VELOCITY_MPS:+.2f} m/s" in capsys.readouterr().out
+    assert re.search(r"no rotor in 2 dwells; body -(19\.99|20\.0[01]) \+- 0\.01 m/s", capsys.readouterr().out)
+
+
+def test_a_dwell_that_hardly_tells_the_body_does_not_speak_for_the_recording(folder):
+    (spoken,) = measured([folder / "drone.npy"], Settings(0.0857, 2, None), carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
+    for values, stds, expected in (
+        ([3.0, -90.0, -95.0], [0.1, 110.0, 110.0], (3.0, 0.1)),  # a plain median would be -90
+        ([1.0, 3.0], [0.5, 0.5], (2.0, 1.0)),  # each is two deviations off: Birge's ratio is the root of 8
+        ([2.0, np.nan, 2.0], [0.2, np.nan, 0.2], (2.0, 0.2 / np.sqrt(2))),
+        ([np.nan, np.nan], [np.nan, np.nan], (None, None)),
+    ):
+        told = replace(spoken.values, body_velocity_mps=np.array(values), body_velocity_mps_std=np.array(stds))
+        found = replace(spoken, values=told).body(np.ones(len(values), bool))
+        assert found == pytest.approx(dict(zip(("body_velocity_mps", "body_velocity_mps_std"), expected, strict=True)))
 
 
 def test_what_is_shorter_than_a_dwell_is_said_to_be_left_out(folder, capsys):
@@ -107,6 +125,7 @@ def test_the_table_says_rate_and_blade(folder, capsys, monkeypatch):
     said = capsys.readouterr().out
     assert "chopping Hz" in said
     assert f"2-blade rotors at {60 * RATE_HZ:.0f} rpm, blade at least" in said
+    assert f"body {VELOCITY_MPS:+.2f} +- 0.01 m/s" in said
     assert max(map(len, said.splitlines()[1:-1])) <= 80
 
 

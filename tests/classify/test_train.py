@@ -374,6 +374,15 @@ def test_a_missing_settings_file_is_named(tmp_path):
         training_config(tmp_path / "nowhere.toml")
 
 
+def test_a_folder_that_holds_models_of_another_training_is_refused(tmp_path):
+    (tmp_path / "image-cnn.onnx").write_bytes(b"of another run")
+    config = tmp_path / "one.toml"
+    config.write_text('records = 600\nmodels = ["features-linear"]\n')
+    with pytest.raises(BadInput, match=r"holds image-cnn\.onnx of another training, which this one does not make"):
+        run_training(tmp_path, config=config, progress=False)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["image-cnn.onnx", "one.toml"]
+
+
 def test_a_file_in_the_place_of_the_folder_is_named(tmp_path):
     (tmp_path / "out").write_text("")
     with pytest.raises(BadInput, match="cannot be made a folder"):
