@@ -354,7 +354,7 @@ class Measured:
         try:
             write_whole(path, drawing)
         except OSError as error:
-            raise BadInput(f"--plot {path}: {error.strerror or error}: name a file in an existing folder") from error
+            raise BadInput(f"--plot {path}: {error.strerror or error}: name a file that can be written") from error
 
 
 def with_error(value: float, std: float) -> str:

@@ -68,7 +68,9 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
     try:
         write_together(stem.parent, files)
     except OSError as error:
-        raise BadInput(f"{stem}: cannot be written: {error.strerror or error}: give a folder that exists") from None
+        raise BadInput(
+            f"{stem}: cannot be written: {error.strerror or error}: give a folder that can be written to"
+        ) from None
     return [stem.parent / file for file in files]
 
 

@@ -207,7 +207,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
         least_s = MIN_SPACING_BINS / finer / data.prf_hz
         return None, (
             f"dwell too short: lines {fit.spacing * data.prf_hz:.0f} Hz apart with others between them, "
-            f"a dwell of {1e3 * least_s:.0f} ms tells them apart"
+            f"to tell them apart takes {1e3 * least_s:.0f} ms at least"
         )
     seen = fit.amplitudes + LineSpace(fitted[1]).at(fit.frequencies)[0]
     power = np.abs(seen) ** 2 * data.pulses / data.level_of(fitted[1])(fit.frequencies)

@@ -8,20 +8,23 @@ from numpy.typing import NDArray
 from scipy.special import diric
 
 from .airframe import body_echo
+from .grid import PulseGrid, Sine
 from .laws import Draws
-from .motion import TWO_PI, range_phasor, straight_path
+from .motion import TWO_PI, range_phasor, reduce_phase, straight_path
 from .radar import Radar
 from .target import Target, mean_power
 
-#: Limbs of a walker: (amplitude, swing of its speed over the torso's, phase of the gait in turns). Feet reach 3x.
+#: Limbs of a walker: (amplitude, swing of its speed over the torso's, share of that at twice the gait, phase of the
+#: gait in turns). A foot stands for nearly half of the time and then swings at 3x: of a raised cosine over three fifths
+#: of the gait, the second harmonic has 0.45 of the first.
 LIMBS = (
-    (1.0, 0.15, 0.0),
-    (0.25, 0.8, 0.0),
-    (0.25, 0.8, 0.5),
-    (0.2, 1.3, 0.5),
-    (0.2, 1.3, 0.0),
-    (0.15, 2.0, 0.5),
-    (0.15, 2.0, 0.0),
+    (1.0, 0.15, 0.0, 0.0),
+    (0.25, 0.8, 0.1, 0.0),
+    (0.25, 0.8, 0.1, 0.5),
+    (0.2, 1.3, 0.3, 0.5),
+    (0.2, 1.3, 0.3, 0.0),
+    (0.15, 2.0, 0.45, 0.5),
+    (0.15, 2.0, 0.45, 0.0),
 )
 
 
@@ -32,21 +35,23 @@ MAX_BODY_POINTS, MAX_COMPANY_POINTS, MAX_WHEEL_POINTS = 48, 12, 240
 VEHICLE_WIDTH_M = 1.8
 
 #: Most scatterers of a wind turbine's blade.
-MAX_BLADE_POINTS = 30
+MAX_BLADE_POINTS = 100
 
 
 def draw_person(draws: Draws, radar: Radar) -> Target:
-    """Draw a walker: a torso that sways and limbs whose speed swings about the torso's at the gait."""
+    """Draw a walker: a torso that sways and limbs whose speed swings about the torso's at the gait, feet in strides."""
     speed, gait, phase = draws.value("person_mps"), draws.value("gait_hz"), draws.value("phase_rad")
+    sharper = 1.3 * draws.uniform()
+    grid = PulseGrid(radar)
     micro = np.zeros((len(draws), radar.pulses), np.complex64)
     body = np.zeros_like(micro)
-    for number, (amplitude, swing, turns) in enumerate(LIMBS):
+    for number, (amplitude, swing, sharp, turns) in enumerate(LIMBS):
         stretch = swing * (0.6 + 0.6 * draws.uniform())
         omega = TWO_PI * gait * (2 if number == 0 else 1)  # the torso bobs twice a stride
         offset = phase + TWO_PI * turns
         swing_rad = -2 * TWO_PI / radar.wavelength_m * speed * stretch / omega
         level = amplitude * np.exp(0.3 * draws.normal())
-        body_echo(
+        limb = body_echo(
             radar,
             len(draws),
             velocity_mps=speed,
@@ -55,10 +60,13 @@ def draw_person(draws: Draws, radar: Radar) -> Target:
             vibration_hz=omega / TWO_PI,
             vibration_phase_rad=offset,
             amplitude=level,
-            out=body if number == 0 else micro,
         )
+        if sharp:
+            stride = np.stack([swing_rad * sharper * sharp / 2, 2 * omega / TWO_PI, 2 * offset], axis=1)[..., None]
+            limb *= np.exp(1j * grid.sines(Sine(*np.moveaxis(stride, 1, 0))))
+        (micro if number else body)[...] += limb
     truth = {"velocity_mps": speed, "gait_hz": gait}
-    return Target(micro, body, 3 + 12 * draws.uniform(), truth=truth)
+    return Target(micro, body, 15 * draws.uniform(), truth=truth)
 
 
 def draw_vehicle(draws: Draws, radar: Radar) -> Target:
@@ -73,9 +81,9 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
     turns = draws.value("engine_hz")[:, None] * radar.times_s
     shaken_m = draws.value("engine_m")[:, None] * np.sin(TWO_PI * turns + draws.value("phase_rad")[:, None])
     body *= range_phasor(shaken_m, radar.wavelength_m)
-    other, _ = _vehicle_body(draws, radar, MAX_COMPANY_POINTS)
-    level = 10 ** (draws.value("company_db") / 20) * draws.chance(0.3)  # another one in the beam
-    body += level.astype(np.float32)[:, None] * other
+    accompanied = draws.chance(0.3)  # by another one in the beam
+    other, _ = _vehicle_body(draws, radar, MAX_COMPANY_POINTS, accompanied)
+    body += (10 ** (draws.value("company_db") / 20)).astype(np.float32)[:, None] * other
     speed, pull, ahead, aside, sight, gone = passage
     along = ahead[:, None] + gone
     wheels, radius = _wheels(draws, radar, gone, along / np.hypot(along, aside[:, None]))
@@ -91,9 +99,11 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
 
 
 def _vehicle_body(
-    draws: Draws, radar: Radar, most: int
+    draws: Draws, radar: Radar, most: int, there: NDArray[np.bool_] | bool = True
 ) -> tuple[NDArray[np.complex64], tuple[NDArray[np.float64], ...]]:
     """Echo of a vehicle but for its wheels, of unit power and at most so many scatterers, and how it passes.
+
+    Where it is not `there` it has none.
 
     Returns
     -------
@@ -111,7 +121,7 @@ def _vehicle_body(
     gone = straight_path(radar.times_s - radar.times_s[radar.pulses // 2], speed, pull)
     length, beam = draws.value("vehicle_length_m"), draws.value("beam_rad")
     axis = sight + beam * (2 * draws.uniform() - 1)
-    points = np.minimum(np.floor(draws.value("body_points")), most)
+    points = np.minimum(np.floor(draws.value("body_points")), most) * there
     x = ahead[:, None] + length[:, None] * (draws.uniform(most) - 0.5)
     y = aside[:, None] + VEHICLE_WIDTH_M * draws.uniform(most)
     near = (np.hypot(aside, ahead)[:, None] / np.hypot(x, y)) ** 2  # near parts are strong
@@ -142,31 +152,41 @@ def _wheels(
     """Echo of a vehicle's wheels about the vehicle itself, and their radius [m].
 
     A point on the rim rolls as far as the vehicle has `gone_m`: its radial speed runs from 0 at the ground to twice the
-    vehicle's at the top; `cosine` is that of the angle between the road and the line of sight, a pulse. Half of the
-    wheels have even spokes, whose lines are those of a rotor; the others' points lie and echo as they will, and the
-    many of a tyre close by fill all speeds up to twice the vehicle's as noise does.
+    vehicle's at the top; `cosine` is that of the angle between the road and the line of sight, a pulse. Even spokes
+    have the lines of a rotor; a tyre's points lie and echo as they will, and the many of one close by fill all speeds
+    up to twice the vehicle's as noise does. A third of the vehicles show spokes, a third tyres, a third both.
     """
     radius = draws.value("wheel_radius_m")
-    rolled = gone_m / radius[:, None]
     wheels, spokes, blocks = (np.floor(draws.value(law)).astype(int) for law in ("wheels", "spokes", "tyre_points"))
     own_phase = draws.value("phase_rad", 4)
-    even, equal, rim_only = draws.chance(0.5), draws.chance(0.5), draws.chance(0.5)
-    spokes = np.where(even, spokes, blocks)
-    points = wheels * spokes
+    shows, equal, rim_only = draws.uniform(), draws.chance(0.5), draws.chance(0.5)
+    spokes = np.where(shows < 2 / 3, spokes, 0)
+    blocks = np.where(shows > 1 / 3, np.minimum(blocks, MAX_WHEEL_POINTS // 4 - spokes), 0)
+    points = wheels * (spokes + blocks)
     depth, angle, echo = (draws.uniform(MAX_WHEEL_POINTS) for _ in range(3))
     level = np.exp(0.4 * draws.normal(MAX_WHEEL_POINTS))
     out = np.zeros((len(draws), radar.pulses), np.complex64)
+    # a radius is 2000 rad of phase at most: float32 holds it; one sine a vehicle serves all its points
+    rolled = reduce_phase(gone_m / radius[:, None])
+    sines, cosines = np.sin(rolled), np.cos(rolled)
+    arm_rad = (-2 * TWO_PI / radar.wavelength_m * radius[:, None] * cosine).astype(np.float32)
     for point in range(int(points.max(initial=0))):
         rows = np.flatnonzero(points > point)
         wheel = point % wheels[rows]
-        alike = even[rows]
-        at = TWO_PI * np.where(alike, (point // wheels[rows]) / spokes[rows], angle[rows, point])
+        alike = point // wheels[rows] < spokes[rows]
+        at = TWO_PI * np.where(alike, (point // wheels[rows]) / np.maximum(spokes[rows], 1), angle[rows, point])
         at += own_phase[rows, wheel]
         own = np.where(alike, wheel, point)  # even spokes share what is drawn for their wheel
-        deep = np.where(rim_only[rows], 0.03, 0.5) * depth[rows, own]
+        deep = 1 - np.where(rim_only[rows], 0.03, 0.5) * depth[rows, own]
         gain = np.where(alike & equal[rows], 1.0, level[rows, point]) * np.exp(1j * TWO_PI * echo[rows, own])
-        ahead = (radius[rows] * (1 - deep))[:, None] * cosine[rows] * np.sin(rolled[rows] + at[:, None])
-        out[rows] += gain.astype(np.complex64)[:, None] * range_phasor(ahead, radar.wavelength_m)
+        ahead_rad = (deep * np.cos(at)).astype(np.float32)[:, None] * sines[rows]
+        ahead_rad += (deep * np.sin(at)).astype(np.float32)[:, None] * cosines[rows]
+        ahead_rad *= arm_rad[rows]
+        turned = np.empty(ahead_rad.shape, np.complex64)
+        np.cos(ahead_rad, out=turned.real)
+        np.sin(ahead_rad, out=turned.imag)
+        turned *= gain.astype(np.complex64)[:, None]
+        out[rows] += turned
     return out, radius
 
 
@@ -236,7 +256,7 @@ def _even_row(
 
 def draw_mover(draws: Draws, radar: Radar) -> Target:
     """Draw a featureless moving reflector: a far vehicle, a boat, a balloon. A line alone is no drone."""
-    speed = draws.value("mover_mps")
+    speed = draws.either("mover_mps", "drifter_mps", 0.2)
     acceleration = draws.acceleration_mps2("bird_acceleration_mps2")
     path = straight_path(radar.times_s, speed, acceleration)
     turn = np.exp(1j * draws.value("phase_rad")).astype(np.complex64)[:, None]

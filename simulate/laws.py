@@ -96,7 +96,7 @@ LAWS: dict[str, Law] = {
     "flock_spread": Law("uniform", 0.1, 1.0, "1", "a close flock's spread over a loose one's"),
     "members": Law("log", 2.0, 21.0, "1", "birds that a flock brings into one range cell"),
     # clutter
-    "rain_velocity_mps": Law("uniform", -12.0, 12.0, "m/s", "wind and fall along the line of sight"),
+    "rain_velocity_mps": Law("uniform", -18.0, 18.0, "m/s", "wind up to a storm's, and fall"),
     "rain_width_mps": Law("log", 0.4, 2.5, "m/s", "1-4 m/s wide overall"),
     "sea_velocity_mps": Law("uniform", -4.5, 4.5, "m/s", "Bragg and wind-driven lines"),
     "sea_width_mps": Law("log", 0.15, 1.5, "m/s", "measured sea spectra"),
@@ -104,7 +104,8 @@ LAWS: dict[str, Law] = {
     "texture_hz": Law("log", 0.2, 2.5, "Hz", "swells and gusts; decorrelation 0.1-1 s"),
     "person_mps": Law("uniform", -3.5, 3.5, "m/s", "walking to jogging"),
     "gait_hz": Law("uniform", 0.8, 2.2, "Hz", "1-2 Hz"),
-    "vehicle_mps": Law("log", 1.5, 42.0, "m/s", "along the road, from a crawl over towns to motorways"),
+    # not by the logarithm: where vehicles at 20 to 30 m/s are rare beside UAVs that fast, their wheels are rotors
+    "vehicle_mps": Law("uniform", 1.5, 42.0, "m/s", "along the road, from a crawl over towns to motorways"),
     "engine_hz": Law("log", 10.0, 120.0, "Hz", "four-stroke engines fire at 20-30 Hz idling, to 100 Hz driven"),
     "engine_m": Law("log", 1e-6, 3e-4, "m", "panels shaken by it, micrometres to tenths of a millimetre"),
     "road_acceleration_mps2": Law("uniform", -4.0, 4.0, "m/s^2", "pulling away and braking"),
@@ -115,7 +116,10 @@ LAWS: dict[str, Law] = {
     "body_points": Law("log", 4.0, 49.0, "1", "echoes of a body: few corners, or all of a bus near by"),
     "beam_rad": Law("log", 0.2, 4.0, "rad", "width of the beam that looks along or across a road, to none at all"),
     "company_db": Law("uniform", -25.0, -3.0, "dB", "another vehicle in the beam, under the first"),
-    "mover_mps": Law("uniform", -60.0, 60.0, "m/s", "boats, balloons, far vehicles, aircraft on a slant path"),
+    "mover_mps": Law("uniform", -60.0, 60.0, "m/s", "far vehicles, aircraft on a slant path"),
+    "drifter_mps": Law(
+        "uniform", -15.0, 15.0, "m/s", "boats, balloons: slow ones must not be rarer than birds that glide"
+    ),
     "wheel_radius_m": Law("log", 0.2, 0.55, "m", "motorcycle to lorry"),
     "wheel_db": Law("uniform", -35.0, 0.0, "dB", "wheels under the body; measured beside a road: 10 dB"),
     "wheels": Law("uniform", 1.0, 5.0, "1", "wheels that the radar sees"),
@@ -124,7 +128,7 @@ LAWS: dict[str, Law] = {
     "turbine_length_m": Law("log", 15.0, 60.0, "m", "small to large wind turbines"),
     "turbine_tip_mps": Law("uniform", 15.0, 90.0, "m/s", "tips 60-90 m/s at rated wind, less below"),
     "cell_m": Law("log", 3.0, 200.0, "m", "part of a blade inside the range cell, often the whole"),
-    "turbine_points": Law("log", 3.0, 31.0, "1", "echoes along a blade"),
+    "turbine_points": Law("log", 3.0, 101.0, "1", "echoes along a blade; many fill its speeds as noise does"),
     "turbine_row_points": Law("log", 3.0, 3e4, "1", "the same where a model draws them even, up to a smooth line"),
     "chord_m": Law("log", 0.05, 2.0, "m", "half the blade's chord: how far its echoes lie off its axis"),
     # receivers

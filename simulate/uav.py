@@ -22,9 +22,17 @@ BLADES = (2, 3, 4)
 #: No rotor turns slower [Hz], however long its blades (24-100 Hz in P, and a margin): what does has wheels or wings.
 LEAST_ROTATION_HZ = 20.0
 
+#: A tip is at least so many times as fast as the aircraft: rotors advance by at most 0.4 of their tips' speed
+#: (helicopters), propellers by a third. What turns no faster than it moves is a wheel.
+TIP_OVER_BODY = 2.5
+
 #: What a blade reflects with, and how often: a line (Martin and Mulgrew 1990), its tip alone (P), or some points of it.
 #: A model that knows one of them takes the spectrum of another for clutter.
 POINTS = {None: 0.55, 1: 0.15, 2: 0.07, 3: 0.07, 5: 0.06, 8: 0.05, 12: 0.05}
+
+#: Of the blades with their tips alone this share is rough instead: so many points each, every one as strong as it will.
+#: Where the wavelength is that of a blade's unevenness no blade is like another, and the lines of every turn show.
+ROUGH_CHANCE, ROUGH_POINTS = 0.5, 4
 
 
 def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
@@ -49,12 +57,14 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
     velocity = np.where(draws.chance(0.3), 0.0, draws.value("uav_velocity_mps"))
     acceleration = draws.acceleration_mps2("uav_acceleration_mps2")
     length = draws.value("main_length_m" if kind == "helicopter" else "blade_length_m")
-    rotation = draws.value("tip_mps", least=TWO_PI * length * LEAST_ROTATION_HZ) / (TWO_PI * length)
+    least_mps = np.maximum(TWO_PI * length * LEAST_ROTATION_HZ, TIP_OVER_BODY * np.abs(velocity))
+    rotation = draws.value("tip_mps", least=least_mps) / (TWO_PI * length)
     blades = np.where(draws.chance(0.65), 2, np.where(draws.chance(0.75), 3, 4))
     amplitudes = _blade_amplitudes(draws)
     root = length * draws.value("root_fraction")
     asymmetry = draws.value("edge_asymmetry")
     points = np.searchsorted(np.cumsum(list(POINTS.values()))[:-1], draws.uniform(), side="right")
+    rough = draws.chance(ROUGH_CHANCE) & (points == list(POINTS).index(1))
 
     manoeuvre = draws.chance(0.3)
     spread = np.where(manoeuvre, draws.value("manoeuvre_spread"), draws.value("hover_spread"))
@@ -76,8 +86,8 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
         "velocity_mps": velocity,
         "acceleration_mps2": acceleration,
         "tip_mps": TWO_PI * rates.max(axis=1) * length,
-        # one reflecting blade repeats once a turn, equal blades `blades` times
-        "chopping_hz": rates.mean(axis=1) * np.where((amplitudes[:, 1:] > 0).any(axis=1), blades, 1),
+        # one reflecting blade repeats once a turn, as blades do that are all unlike; equal ones `blades` times
+        "chopping_hz": rates.mean(axis=1) * np.where((amplitudes[:, 1:] > 0).any(axis=1) & ~rough, blades, 1),
     }
     tail = []
     if kind == "helicopter":
@@ -92,10 +102,12 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
         "vibration_phase_rad": phase,
     }
     micro = np.empty((len(draws), radar.pulses), np.complex64)
-    for count, (number, each) in product(BLADES, enumerate(POINTS)):
-        rows = np.flatnonzero((blades == count) & (points == number))
+    parts = [part for rotor in lifting for part in _rough(draws, rotor)]
+    looks = [(each, lifting, (points == number) & ~rough) for number, each in enumerate(POINTS)] + [(1, parts, rough)]
+    for count, (each, main, own) in product(BLADES, looks):
+        rows = np.flatnonzero((blades == count) & own)
         if len(rows):
-            some = [_of(rotor, rows, each, count) for rotor in lifting] + [_of(rotor, rows, each) for rotor in tail]
+            some = [_of(rotor, rows, each, count) for rotor in main] + [_of(rotor, rows, each) for rotor in tail]
             micro[rows] = rotors_echo(radar, some, len(rows), **{name: value[rows] for name, value in path.items()})
     body = body_echo(radar, len(draws), **path, phase_rad=rest)
     return Target(micro, body, draws.value("uav_body_db"), truth=truth)
@@ -119,6 +131,17 @@ def _blade_amplitudes(draws: Draws) -> NDArray[np.float64]:
     amplitudes = np.exp(inequality[:, None] * draws.normal(max(BLADES)))
     amplitudes[draws.chance(0.06), 1:] = 0.0
     return amplitudes
+
+
+def _rough(draws: Draws, rotor: Rotor) -> list[Rotor]:
+    """A rotor of rough blades, as rotors of one point a blade: anywhere along it, on each as strong as it will."""
+    length, root, amplitudes = (np.asarray(v) for v in (rotor.blade_length_m, rotor.root_m, rotor.blade_amplitudes))
+    out = []
+    for _ in range(ROUGH_POINTS):
+        place, turn = root + (length - root) * draws.uniform(), np.exp(1j * draws.value("phase_rad"))
+        uneven = amplitudes * draws.normal(amplitudes.shape[-1])
+        out.append(replace(rotor, blade_length_m=place, blade_amplitudes=uneven, hub=rotor.hub * turn))
+    return out
 
 
 def _tail_rotor(

@@ -113,9 +113,7 @@ def test_what_is_shorter_than_a_dwell_is_said_to_be_left_out(folder, capsys):
 def test_the_reason_for_no_rotor_is_given_whole(folder, capsys):
     assert main(["measure", str(folder / "drone.npy"), *RADAR, "--dwell", "0.018"]) == 0
     # two flashes a dwell
-    said = (
-        r"\d dwells: dwell too short.* lines \d+ Hz apart with others between them, a dwell of \d+ ms tells them apart"
-    )
+    said = r"\d dwells: dwell too short.* lines \d+ Hz apart with others between them, to tell them apart takes \d+ ms"
     assert re.search(said, capsys.readouterr().out)
 
 

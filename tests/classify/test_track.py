@@ -6,9 +6,8 @@ from bladewing.classify.labels import CLASSES, UNKNOWN, decide
 from bladewing.classify.predict import answer
 from bladewing.classify.recording import Recording
 from bladewing.classify.track import FITTED_DWELL_S, LONGER, fuse, weights
-from bladewing.features.comb_search import MIN_SPACING_BINS
-from bladewing.features.steady_comb import DWELL_S
-from bladewing.simulate import Radar, draw_records
+from bladewing.simulate import Radar, Scene, draw_records
+from bladewing.simulate.catalogue import AIRFRAMES
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from rich.console import Console
@@ -339,13 +338,12 @@ def test_a_body_that_goes_to_and_fro_is_reported_and_counts(velocity_mps, rate_h
 
 
 def test_a_comb_that_stays_is_reported_and_counts(capsys):
-    radar = Radar(9.85e9, 25e3, 25_000)
-    records = draw_records(radar, 6, 3, purpose="bench", kind="fixed_wing")
-    told_apart = records.truth["chopping_hz"] * DWELL_S > 2 * MIN_SPACING_BINS  # lines in the dwells that are looked at
-    row = int(np.where(told_apart, records.truth["snr_db"], -np.inf).argmax())
-    given = answer(Recording("x", records.iq[row], radar.carrier_hz, radar.prf_hz), Asked(Envelope()))
-    truth_hz = records.truth["chopping_hz"][row]
-    assert given.shown == {"comb": pytest.approx(truth_hz, rel=0.03)}
+    uav = AIRFRAMES["type1"].fields | {"name": "drone", "velocity_mps": 12.0}
+    radar = {"carrier_hz": 9.85e9, "prf_hz": 25e3, "pulses": 25_000}
+    iq = Scene.build({"radar": radar, "uav": [uav]}).render(3).iq
+    given = answer(Recording("x", iq, radar["carrier_hz"], radar["prf_hz"]), Asked(Envelope()))
+    truth_hz = 2 * uav["rotors"][0]["rotation_hz"]
+    assert given.shown == {"comb": pytest.approx(truth_hz, rel=0.001)}
     assert list(given.json_objects())[-1]["track"]["comb_hz"] == round(given.shown["comb"], 3)
     uav, bird, _ = given.track.probabilities
     factor = (0.4 / 0.3) ** (given.track.used / (1 + (given.track.used - 1) * CORRELATION))

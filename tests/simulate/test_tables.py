@@ -157,13 +157,13 @@ def test_the_ground_keeps_all_lines_that_hold_its_power(prf_hz):
 
 def test_limbs_come_in_pairs_that_swing_against_each_other_about_the_torso():
     torso, *limbs = LIMBS
-    assert torso[0] == max(amplitude for amplitude, _, _ in LIMBS)
-    assert torso[1] < min(swing for _, swing, _ in limbs)
+    assert torso[0] == max(amplitude for amplitude, *_ in LIMBS)
+    assert torso[1] < min(swing for _, swing, *_ in limbs)
     for one, other in zip(limbs[::2], limbs[1::2], strict=True):
-        assert one[:2] == other[:2]
-        assert abs(one[2] - other[2]) == pytest.approx(0.5)
-    # the feet: 1 + 2 = three times the torso's speed, the fastest that a walker shows
-    assert 1 + max(swing for _, swing, _ in LIMBS) == pytest.approx(3)
+        assert one[:3] == other[:3]
+        assert abs(one[3] - other[3]) == pytest.approx(0.5)
+    # the feet: 1 + 2 = three times the torso's speed, the fastest that a walker shows but for the stride
+    assert 1 + max(swing for _, swing, *_ in LIMBS) == pytest.approx(3)
 
 
 def test_kinds_chances_and_words_are_complete():
