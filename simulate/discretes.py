@@ -10,7 +10,7 @@ from scipy.special import diric
 from .airframe import body_echo
 from .grid import PulseGrid, Sine
 from .laws import Draws
-from .motion import TWO_PI, range_phasor, reduce_phase, straight_path
+from .motion import TWO_PI, range_phasor, reduce_phase, straight_path, turned
 from .radar import Radar
 from .target import Target, mean_power
 
@@ -63,7 +63,7 @@ def draw_person(draws: Draws, radar: Radar) -> Target:
         )
         if sharp:
             stride = np.stack([swing_rad * sharper * sharp / 2, 2 * omega / TWO_PI, 2 * offset], axis=1)[..., None]
-            limb *= np.exp(1j * grid.sines(Sine(*np.moveaxis(stride, 1, 0))))
+            limb *= turned(grid.sines(Sine(*np.moveaxis(stride, 1, 0))))
         (micro if number else body)[...] += limb
     truth = {"velocity_mps": speed, "gait_hz": gait}
     return Target(micro, body, 15 * draws.uniform(), truth=truth)
@@ -182,11 +182,7 @@ def _wheels(
         ahead_rad = (deep * np.cos(at)).astype(np.float32)[:, None] * sines[rows]
         ahead_rad += (deep * np.sin(at)).astype(np.float32)[:, None] * cosines[rows]
         ahead_rad *= arm_rad[rows]
-        turned = np.empty(ahead_rad.shape, np.complex64)
-        np.cos(ahead_rad, out=turned.real)
-        np.sin(ahead_rad, out=turned.imag)
-        turned *= gain.astype(np.complex64)[:, None]
-        out[rows] += turned
+        out[rows] += gain.astype(np.complex64)[:, None] * turned(ahead_rad)
     return out, radius
 
 

@@ -251,6 +251,22 @@ def test_even_spokes_show_only_lines_of_their_own_rate():
     assert 0.05 < np.mean(np.array(shares) > 0.98) < 0.4
 
 
+def test_a_point_of_a_wheel_goes_round_to_the_digits_of_float32(monkeypatch):
+    radar = Radar(94e9, 100e3, 4000)
+    gone = 40.0 * (radar.times_s - radar.dwell_s / 2)[None, :] * np.ones((40, 1))
+    fix(monkeypatch, spokes=1.0, tyre_points=1.0, wheels=1.0, wheel_radius_m=0.3)
+    wheels, radius = _wheels(draws(40, 6), radar, gone, np.ones_like(gone))
+    alone = np.ptp(abs(wheels), axis=1) < 1e-5 * abs(wheels).max()  # spokes and tyre together are two points
+    assert 15 < alone.sum() < 35
+    turn = gone[0] / radius[0]
+    basis = np.stack([np.sin(turn), np.cos(turn), np.ones_like(turn)], axis=1)
+    for row in wheels[alone]:
+        phase = np.unwrap(np.angle(row.astype(complex)))
+        fitted, *_ = np.linalg.lstsq(basis, phase, rcond=None)
+        assert np.hypot(*fitted[:2]) <= 4 * np.pi / radar.wavelength_m * 0.3
+        assert abs(phase - basis @ fitted).max() < 1e-3  # of up to 1200 rad
+
+
 def test_the_many_blocks_of_a_tyre_fill_its_speeds_at_every_moment(monkeypatch):
     """As measured beside a road; of few points each shows one speed at a time."""
     radar = Radar(24e9, 16e3, 320)  # 20 ms: an eighth of a turn
