@@ -19,8 +19,9 @@ from bladewing.models.seal import SEAL_KEY, seal
 from onnx import TensorProto, helper
 from scipy import fft
 
+from .bounds import MOST_MODEL_BYTES
 from .errors import BadInput
-from .files import write_whole
+from .files import read_bounded, write_whole
 from .inference import Classifier
 from .labels import CLASSES, UNKNOWN
 from .ladder import CASCADE
@@ -71,7 +72,7 @@ def export_raw_iq(
     """
     if Path(out).suffix.lower() != ".onnx":
         raise BadInput(f"{os.fspath(out)}: a graph's name ends in .onnx: give it such a name")
-    if Path(out).is_file() and EXPORTED.encode() not in Path(out).read_bytes():
+    if not _replaceable(Path(out)):
         raise BadInput(f"{os.fspath(out)} is there and is no exported graph: it is not written over: give another file")
     name = chosen_name(model, single=True)
     if name == CASCADE:
@@ -100,6 +101,14 @@ def export_raw_iq(
     except OSError as error:
         raise BadInput(f"{os.fspath(out)}: cannot be written: {error.strerror or error}: give another file") from None
     return worst
+
+
+def _replaceable(out: Path) -> bool:
+    """Whether nothing of another kind stands there."""
+    try:
+        return not out.exists() or EXPORTED.encode() in read_bounded(out, MOST_MODEL_BYTES)
+    except (OSError, ValueError):
+        return False
 
 
 def _whole_graph(
