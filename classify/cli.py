@@ -416,13 +416,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         if error.errno not in _DISK_ERRORS:
             return _unexpected(error)
-        name = f"{error.filename}: " if error.filename else ""
+        name, cure = error.filename, "make room or give another place; what stood there is unchanged"
         if not name and _output_is_full():
-            _complain(
-                f"standard output: {error.strerror}: what was to be printed is lost; files are written whole or not"
-            )
-            return 2
-        _complain(f"{name}{error.strerror}: make room or give another place; what stood there is unchanged")
+            name, cure = "standard output", "what was to be printed is lost; files are written whole or not"
+        _complain(f"{f'{name}: ' if name else ''}{error.strerror}: {cure}")
         return 2
     except Exception as error:
         return _unexpected(error)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
-from bladewing.features.measure import Measurements, beyond_radars, measure
+from bladewing.features.measure import BODY, Measurements, beyond_radars, measure
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 from bladewing.features.steady_comb import OVER_BODY
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
@@ -58,8 +58,8 @@ WHOLE = ("comb_order", "rotor_count", "blades")
 #: What a recording's JSON object holds of the wingbeat and of the body's course.
 WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std", "acceleration_mps2", "acceleration_mps2_std")
 
-#: What it holds of the body, of which no dwell knows more than the least.
-BODY, LEAST_STD_MPS = ("body_velocity_mps", "body_velocity_mps_std"), 1e-6
+#: No dwell knows the body better.
+LEAST_STD_MPS = 1e-6
 
 #: Where the middle half of so many combs and more reaches over this ratio, they are not the same in all dwells.
 LEAST_COMBS, UNSTEADY = 4, 1.25

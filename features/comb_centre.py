@@ -105,7 +105,7 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
     even: dict[int, float] = {}
     if highest_db > CLEAR_DB:
         unlikely = _even_orders(data, found, 10 ** ((highest_db - ENDS_DB) / 10))
-        even = {order: EVEN - nats for order, nats in unlikely if nats < EVEN}
+        even = {order: EVEN - nats for order, nats in unlikely.items() if nats < EVEN}
         out += [(found.centre + found.spacing * order, 0.0) for order in even]
     others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
     moving = 0.0
@@ -135,7 +135,7 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
     return most, even
 
 
-def _even_orders(data: Periodogram, found: Candidate, least: float) -> list[tuple[int, float]]:
+def _even_orders(data: Periodogram, found: Candidate, least: float) -> dict[int, float]:
     """Orders about which what shows of this power is about even, and what the evenest has before each [nats].
 
     All that lies about each order counts, the lines of several rotors too that it has parted from. The levels of two
@@ -152,7 +152,7 @@ def _even_orders(data: Periodogram, found: Candidate, least: float) -> list[tupl
     groups = np.split(shows, np.flatnonzero(np.diff(shows) > 1 + ENDS_GAP) + 1)
     own = [group for group in groups if np.any((order[group] >= found.low) & (order[group] <= found.high))]
     if not own:
-        return [(0, 0.0)]
+        return {0: 0.0}
     first, last = int(own[0][0]), int(own[-1][-1])
     half = (last - first) // 2 + ENDS_GAP
     nats = np.pad(np.log(np.maximum(highest, least)), half, constant_values=np.log(least))
@@ -164,4 +164,4 @@ def _even_orders(data: Periodogram, found: Candidate, least: float) -> list[tupl
     count = np.maximum(both.sum(axis=1), 1)
     uneven = (both * (nats[after] - nats[before]) ** 2).sum(axis=1) / count + LEAST_UNEVEN
     unlikely = UNEVEN_WEIGHT * count / 2 * np.log(uneven / uneven.min())
-    return [(int(order[place]), float(much)) for place, much in zip(tried, unlikely, strict=True)]
+    return dict(zip(order[tried].tolist(), unlikely.tolist(), strict=True))

@@ -62,8 +62,8 @@ def draw_person(draws: Draws, radar: Radar) -> Target:
             amplitude=level,
         )
         if sharp:
-            stride = np.stack([swing_rad * sharper * sharp / 2, 2 * omega / TWO_PI, 2 * offset], axis=1)[..., None]
-            limb *= turned(grid.sines(Sine(*np.moveaxis(stride, 1, 0))))
+            stride = swing_rad * sharper * sharp / 2, 2 * omega / TWO_PI, 2 * offset
+            limb *= turned(grid.sines(Sine(*(values[:, None] for values in stride))))
         (micro if number else body)[...] += limb
     truth = {"velocity_mps": speed, "gait_hz": gait}
     return Target(micro, body, 15 * draws.uniform(), truth=truth)
@@ -172,9 +172,9 @@ def _wheels(
     arm_rad = (-2 * TWO_PI / radar.wavelength_m * radius[:, None] * cosine).astype(np.float32)
     for point in range(int(points.max(initial=0))):
         rows = np.flatnonzero(points > point)
-        wheel = point % wheels[rows]
-        alike = point // wheels[rows] < spokes[rows]
-        at = TWO_PI * np.where(alike, (point // wheels[rows]) / np.maximum(spokes[rows], 1), angle[rows, point])
+        number, wheel = np.divmod(point, wheels[rows])
+        alike = number < spokes[rows]
+        at = TWO_PI * np.where(alike, number / np.maximum(spokes[rows], 1), angle[rows, point])
         at += own_phase[rows, wheel]
         own = np.where(alike, wheel, point)  # even spokes share what is drawn for their wheel
         deep = 1 - np.where(rim_only[rows], 0.03, 0.5) * depth[rows, own]

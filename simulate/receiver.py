@@ -12,7 +12,7 @@ from scipy import fft
 from .clutter import process_velocities, real_noise, shaped_noise
 from .grid import PulseGrid, Sine
 from .laws import Draws
-from .motion import TWO_PI
+from .motion import TWO_PI, turned
 from .radar import Radar
 from .target import Normals
 
@@ -144,10 +144,7 @@ class Receiver:
             side[0] = 0
             angle = real_noise(normals_of("phase_noise")(rows), radar, side)
             angle *= self.phase_noise_rad[rows].astype(np.float32)[:, None]
-            turn = np.empty(angle.shape, np.complex64)
-            np.cos(angle, out=turn.real)
-            np.sin(angle, out=turn.imag)
-            iq[rows] *= turn
+            iq[rows] *= turned(angle)
         iq = iq + noise
         self._strike(iq, np.flatnonzero(self.on["impulses"]))
         rows = np.flatnonzero(self.on["flicker"])

@@ -31,3 +31,15 @@ def rotors(
         )
     iq /= np.sqrt(np.mean(abs(iq) ** 2))
     return (iq + body) * np.exp(-4j * np.pi * velocity_mps * times_s / WAVELENGTH_M)
+
+
+def rotors_by_chance(
+    rng: np.random.Generator, rates_hz, times_s: np.ndarray, *, wavelength_m: float, length_m: float, points=None
+) -> np.ndarray:
+    """Echo of rotors of these rates at phases of chance, unit power a sample."""
+    echo = np.zeros(len(times_s), complex)
+    for rate_hz in rates_hz:
+        angle_rad = RotorMotion(rate_hz, rng.uniform(0, 2 * np.pi)).angle_rad(times_s)
+        one = rotor_echo(angle_rad, wavelength_m=wavelength_m, blade_length_m=length_m, points=points)
+        echo += one * np.exp(2j * np.pi * rng.uniform())
+    return echo / np.sqrt(np.mean(np.abs(echo) ** 2))

@@ -5,7 +5,7 @@ from bladewing.features.body_velocity import NOISE_BINS
 from bladewing.features.spectrum import KAISER_BETA
 from bladewing.simulate import RotorMotion, rotor_echo
 
-from .signals import CARRIER_HZ, PRF_HZ, WAVELENGTH_M, white
+from .signals import CARRIER_HZ, PRF_HZ, WAVELENGTH_M, rotors_by_chance, white
 
 RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 PULSES = 700
@@ -107,13 +107,9 @@ def short_drone(seed, velocity_mps, body_db):
     wavelength_m = 299_792_458.0 / carrier_hz
     prf_hz = max(5 * tip_mps / wavelength_m, 8e3)
     times_s = np.arange(int(rng.uniform(0.012, 0.025) * prf_hz)) / prf_hz
-    echo = np.zeros(len(times_s), complex)
-    for rate_hz in tip_mps / (2 * np.pi * length_m) * (1 + rng.uniform(-0.06, 0.06, 4)):
-        angle_rad = RotorMotion(rate_hz, rng.uniform(0, 2 * np.pi)).angle_rad(times_s)
-        one = rotor_echo(angle_rad, wavelength_m=wavelength_m, blade_length_m=length_m, points=1)
-        echo += one * np.exp(2j * np.pi * rng.uniform())
-    echo *= 10 ** (rng.uniform(0, 25) / 20) / np.sqrt(np.mean(np.abs(echo) ** 2))
-    echo += 10 ** (body_db / 20) * np.sqrt(np.mean(np.abs(echo) ** 2))
+    rates_hz = tip_mps / (2 * np.pi * length_m) * (1 + rng.uniform(-0.06, 0.06, 4))
+    echo = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=wavelength_m, length_m=length_m, points=1)
+    echo = (echo + 10 ** (body_db / 20)) * 10 ** (rng.uniform(0, 25) / 20)
     iq = echo * np.exp(-4j * np.pi * velocity_mps * times_s / wavelength_m) + white(rng, len(times_s))
     return iq.astype(np.complex64), {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
 

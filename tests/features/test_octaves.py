@@ -5,30 +5,20 @@ import pytest
 from bladewing.features.comb import find_comb, strong_multiple
 from bladewing.features.octaves import coarsest, over_neighbours
 from bladewing.features.periodogram import prepare
-from bladewing.simulate import RotorMotion, rotor_echo
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors_by_chance, white
 
 RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
-
-
-def together(rng, rates_hz, points=None):
-    """Echo of rotors of these rates at phases of chance, unit power a sample."""
-    times_s = np.arange(PULSES) / PRF_HZ
-    echo = np.zeros(PULSES, complex)
-    for rate_hz in rates_hz:
-        angle_rad = RotorMotion(rate_hz, rng.uniform(0, 2 * np.pi)).angle_rad(times_s)
-        one = rotor_echo(angle_rad, wavelength_m=WAVELENGTH_M, blade_length_m=0.15, points=points)
-        echo += one * np.exp(2j * np.pi * rng.uniform())
-    return echo / np.sqrt(np.mean(np.abs(echo) ** 2))
+TIMES_S = np.arange(PULSES) / PRF_HZ
+ROTOR = {"wavelength_m": WAVELENGTH_M, "length_m": 0.15}
 
 
 def four_rotors(seed):
     """Rates within 3 %, 20 dB over the noise, at phases and a velocity of chance; with the mean rate [Hz]."""
     rng = np.random.default_rng(seed)
-    rates_hz, times_s = 57.5 * (1 + rng.uniform(-0.015, 0.015, 4)), np.arange(PULSES) / PRF_HZ
-    iq = together(rng, rates_hz) * 10 + 100
-    iq *= np.exp(-4j * np.pi * rng.uniform(-30, 30) * times_s / WAVELENGTH_M)
+    rates_hz = 57.5 * (1 + rng.uniform(-0.015, 0.015, 4))
+    iq = rotors_by_chance(rng, rates_hz, TIMES_S, **ROTOR) * 10 + 100
+    iq *= np.exp(-4j * np.pi * rng.uniform(-30, 30) * TIMES_S / WAVELENGTH_M)
     return (iq + white(rng, PULSES)).astype(np.complex64), rates_hz.mean()
 
 
@@ -48,7 +38,7 @@ def test_tips_of_rotors_that_turn_evenly_apart_have_no_comb_at_a_third():
     # at 0 dB, a third of the spacing had 55 nats where the whole had 53
     rng = np.random.default_rng(60)
     rates_hz = (np.array([3400.0, 3424.0, 3448.0, 3472.0]) + rng.uniform(0, 20, 4)) / 60
-    iq = together(rng, rates_hz, points=1) + 10 + white(rng, PULSES)
+    iq = rotors_by_chance(rng, rates_hz, TIMES_S, **ROTOR, points=1) + 10 + white(rng, PULSES)
     comb, reason = find_comb(prepare(iq.astype(np.complex64), **RADAR))
     assert comb is not None, reason
     assert comb.chopping * PRF_HZ == pytest.approx(2 * rates_hz.mean(), rel=0.02)
