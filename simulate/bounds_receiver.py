@@ -27,6 +27,7 @@ CHAIN = (
     "bursts",
     "colour",
     "high_pass",
+    "canceller",
     "image",
     "real_only",
     "analytic",
@@ -86,6 +87,7 @@ class ReceiverBounds:
         return {
             "fading": float(10 ** (abs(drawn.fading_db[0]) / 20)),
             "colour": float(10 ** ((np.abs(drawn.hump_db[0]).sum() + max(drawn.tilt_db[0], 0)) / 20)),
+            "canceller": float(2 ** (drawn.canceller_pulses[0] - 1)),
             "image": float(1 + 10 ** (drawn.image_db[0] / 20)),
             "analytic": float(np.sqrt(2)),
         }.get(effect, 1.0)

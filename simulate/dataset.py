@@ -29,20 +29,27 @@ KINDS: dict[str, dict[str, float]] = {
     "uav": {"fixed_wing": 0.25, "quadcopter": 0.3, "hexacopter": 0.15, "octocopter": 0.1, "helicopter": 0.2},
     "bird": {"flapping_bird": 0.68, "gliding_bird": 0.15, "flock": 0.17},
     "clutter": {
-        "noise": 0.18,  # most of what a radar looks at; at 0.11 a glimmer in noise was a UAV too often
+        "noise": 0.17,  # most of what a radar looks at; at 0.11 a glimmer in noise was a UAV too often
         "ground": 0.06,
         "rain": 0.09,
         "sea": 0.07,
         "person": 0.09,
-        "vehicle": 0.30,
-        "wind_turbine": 0.11,
-        "mover": 0.10,
+        "vehicle": 0.28,
+        "wind_turbine": 0.10,
+        "mover": 0.08,
+        "insects": 0.06,
     },
 }
 
 #: Share of the records, of any kind, that hardly have thermal noise: simulated ones, near targets, laboratories. Were
 #: the levels over the noise another for each class up there, they would give the class away.
 QUIET = 0.12
+
+#: Share of the backgrounds that are rain or sea: were these clutter alone, a drone over the sea would be as well.
+WEATHER = 0.2
+
+#: Uniform numbers that the sea takes; rain takes fewer.
+_WEATHER_NUMBERS = 28
 
 #: What a set of records is for; each has streams of its own, so a test record is never a training record.
 PURPOSES = {"train": 0, "validate": 1, "calibrate": 2, "test": 3, "bench": 4, "report": 5}
@@ -296,13 +303,19 @@ def _powered(target: Target, snr_db: NDArray[np.float64]) -> NDArray[np.complex6
 
 
 def _background(draws: Draws, radar: Radar, normals_of: NormalsOf, level_db: NDArray[np.float64]) -> NDArray:
-    """What stands in the cell behind any target: nothing, a return at rest, or wind-blown ground."""
+    """What is in the cell behind any target: nothing, a return at rest, wind-blown ground, rain or sea."""
     present, blown = draws.chance(0.6), draws.chance(0.5)
     drawn_db, wind = draws.value("background_db"), draws.value("wind_mph")
     phase = draws.value("phase_rad")
+    weather, wet, own = draws.chance(WEATHER), draws.chance(0.5), draws.uniform(_WEATHER_NUMBERS)
+    drawn_db = np.where(weather, draws.value("weather_db"), drawn_db)
     level_db[:] = np.where(present, drawn_db, np.nan)
     out = np.exp(1j * phase).astype(np.complex64)[:, None] * np.ones((1, radar.pulses), np.complex64)
-    rows = np.flatnonzero(present & blown)
+    rows = np.flatnonzero(present & blown & ~weather)
     if len(rows):
         out[rows] = draw_ground(normals_of(rows), radar, wind[rows], phase[rows])
+    for kind, of_kind in (("rain", wet), ("sea", ~wet)):
+        rows = np.flatnonzero(present & weather & of_kind)
+        if len(rows):
+            out[rows] = draw_clutter(Draws(own[rows]), radar, kind, normals_of(rows)).micro
     return out * np.where(present, 10 ** (drawn_db / 20), 0.0).astype(np.float32)[:, None]

@@ -9,6 +9,7 @@ from scipy.special import diric
 
 from .airframe import body_echo
 from .grid import PulseGrid, Sine
+from .insects import draw_insects
 from .laws import Draws
 from .motion import TWO_PI, range_phasor, reduce_phase, straight_path, turned
 from .radar import Radar
@@ -262,6 +263,7 @@ def draw_mover(draws: Draws, radar: Radar) -> Target:
 
 #: Renderers by kind.
 DISCRETES = {
+    "insects": draw_insects,
     "mover": draw_mover,
     "person": draw_person,
     "vehicle": draw_vehicle,
@@ -278,7 +280,7 @@ def draw_discrete(draws: Draws, radar: Radar, kind: str) -> Target:
         The records' uniform numbers.
     radar : Radar
         The radar that looks.
-    kind : {"person", "vehicle", "wind_turbine", "mover"}
+    kind : {"person", "vehicle", "wind_turbine", "mover", "insects"}
         What it is.
 
     Returns

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 1622 of them.
-WIDTH = 1623
+#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 1655 of them.
+WIDTH = 1656
 
 #: What a steady body's acceleration is of a manoeuvring one's. Half of all bodies are steady, whatever they are: if one
 #: class alone accelerated, a line that bends would be all there is to learn of it.
@@ -56,15 +56,17 @@ LAWS: dict[str, Law] = {
     # every scene
     # rising: a model that is shown many UAVs in which nothing can be seen learns to call an empty cell a UAV
     "snr_db": Law("rising", -20.0, 32.0, "dB", "micro-motion power over noise, a sample"),
-    "clutter_snr_db": Law("uniform", -20.0, 50.0, "dB", "whole clutter return over noise, a sample"),
+    # as high as a UAV with its body: a level that only one class reaches would give it away
+    "clutter_snr_db": Law("uniform", -20.0, 60.0, "dB", "whole clutter return over noise, a sample"),
     "quiet_db": Law("uniform", 0.0, 100.0, "dB", "thermal noise under the usual, to none that float32 holds"),
     "phase_rad": Law("uniform", -np.pi, np.pi, "rad", "no phase is special"),
     "background_db": Law(
         "uniform", -10.0, 65.0, "dB", "static return over noise; measured drone: 35-54 dB over blades"
     ),
+    "weather_db": Law("uniform", -10.0, 35.0, "dB", "rain or sea behind a target, over noise"),
     "wind_mph": Law("log", 2.0, 35.0, "mph", "Billingsley"),
     # rotors
-    "blade_length_m": Law("log", 0.06, 0.45, "m", "0.075-0.41 m (P) and a margin"),
+    "blade_length_m": Law("log", 0.06, 0.7, "m", "0.075-0.41 m (P); 0.7 m on agricultural drones"),
     "tip_mps": Law("log", 28.0, 190.0, "m/s", "idling 33 m/s (measured) to fast racing props, below Mach 0.6"),
     "main_length_m": Law("log", 0.25, 1.0, "m", "RC helicopters, 0.407 m (P)"),
     "gear_ratio": Law("uniform", 3.8, 6.2, "1", "tail over main, 4.73 (P), 4-6 in general"),
@@ -80,8 +82,9 @@ LAWS: dict[str, Law] = {
     "blade_inequality": Law("log", 0.01, 1.0, "1", "spread of blade amplitudes, natural log"),
     "uav_body_db": Law("uniform", -10.0, 35.0, "dB", "body over blade power; blade lines 10-45 dB under body (P)"),
     "uav_velocity_mps": Law("uniform", -30.0, 30.0, "m/s", "small UAVs"),
+    "fast_uav_mps": Law("uniform", -65.0, 65.0, "m/s", "racing drones and fast fixed wings"),
     "uav_acceleration_mps2": Law("uniform", -4.0, 4.0, "m/s^2", "small UAVs"),
-    "vibration_rad": Law("log", 1e-3, 0.6, "rad", "airframe shaken at the rotor rate"),
+    "vibration_m": Law("log", 1e-6, 3e-4, "m", "airframe shaken at the rotor rate, at most as `uav.SHAKEN_MPS2` lets it"),
     # birds
     "bird_mass_kg": Law("log", 0.008, 10.0, "kg", "goldcrest to swan"),
     "wingbeat_scatter": Law("log", 0.75, 1.33, "1", "about Pennycuick 1996"),
@@ -131,6 +134,11 @@ LAWS: dict[str, Law] = {
     "turbine_points": Law("log", 3.0, 101.0, "1", "echoes along a blade; many fill its speeds as noise does"),
     "turbine_row_points": Law("log", 3.0, 3e4, "1", "the same where a model draws them even, up to a smooth line"),
     "chord_m": Law("log", 0.05, 2.0, "m", "half the blade's chord: how far its echoes lie off its axis"),
+    "insect_count": Law("uniform", 1.0, 12.0, "1", "in one range cell, from single ones to a swarm's edge"),
+    "insect_velocity_mps": Law("uniform", -8.0, 8.0, "m/s", "they drift with the wind"),
+    "insect_spread_mps": Law("log", 0.2, 3.0, "m/s", "rms of their own flight; airspeeds of 1-6 m/s"),
+    "insect_wingbeat_hz": Law("log", 20.0, 600.0, "Hz", "locusts at 20 Hz, bees at 200 Hz, mosquitoes at 600 Hz"),
+    "insect_depth": Law("uniform", 0.05, 0.5, "1", "swing of the amplitude: wings are small beside the body"),
     # receivers
     "gain_db": Law("uniform", -80.0, 80.0, "dB", "no gain is special"),
     "phase_noise_rad": Law(
@@ -140,11 +148,12 @@ LAWS: dict[str, Law] = {
     "fading_db": Law("uniform", 0.0, 12.0, "dB", "swing of glint and multipath"),
     "fading_hz": Law("log", 0.3, 25.0, "Hz", "lines decorrelate in tens to hundreds of ms (IET RSN 2022)"),
     "impulse_db": Law("uniform", 10.0, 45.0, "dB", "a spoilt pulse over noise"),
-    "high_pass_hz": Law("log", 3.0, 150.0, "Hz", "capacitor-coupled audio front ends; clutter cancellers"),
+    "high_pass_hz": Law("log", 3.0, 150.0, "Hz", "capacitor-coupled audio front ends"),
+    "canceller_pulses": Law("uniform", 2.0, 3.0, "1", "moving-target indication by two or three pulses"),
     "mains_db": Law("uniform", -25.0, 15.0, "dB", "mains lines together over noise"),
     "burst_hz": Law("log", 10.0, 1000.0, "Hz", "ignition, switched supplies, other radars; or the mains' rate"),
     "burst_share": Law("log", 0.0003, 0.3, "1", "share of its period that a burst lasts, from a rectifier's tick"),
-    "burst_db": Law("uniform", -25.0, 5.0, "dB", "mean power of the bursts over noise; seen in a measured CW module"),
+    "burst_db": Law("uniform", -25.0, 10.0, "dB", "mean power of the bursts over noise; seen in a measured CW module"),
     "tilt_db": Law("uniform", -25.0, 0.0, "dB", "receiver band edges under its middle"),
     "hump_db": Law("uniform", 0.0, 5.0, "dB", "half the swing of a smooth hump in the receiver's band"),
     "hump_turns": Law("log", 0.2, 8.0, "1", "humps across half the band, from one slope to several swells"),

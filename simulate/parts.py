@@ -10,7 +10,6 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from .bird import wing_size
-from .insects import INSECT_LAWS
 from .laws import LAWS
 from .receiver import FAULT_CHANCE
 
@@ -31,13 +30,14 @@ BOUNDS = {
     "sight_rad": (-1.56, 1.56),
     "spokes": (1, 10),
     "tyre_points": (1, 60),
-    "turbine_points": (3, 30),
+    "turbine_points": (3, 100),
     "turbine_row_points": (2, 1e6),
     "insect_count": (1, 20),
     "wind_mph": (0.5, 200),
     "gait_hz": (0.05, 20),
     "texture_hz": (1e-6, 1000),
     "high_pass_hz": (1e-6, 1e9),
+    "canceller_pulses": (2, 3),
     "adc_bits": (1, 24),
 }
 
@@ -232,8 +232,7 @@ class BirdPart(TargetPart):
 class ClutterPart(Part):
     """Clutter or a confuser of one kind, of mean power `level_db`.
 
-    Its parameters are drawn from the laws of the training records (`laws.LAWS`), those of insects from
-    `insects.INSECT_LAWS`; `values` fixes any of them by name.
+    Its parameters are drawn from the laws of the training records (`laws.LAWS`); `values` fixes any of them by name.
     """
 
     name: Name
@@ -277,20 +276,19 @@ class ReceiverPart(Part):
 
 def bounds_of(name: str) -> tuple[float, float]:
     """Least and largest value that a scene may fix a parameter to, in its law's unit."""
-    law = (LAWS | INSECT_LAWS)[name]
+    law = LAWS[name]
     return BOUNDS.get(name, LEVEL_BOUNDS_DB if law.unit == "dB" else (-math.inf, math.inf))
 
 
 def _known_laws(values: dict[str, float]) -> dict[str, float]:
     """Refuse a parameter that no law knows, or a value that its law's meaning forbids."""
-    laws = LAWS | INSECT_LAWS
     for name, value in values.items():
-        if name not in laws:
-            near = ", ".join(get_close_matches(name, laws, n=5, cutoff=0.3)) or "none"
+        if name not in LAWS:
+            near = ", ".join(get_close_matches(name, LAWS, n=5, cutoff=0.3)) or "none"
             raise ValueError(
-                f"{name!r} is unknown: of the {len(laws)} parameters (simulate/laws.py) near it are {near}"
+                f"{name!r} is unknown: of the {len(LAWS)} parameters (simulate/laws.py) near it are {near}"
             )
-        law = laws[name]
+        law = LAWS[name]
         if law.kind == "log" and value <= 0:
             raise ValueError(f"{name} is {value}: it must be above 0 [{law.unit}]")
         low, high = bounds_of(name)

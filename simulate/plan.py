@@ -48,6 +48,7 @@ WORDS = {
     "bursts": ("bursts of noise", "none"),
     "colour": ("a band that is not flat", "a flat band"),
     "high_pass": ("a stop band about velocity zero", "none"),
+    "canceller": ("clutter cancelled from pulse to pulse", "none"),
     "image": ("I/Q imbalance", "balanced channels"),
     "real_only": ("a real receiver", "both channels"),
     "analytic": ("a one-sided record made of a real one", "both sides"),

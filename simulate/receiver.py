@@ -21,6 +21,7 @@ FAULT_CHANCE = {
     "fading": 0.4,
     "impulses": 0.12,
     "high_pass": 0.12,
+    "canceller": 0.08,
     "flicker": 0.25,
     "phase_noise": 0.25,
     "mains": 0.25,
@@ -38,6 +39,7 @@ EFFECT_OF = {
     "fading_hz": "fading",
     "impulse_db": "impulses",
     "high_pass_hz": "high_pass",
+    "canceller_pulses": "canceller",
     "flicker_db": "flicker",
     "phase_noise_rad": "phase_noise",
     "mains_db": "mains",
@@ -81,6 +83,7 @@ class Receiver:
         self.impulse_phase = draws.value("phase_rad", MAX_IMPULSES)
         self.impulse_count = 1 + np.floor(MAX_IMPULSES * draws.uniform())
         self.high_pass_hz = draws.value("high_pass_hz")
+        self.canceller_pulses = np.rint(draws.value("canceller_pulses"))
         self.flicker_db = draws.value("flicker_db")
         self.phase_noise_rad = draws.value("phase_noise_rad")
         self.mains_hz = np.where(draws.chance(0.5), 50.0, 60.0)
@@ -210,13 +213,15 @@ class Receiver:
     def _filter(self, iq: NDArray[np.complex64], radar: Radar) -> None:
         """The band's shape: not flat, falling towards its edges with smooth humps anywhere, and blind at rest.
 
-        A hump of noise must not pass for a rotor's band. A receiver coupled by capacitors, or a clutter canceller, lets
-        nothing near velocity zero through.
+        A hump of noise must not pass for a rotor's band. A receiver coupled by capacitors lets nothing near velocity
+        zero through; a canceller of clutter takes each pulse from the next, or does so twice: |2 sin(pi f / PRF)|, or
+        its square, over the whole band (Skolnik, Introduction to Radar Systems, ch. 3), but for a delay.
         """
         share = (fft.fftfreq(iq.shape[-1]) * 2).astype(np.float32)
         tilt, square = share**2, fft.fftfreq(iq.shape[-1], 1 / radar.prf_hz).astype(np.float32) ** 2
         neper = np.float32(np.log(10) / 20)
-        for row in np.flatnonzero(self.on["colour"] | self.on["high_pass"]):
+        cancelled = np.abs(2 * np.sin(np.float32(np.pi / 2) * share))
+        for row in np.flatnonzero(self.on["colour"] | self.on["high_pass"] | self.on["canceller"]):
             spectrum = fft.fft(iq[row])
             if self.on["colour"][row]:
                 turns = np.float32(TWO_PI) * self.hump_turns[row].astype(np.float32)[:, None] * share
@@ -228,6 +233,8 @@ class Receiver:
                 spectrum *= np.exp(total, out=total)
             if self.on["high_pass"][row]:
                 spectrum *= square / (square + np.float32(self.high_pass_hz[row] ** 2))
+            if self.on["canceller"][row]:
+                spectrum *= cancelled ** (int(self.canceller_pulses[row]) - 1)
             iq[row] = fft.ifft(spectrum, overwrite_x=True)
 
     def _one_sided(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from .clutter import draw_clutter
 from .discretes import DISCRETES, draw_discrete
-from .insects import INSECT_LAWS, draw_insects
 from .laws import LAWS, WIDTH, Draws
 from .parts import ClutterPart
 from .radar import Radar
@@ -35,8 +34,8 @@ class Chosen(Draws):
     def value(
         self, law: str, columns: int | None = None, *, least: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]:
-        """Draw by the law of that name, insects' among them, or give the value that is fixed."""
-        return self._fixed((LAWS | INSECT_LAWS)[law](self.uniform(columns), least), law)
+        """Draw by the law of that name, or give the value that is fixed."""
+        return self._fixed(LAWS[law](self.uniform(columns), least), law)
 
     def change(self, law: str, dwell_s: float) -> NDArray[np.float64]:
         """Draw a rate of change, or give the value that is fixed."""
@@ -69,9 +68,7 @@ def clutter_echo(part: ClutterPart, radar: Radar, seed: int) -> tuple[NDArray[np
     """Clutter of mean power `level_db`, what was drawn of it, and which of its `values` it has no use for."""
     rng = stream(seed, part.name)
     draws = Chosen(rng.random((1, WIDTH)), part.values)
-    if part.kind == "insects":
-        target = draw_insects(draws, radar)
-    elif part.kind in DISCRETES:
+    if part.kind in DISCRETES:
         target = draw_discrete(draws, radar, part.kind)
     else:
         target = draw_clutter(draws, radar, part.kind, NormalsOf([rng])(np.array([0])))

@@ -22,9 +22,16 @@ BLADES = (2, 3, 4)
 #: No rotor turns slower [Hz], however long its blades (24-100 Hz in P, and a margin): what does has wheels or wings.
 LEAST_ROTATION_HZ = 20.0
 
+#: This share of the UAVs that move may be fast ones.
+FAST_CHANCE = 0.2
+
 #: A tip is at least so many times as fast as the aircraft: rotors advance by at most 0.4 of their tips' speed
 #: (helicopters), propellers by a third. What turns no faster than it moves is a wheel.
 TIP_OVER_BODY = 2.5
+
+#: An airframe is shaken by its rotors with no more than this [m/s^2]: five times gravity, beyond which no autopilot
+#: flies. What a wave sees of it is its length over the wavelength, so that only short waves see much.
+SHAKEN_MPS2 = 50.0
 
 #: What a blade reflects with, and how often: a line (Martin and Mulgrew 1990), its tip alone (P), or some points of it.
 #: A model that knows one of them takes the spectrum of another for clutter.
@@ -54,7 +61,7 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
     """
     rotors = ROTORS[kind]
     beta = draws.value("uav_beta_rad")
-    velocity = np.where(draws.chance(0.3), 0.0, draws.value("uav_velocity_mps"))
+    velocity = np.where(draws.chance(0.3), 0.0, draws.either("uav_velocity_mps", "fast_uav_mps", FAST_CHANCE))
     acceleration = draws.acceleration_mps2("uav_acceleration_mps2")
     length = draws.value("main_length_m" if kind == "helicopter" else "blade_length_m")
     least_mps = np.maximum(TWO_PI * length * LEAST_ROTATION_HZ, TIP_OVER_BODY * np.abs(velocity))
@@ -93,11 +100,12 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
     if kind == "helicopter":
         rotor, truth["tail_rotation_hz"] = _tail_rotor(draws, length, lifting[0].motion)
         tail.append(rotor)
-    vibration, phase, rest = (draws.value(law) for law in ("vibration_rad", "phase_rad", "phase_rad"))
+    shaken_m, phase, rest = (draws.value(law) for law in ("vibration_m", "phase_rad", "phase_rad"))
+    shaken_m = np.minimum(shaken_m, SHAKEN_MPS2 / (TWO_PI * rates[:, 0]) ** 2)
     path = {
         "velocity_mps": velocity,
         "acceleration_mps2": acceleration,
-        "vibration_rad": vibration,
+        "vibration_rad": 2 * TWO_PI / radar.wavelength_m * shaken_m,
         "vibration_hz": rates[:, 0],
         "vibration_phase_rad": phase,
     }
@@ -150,17 +158,18 @@ def _tail_rotor(
     """A two-blade tail rotor, geared to the main one, in an upright plane: its aspect is another angle.
 
     Tip speed is held below 200 m/s, as on real airframes. What the main rotor drifts and wanders, it does times the
-    ratio.
+    ratio, whichever way it turns.
     """
     length = main_length_m * draws.value("tail_ratio")
     main_hz = np.abs(main.rotation_hz)
     rate = np.minimum(main_hz * draws.value("gear_ratio"), 200.0 / (TWO_PI * length))
+    ratio = draws.sign() * rate / main_hz
     motion = replace(
         main,
-        rotation_hz=rate * draws.sign(),
+        rotation_hz=main.rotation_hz * ratio,
         phase_rad=draws.value("phase_rad"),
-        drift_hz_per_s=main.drift_hz_per_s * rate / main_hz,
-        wander_hz=main.wander_hz * rate / main_hz,
+        drift_hz_per_s=main.drift_hz_per_s * ratio,
+        wander_hz=main.wander_hz * ratio,
     )
     beta = LAWS["uav_beta_rad"](draws.uniform())
     hub = 0.4 * np.exp(0.5 * draws.normal() + 1j * draws.value("phase_rad"))

@@ -8,7 +8,6 @@ import pytest
 from bladewing.simulate.bird import wingbeat_hz
 from bladewing.simulate.catalogue import AIRFRAMES, BIRDS
 from bladewing.simulate.clutter import _texture
-from bladewing.simulate.insects import INSECT_LAWS
 from bladewing.simulate.laws import LAWS, WIDTH
 from bladewing.simulate.parts import BOUNDS, MOST, bounds_of
 from bladewing.simulate.radar import Radar
@@ -383,15 +382,15 @@ def test_values_that_cannot_be_rendered_are_refused_and_those_at_the_bounds_are_
 
 def extremes(name: str) -> tuple[float, float]:
     """Least and largest value of a parameter that a scene may give; of those that count points, few enough to draw."""
-    (low, high), above = bounds_of(name), (LAWS | INSECT_LAWS)[name].kind == "log"
+    (low, high), above = bounds_of(name), LAWS[name].kind == "log"
     return max(low, 1e-12 if above else -MOST), min(high, 1e4 if name.endswith("_points") else MOST)
 
 
 @pytest.mark.parametrize("kind", ["ground", "rain", "sea", "person", "vehicle", "wind_turbine", "insects"])
 def test_every_parameter_of_a_clutter_is_rendered_at_its_extremes(kind):
-    unknown = clutter_of(kind, **{name: law.low for name, law in (LAWS | INSECT_LAWS).items()}).warnings
+    unknown = clutter_of(kind, **{name: law.low for name, law in LAWS.items()}).warnings
     unused = {line.split(": ")[1].split()[0] for line in unknown}
-    used = sorted((LAWS | INSECT_LAWS).keys() - unused)
+    used = sorted(LAWS.keys() - unused)
     assert len(used) >= 2
     for name in used:
         for value in extremes(name):

@@ -221,7 +221,7 @@ def test_a_vehicles_snr_is_its_bodys_or_its_wheels_at_even_chances():
     wheels_db = target.snr_db(u)
     np.testing.assert_allclose((wheels_db + target.body_db)[of_body], LAWS["clutter_snr_db"](u)[of_body])
     np.testing.assert_allclose(wheels_db[~of_body], LAWS["snr_db"](u)[~of_body])
-    assert 0.5 < np.mean(wheels_db[of_body] < 0) < 0.8  # of most vehicles met so no wheel is seen
+    assert 0.35 < np.mean(wheels_db[of_body] < 0) < 0.8  # of many vehicles met so no wheel is seen
 
 
 def test_steady_and_manoeuvring_bodies_are_as_frequent_in_every_class():

@@ -9,7 +9,6 @@ from bladewing.simulate.catalogue import AIRFRAMES, BIRDS
 from bladewing.simulate.clutter import billingsley, process_velocities, slow_velocities
 from bladewing.simulate.dataset import PURPOSES, TRUTH_UNITS
 from bladewing.simulate.discretes import DISCRETES, LIMBS
-from bladewing.simulate.insects import INSECT_LAWS
 from bladewing.simulate.laws import LAWS
 from bladewing.simulate.plan import WORDS
 from bladewing.simulate.receiver import FAULT_CHANCE
@@ -20,7 +19,6 @@ from bladewing.simulate.uav import ROTORS
 
 RADAR = {"carrier_hz": 9.85e9, "prf_hz": 35e3, "pulses": 3000}
 WAVELENGTH_M = 299_792_458 / 9.85e9
-EVERY = LAWS | INSECT_LAWS
 
 #: A law's name ends in its unit, where it has one.
 SUFFIXES = {
@@ -98,9 +96,9 @@ def test_the_papers_bird_sweeps_what_the_paper_measured():
     assert abs(bird["acceleration_mps2"]) < LAWS["bird_acceleration_mps2"].high
 
 
-@pytest.mark.parametrize("name", list(EVERY))
+@pytest.mark.parametrize("name", list(LAWS))
 def test_a_laws_unit_is_that_of_its_name(name):
-    law = EVERY[name]
+    law = LAWS[name]
     ends = [unit for suffix, unit in SUFFIXES.items() if name.endswith(suffix)]
     assert not ends or law.unit in ends
     assert law.low < law.high
@@ -128,10 +126,10 @@ def test_no_law_passes_another():
     assert LAWS["texture_hz"].high < 1 / 0.1  # slower than speckle
     assert LAWS["full_scale_db"].low < 0 < LAWS["full_scale_db"].high  # some clip
     assert LAWS["unambiguous_mps"].high > LAWS["tip_mps"].high + LAWS["uav_velocity_mps"].high
-    assert INSECT_LAWS["insect_wingbeat_hz"].low > MAX_WINGBEAT_HZ  # no bird beats as fast as an insect
-    assert INSECT_LAWS["insect_depth"].high < 1
+    assert LAWS["insect_wingbeat_hz"].low > MAX_WINGBEAT_HZ  # no bird beats as fast as an insect
+    assert LAWS["insect_depth"].high < 1
     for law in ("phase_rad", "edge_asymmetry", "uav_velocity_mps", "mover_mps", "person_mps", "insect_velocity_mps"):
-        assert EVERY[law].low == -EVERY[law].high, law  # no direction is special
+        assert LAWS[law].low == -LAWS[law].high, law  # no direction is special
 
 
 def test_billingsleys_ground_rests_more_in_less_wind_and_at_lower_carriers():
