@@ -2,11 +2,12 @@
 
 The figures come from `train.json` beside the models: balanced accuracy on the test records, and what a record costs as
 a multiple of its bare FFT, both measured by the run that made the models; of the cascade, whose records do not all cost
-the same, the mean over records as training draws them. Only the FFT is timed here: a ratio to it carries over to
+the same, the mean over records of all classes at one radar. Only the FFT is timed here: a ratio to it carries over to
 another machine within a factor of two, as processors differ in how fast their FFT is beside the rest.
 """
 
 import json
+import math
 import time
 from collections.abc import Mapping, Sequence
 from importlib import resources
@@ -20,6 +21,9 @@ from .errors import BadInput
 #: Names for places on the front: the cheapest, the cheapest that gains at least half of the accuracy between the ends,
 #: the most accurate.
 PLACES = ("fast", "balanced", "best")
+
+#: A time measured again is longer by a twentieth at most.
+_SCATTER = 1.05
 
 #: Name of the two models that are asked one after the other (see `cascade`), in train.json and where one is loaded.
 CASCADE = "cascade"
@@ -114,7 +118,7 @@ def by_budget(budget_us: float, account: Mapping[str, Mapping[str, Any]], fft_us
         name, cost = models[0]
         raise BadInput(
             f"budget {budget_us:g} us: the cheapest model, {name}, takes {cost * fft_us:.0f} us here for a record of "
-            f"{PULSES} pulses in batches of {RECORDS}: allow that much"
+            f"{PULSES} pulses in batches of {RECORDS}: allow {math.ceil(_SCATTER * cost * fft_us)}"
         )
     return affordable[-1]
 

@@ -5,6 +5,7 @@ import json
 import re
 import tarfile
 import warnings
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from .bounds import MOST_TEXT_BYTES, open_zip, require_size, unpacked
 from .errors import BadInput
-from .files import read_bounded
+from .files import read_bounded, settle
 from .samples import positive
 
 if TYPE_CHECKING:
@@ -65,6 +66,8 @@ def find_sigmf(path: Path) -> Path | None:
         raise BadInput(f"{path}: a collection of recordings: name the recordings themselves (.sigmf-meta)")
     if path.name.endswith(_ARCHIVES):
         return path if path.is_file() else None
+    with suppress(OSError):
+        settle(path.parent)  # both files of a pair, or what stood there before
     if path.name.endswith((_META, _DATA)):
         stem, missing = path.with_suffix(""), f"{path}: no such file"
     elif path.is_file() or not path.name:

@@ -166,7 +166,7 @@ def _beside(
 
     An acceleration and the line are taken out first. What lies k bins off bends the line's phase by the second Legendre
     polynomial's part of it, which falls with 1 / k^2: the nearest bins count most, all alike where it is noise. It is
-    no less than the noise of the whole span.
+    no less than the noise of the whole span, nor than what single precision rounds of the line itself.
     """
     pulses = len(samples)
     steady = _steadied(samples, np.asarray(acceleration_mps2), wavelength_m, prf_hz)
@@ -182,7 +182,8 @@ def _beside(
     bins = np.arange(1, BESIDE_BINS + 1)
     power = (np.abs(rest[bins]) ** 2 + np.abs(rest[-bins]) ** 2) / 2
     floor = np.median(np.abs(rest) ** 2) / np.log(2)
-    return float(max(power.mean(), np.average(power, weights=bins**-4.0), floor))
+    rounding = np.sum(np.abs(still) ** 2) * np.finfo(np.float32).eps ** 2
+    return float(max(power.mean(), np.average(power, weights=bins**-4.0), floor, rounding))
 
 
 def _sharpened(

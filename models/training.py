@@ -1,7 +1,7 @@
 """The loop that trains a network: one seed, one schedule, the best state kept."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -260,26 +260,15 @@ def network_scores(net: EvidenceNet, inputs: Inputs, batch: int = 1024) -> NDArr
     ValueError
         Where an input is missing, has another shape, or holds NaN or infinity.
     """
-    return torch.cat(list(_each(net, net, inputs, batch))).numpy()
-
-
-def network_shares(net: EvidenceNet, inputs: Inputs, batch: int = 1024) -> NDArray[np.float32]:
-    """Return the probability that a network gives each of its kinds, uncalibrated, shape (n, kinds).
-
-    The arguments and what is raised are those of `network_scores`.
-    """
-    return torch.cat([scores.softmax(1) for scores in _each(net, net.kind_scores, inputs, batch)]).numpy()
-
-
-def _each(net: EvidenceNet, asked: Callable[..., Tensor], inputs: Inputs, batch: int) -> Iterator[Tensor]:
-    """What a network is asked for, a batch of records at a time."""
     count = net.require(inputs)
     place = next(net.parameters()).device
     net.eval()
-    for start in range(0, count, batch):
-        with torch.inference_mode():
+    scores = []
+    with torch.inference_mode():
+        for start in range(0, count, batch):
             part = (_tensor(inputs[name][start : start + batch]).to(place).float() for name in net.input_shapes)
-            yield asked(*part).cpu()
+            scores.append(net(*part).cpu())
+    return torch.cat(scores).numpy()
 
 
 def _target(labels: NDArray[np.integer], said: Tensor | None, place: torch.device) -> Tensor:

@@ -3,7 +3,7 @@
 Everything heavy is imported when a report is made. ``report.json`` holds every number of the page:
 
 ==================== ==============================================================================================
-``schema_version``   "2"; a page is drawn from this version alone
+``schema_version``   "3"; a page is drawn from this version alone
 ``made``             date, command, quick, seed, seconds
 ``machine``          cpu, cores, system, python, packages (name to version), load
 ``classes``          the order of every table

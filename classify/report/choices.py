@@ -203,7 +203,7 @@ def train_picture(
         seed=config.seed,
         epochs=config.front_epochs,
         batch=_BATCH,
-        augment=VelocityMirror(axes={signal: -1 if len(picture.shape) == 2 else -2}, odd={}),
+        augment=VelocityMirror(axes={signal: 2}, odd={}) if picture.has_velocity else None,
         on_epoch=lambda epoch, epochs, _: on_done(epoch / epochs),
     )
 

@@ -17,6 +17,9 @@ from .timing import Work, quote, ratio, time_in_turns
 
 BATCHES = (1, 64)
 
+#: So many batches take turns at most: each is timed a dozen times, so that a disturbance does not count.
+_MOST_TURNS = 250
+
 
 def time_chain(
     models: Mapping[str, bytes],
@@ -67,12 +70,18 @@ def time_chain(
         most = max(5000, least_rounds)
         taken = time_in_turns(works, seconds=seconds, least_rounds=least_rounds, most_rounds=most, on_share=share)
         bare = taken["fft", "fft"]
+        turns = len(_batches(iq, batch))  # a cascade takes longer over some records than over others
         stages = [
-            {"stage": stage, "name": name, **quote(laps, per=batch), **ratio(laps, bare)}
+            {"stage": stage, "name": name, **quote(laps, per=batch, turns=turns), **ratio(laps, bare, turns=turns)}
             for (stage, name), laps in taken.items()
         ]
         results.append({"batch": batch, "stages": stages})
     return results
+
+
+def _batches(iq: NDArray[np.complex64], batch: int) -> list[NDArray[np.complex64]]:
+    """The records in batches, those that take turns."""
+    return [iq[start : start + batch] for start in range(0, len(iq) - batch + 1, batch)][:_MOST_TURNS]
 
 
 def _works(
@@ -86,7 +95,7 @@ def _works(
 ) -> dict[tuple[str, str], Work]:
     """Build the work of each step, keyed (stage, name); every call takes the next batch of the records."""
     wanted = tuple(dict.fromkeys(name for classifier in classifiers.values() for name in classifier.inputs))
-    batches = [iq[start : start + batch] for start in range(0, iq.shape[0] - batch + 1, batch)]
+    batches = _batches(iq, batch)
     ready = [model_inputs(some, carrier_hz=carrier_hz, prf_hz=prf_hz, names=wanted) for some in batches]
 
     make = partial(model_inputs, carrier_hz=carrier_hz, prf_hz=prf_hz)

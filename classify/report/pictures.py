@@ -49,14 +49,17 @@ class Picture:
     words : str
         What people call it.
     shape : tuple of int
-        Of one record: channels and velocity bins, or channels, velocity bins and frames.
+        Of one record: channels and bins of velocity (or period), or channels, these bins and frames.
     make : callable
         From samples (n, pulses) and their radar to float32 (n, *shape) [dB].
+    has_velocity : bool
+        Whether the axis behind the channels is one of velocity, symmetric about zero.
     """
 
     words: str
     shape: tuple[int, ...]
     make: Maker
+    has_velocity: bool = True
 
 
 def spectrum_picture(iq: NDArray[np.complex64], radar: Radar, *, bins: int = SPECTRUM_BINS) -> NDArray[np.float32]:
@@ -229,5 +232,5 @@ PICTURES: dict[str, Picture] = {
     "herm": Picture("HERM lines", (1, SPECTRUM_BINS), herm_picture),
     **dict(_stft_line(*setting) for setting in STFT_SETTINGS),
     "cadence": Picture("cadence-velocity diagram", (1, IMAGE_BINS, IMAGE_FRAMES), cadence_picture),
-    "cepstrogram": Picture("cepstrogram", (1, IMAGE_BINS, IMAGE_FRAMES), cepstral_picture),
+    "cepstrogram": Picture("cepstrogram", (1, IMAGE_BINS, IMAGE_FRAMES), cepstral_picture, has_velocity=False),
 }

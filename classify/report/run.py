@@ -36,12 +36,13 @@ from ..training_account import ACCOUNT
 from ..training_config import TrainingConfig
 from . import cost, evaluate, scores, stft, storage, trade
 from .card import model_card
-from .choices import classifier_of
+from .choices import FEATURES, classifier_of
 from .examples import OVERLAP, WINDOW, show_examples, show_stfts
 from .families import left_out
 from .front import Given, measure_front
 from .machine import describe_machine
 from .page import SCHEMA_VERSION, draw_page
+from .pictures import PICTURES
 from .series import LADDER
 from .settings import ReportConfig, report_config
 
@@ -231,7 +232,7 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
     Raises
     ------
     BadInput
-        If the folder does not exist or holds no model.
+        If the folder does not exist, or holds no model or one of a name that the report needs.
     """
     if folder is None:
         shipped = resources.files("bladewing.models.pretrained").iterdir()
@@ -241,6 +242,9 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
     else:
         settle(folder)
         found = {path.stem: _content(path) for path in folder.glob("*.onnx")}
+    own = {*PICTURES, FEATURES, CASCADE, f"{DEFAULT_MODEL}-int8"}
+    if taken := sorted(found.keys() & own):
+        raise BadInput(f"{folder}: {taken[0]}.onnx has the name of what the report makes itself: rename the file")
     if not found:
         where = folder if folder is not None else "the installed package"
         raise BadInput(f"{where}: holds no .onnx file: run `bladewing train --out {folder or 'DIR'}` first")
@@ -258,6 +262,14 @@ def training_account(folder: Path | None) -> dict[str, Any] | None:
         return None
     except (ValueError, RecursionError) as error:
         raise BadInput(f"{file}: not JSON: {error}: remove it or train again") from None
+    except OSError as error:
+        raise BadInput(f"{file}: cannot be read: {error.strerror}: remove it or train again") from None
+    try:
+        _training(found)
+        _cascade({}, found)
+        found.get("models", {}).get("", {})
+    except (KeyError, TypeError, AttributeError) as error:
+        raise BadInput(f"{file}: not the account of a training ({error}): remove it or train again") from None
     return found
 
 
@@ -313,7 +325,7 @@ def run_report(
         Classifier(content, source=name)  # what cannot be used is told before anything is measured
     out = result_folder(out)
     stability = worst_of_each(out)
-    parts = Parts(out / PARTS, _of(settings, found))
+    parts = Parts(out / PARTS, _of(settings, found, account))
     started, clock, resumed = datetime.now(UTC), time.perf_counter(), parts.begun
     with Progress(visible=progress) as bars:
         body = measure(found, settings, parts=parts, progress=bars, account=account)
@@ -337,9 +349,11 @@ def run_report(
     return report
 
 
-def _of(settings: ReportConfig, models: Mapping[str, bytes]) -> dict[str, Any]:
+def _of(settings: ReportConfig, models: Mapping[str, bytes], account: Mapping[str, Any] | None) -> dict[str, Any]:
     """All that the results depend on."""
     return {
+        "machine": {name: value for name, value in describe_machine().items() if name != "load"},
+        "cascade": (account or {}).get(CASCADE),
         "schema": SCHEMA_VERSION,
         "version": metadata.version("bladewing"),
         "features": schema_hash(),

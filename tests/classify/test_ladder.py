@@ -40,6 +40,14 @@ def test_a_budget_that_buys_nothing_names_the_cheapest():
         by_budget(9.9, LADDER, fft_us=2.0)
 
 
+@pytest.mark.parametrize("fft_us", [2.07, 2.0, 6.04])
+def test_what_a_refused_budget_asks_for_buys_the_cheapest_even_if_it_is_a_little_slower_then(fft_us):
+    with pytest.raises(BadInput) as said:
+        by_budget(0.1, LADDER, fft_us=fft_us)
+    allowed = float(str(said.value).rsplit(maxsplit=1)[-1])
+    assert by_budget(allowed, LADDER, fft_us=1.04 * fft_us) == "tiny"
+
+
 def test_models_without_costs_are_refused_by_one_line():
     with pytest.raises(BadInput, match="holds no 'cost_ffts': name a model"):
         by_place("fast", {"old": {"test": {"balanced_accuracy": 0.5}}})

@@ -56,6 +56,17 @@ def test_a_line_stands_at_its_velocity_in_every_picture(name: str, velocity_mps:
     assert best == pytest.approx(velocity_mps, abs=10.0)
 
 
+@pytest.mark.parametrize("name", list(pictures.PICTURES))
+def test_what_recedes_is_the_mirror_of_what_approaches_in_a_picture_of_velocities_alone(name: str) -> None:
+    picture, radar = pictures.PICTURES[name], Radar(9.85e9, 25e3, 2000)
+    tone = 10 * np.exp(-4j * np.pi * 45.0 / radar.wavelength_m * radar.times_s)
+    iq = (tone + noise(1, radar.pulses)).astype(np.complex64)
+    one, other = picture.make(iq, radar), picture.make(iq.conj(), radar)
+    away = np.abs(other - one).mean(), np.abs(other - np.flip(one, 2)).mean()
+    assert picture.has_velocity == (away[1] < away[0])
+    assert min(away) < 0.3 * max(away)
+
+
 def test_a_swinging_line_stands_at_its_velocity_and_cadence() -> None:
     from bladewing.features.axis import axis_edges_mps
 

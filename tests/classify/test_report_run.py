@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bladewing.classify import BadInput
-from bladewing.classify.report import run, run_report, scores
+from bladewing.classify import BadInput, Classifier
+from bladewing.classify.report import cost, run, run_report, scores
 from bladewing.classify.report.page import draw_page
+from bladewing.classify.report.timing import Laps
 from bladewing.classify.stability.cell import Cell
 from bladewing.features.schema import INPUT_SHAPES
 
@@ -248,6 +249,53 @@ def test_no_models_is_one_clear_line(tmp_path: Path) -> None:
         run_report(tmp_path, models=tmp_path / "missing", quick=True, progress=False)
     with pytest.raises(BadInput, match="seed is -1"):
         run_report(tmp_path, models=None, quick=True, seed=-1, progress=False)
+
+
+@pytest.mark.parametrize("name", ["features", "herm", "cascade"])
+def test_a_model_of_a_name_that_the_report_needs_is_refused(tiny_models: Path, tmp_path: Path, name: str) -> None:
+    (tmp_path / f"{name}.onnx").write_bytes((tiny_models / "spectrum-cnn.onnx").read_bytes())
+    with pytest.raises(BadInput, match=rf"{name}\.onnx has the name of what the report makes itself: rename the file"):
+        run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
+
+
+@pytest.mark.parametrize("text", ["[]", "3", "{}", '{"settings": {}}', '{"cascade": 3}', "{"])
+def test_a_train_json_of_something_else_is_told_before_anything_is_measured(
+    tiny_models: Path, tmp_path: Path, text: str
+) -> None:
+    (tmp_path / "spectrum-cnn.onnx").write_bytes((tiny_models / "spectrum-cnn.onnx").read_bytes())
+    (tmp_path / "train.json").write_text(text)
+    with pytest.raises(BadInput, match=r"train\.json: not .*: remove it or train again"):
+        run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
+
+
+def test_what_was_measured_is_kept_for_the_same_cascade_on_the_same_machine_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    settings = run.report_config(None, seed=1, quick=True)
+    account = {"cascade": {"stages": ["a", "b"]}}
+    one = run._of(settings, {"a": b"x"}, account)
+    assert one == run._of(settings, {"a": b"x"}, account)
+    assert one != run._of(settings, {"a": b"x"}, {"cascade": {"stages": ["b", "a"]}})
+    assert one != run._of(settings, {"a": b"x"}, None)
+    machine = run.describe_machine()
+    for change, same in (({"load": 99.0}, True), ({"cpu": "another"}, False), ({"packages": {}}, False)):
+        monkeypatch.setattr(run, "describe_machine", lambda change=change: machine | change)
+        assert (one == run._of(settings, {"a": b"x"}, account)) == same, change
+
+
+def test_a_chain_whose_records_do_not_all_cost_the_same_costs_their_mean(monkeypatch: pytest.MonkeyPatch) -> None:
+    def timed(works: dict[tuple[str, str], Any], **_: object) -> dict[tuple[str, str], Laps]:
+        laps = [3e-4 if number % 4 == 3 else 1e-4 for number in range(64)]  # one in four asks the second model as well
+        return {name: Laps(laps if name[0] == "chain" else [1e-5] * 64, [1e-3] * 64) for name in works}
+
+    monkeypatch.setattr(cost, "time_in_turns", timed)
+    classifier = Classifier.load("fast")
+    radar = {"carrier_hz": 9.85e9, "prf_hz": 25e3}
+    noise = np.random.default_rng(0).standard_normal((64, 256), np.float32).view(np.complex64)
+    found = cost.time_chain({}, {"fast": classifier}, noise, **radar, seconds=1.0, least_rounds=1)
+    (chain,) = (row for row in found[0]["stages"] if row["stage"] == "chain")
+    assert chain["median_us"] == pytest.approx(150)
+    assert chain["ratio_to_fft"] == pytest.approx(15)
 
 
 def test_a_foreign_model_is_refused_before_anything_is_measured(tmp_path: Path) -> None:

@@ -175,6 +175,20 @@ def test_half_a_recording_says_which_half_is_missing(sigmf_pair, gone, asked):
         load_recording(meta.with_suffix(asked))
 
 
+@pytest.mark.parametrize("moved", [[], [".sigmf-data"], [".sigmf-meta"]])
+def test_a_pair_whose_writer_was_killed_once_it_had_decided_is_read_whole(sigmf_pair, tmp_path, moved):
+    old, new = sigmf_pair(), sigmf_pair("new", np.ones(300, np.complex64))
+    renames = {}
+    for suffix in (".sigmf-data", ".sigmf-meta"):
+        beside = tmp_path / f".bladewing-{suffix[7:]}.new"
+        new.with_suffix(suffix).rename(beside)
+        renames[beside.name] = f"rec{suffix}"
+    for suffix in moved:
+        (tmp_path / f".bladewing-{suffix[7:]}.new").rename(old.with_suffix(suffix))
+    (tmp_path / ".bladewing-pending.json").write_text(json.dumps(renames))
+    np.testing.assert_array_equal(load_recording(old).iq, np.ones(300))
+
+
 def test_a_collection_is_refused(tmp_path):
     with pytest.raises(BadInput, match="collection of recordings: name the recordings themselves"):
         load_recording(tmp_path / "all.sigmf-collection")

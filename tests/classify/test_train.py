@@ -383,6 +383,21 @@ def test_a_folder_that_holds_models_of_another_training_is_refused(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["image-cnn.onnx", "one.toml"]
 
 
+def test_a_run_that_another_one_overtook_writes_nothing_and_keeps_what_it_did(tmp_path, monkeypatch):
+    config, costs = tmp_path / "one.toml", train.add_costs
+    config.write_text('records = 600\nmodels = ["features-linear"]\n')
+
+    def overtaken(*arguments):
+        (tmp_path / "image-cnn.onnx").write_bytes(b"of another run")
+        return costs(*arguments)
+
+    monkeypatch.setattr(train, "add_costs", overtaken)
+    with pytest.raises(BadInput, match=r"holds image-cnn\.onnx of another training"):
+        run_training(tmp_path, config=config, progress=False)
+    assert not list(tmp_path.glob("features-linear*"))
+    assert list((tmp_path / train.PARTS).iterdir())
+
+
 def test_a_file_in_the_place_of_the_folder_is_named(tmp_path):
     (tmp_path / "out").write_text("")
     with pytest.raises(BadInput, match="cannot be made a folder"):

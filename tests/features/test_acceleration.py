@@ -113,3 +113,14 @@ def test_what_is_not_finite_and_no_radar_are_refused(pulses, wrong):
                 find(iq, **radar)
         with pytest.raises(ValueError, match="not finite"):
             find(np.where(np.arange(pulses) == 3, wrong, iq).astype(np.complex64), **RADAR)
+
+
+@pytest.mark.parametrize("value", [3 - 4j, (12 - 7j) / 32768, 1e-20, 1e20])
+def test_a_constant_has_a_body_at_rest_and_no_acceleration(value):
+    samples = np.full((2, 800), value, np.complex64)
+    samples[1] += np.complex64(abs(value) / 100) * white(np.random.default_rng(0), 800).astype(np.complex64)
+    found, std, smeared = body_acceleration(samples, carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
+    assert np.isfinite(std).all()
+    assert (std > 0).all()
+    np.testing.assert_allclose(found, 0, atol=1e-2)
+    assert not smeared.any()
