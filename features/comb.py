@@ -27,6 +27,9 @@ MAINS_HZ = (50.0, 60.0)
 MAINS_MULTIPLES = (1, 2, 3, 4, 6)
 MAINS_SHARE = 0.0055
 
+#: Where fewer bins than this lie between multiples of the mains, any centre lies near one: only one at rest tells then.
+MAINS_BINS = 4.0
+
 #: Beside a static background a comb of less evidence [nats] is not believed at such a spacing, wherever its centre is:
 #: supplies click.
 MAINS_SCORE = 70.0
@@ -131,7 +134,8 @@ def of_mains(fit: CombFit, data: Periodogram, score: float, per_turn: int = 1) -
         multiple = round(spacing * data.prf_hz / mains_hz)
         if multiple in MAINS_MULTIPLES and abs(spacing * data.prf_hz / (multiple * mains_hz) - 1) < MAINS_SHARE:
             base = spacing / multiple
-            off = abs(fit.centre - base * round(fit.centre / base)) * data.pulses
+            nearest = base * round(fit.centre / base) if base * data.pulses >= MAINS_BINS else 0.0
+            off = abs(fit.centre - nearest) * data.pulses
             return (data.rest_half > 0 and score < MAINS_SCORE) or off < max(0.2, 3 * fit.centre_std * data.pulses)
     return False
 

@@ -115,7 +115,8 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
         over_db = max(level_db - others_db, 0.0)
         nats = STRONG_LINE * min(over_db / STRONG_OVER_DB, 1.0)
         nats += STRONG_LINE_DB * max(over_db - STRONG_OVER_DB, 0.0)
-        if abs(centre) > data.rest_half:
+        # a line at rest that is no background may be an offset of the receiver all the same
+        if abs(centre) > data.rest_half and abs(centre) * data.pulses >= AT_REST_BINS:
             moving = nats
         elif hides:
             reach = int(data.rest_half / found.spacing) + 1

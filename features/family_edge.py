@@ -75,7 +75,12 @@ def _orders(spacing: float, span: float) -> NDArray[np.intp]:
 
 
 def edge_of_lines(
-    data: Periodogram, fits: list[CombFit], rest: NDArray[np.complex128], per_turn: int, blades: int | None
+    data: Periodogram,
+    fits: list[CombFit],
+    rest: NDArray[np.complex128],
+    per_turn: int,
+    blades: int | None,
+    tail: float | None = None,
 ) -> tuple[float, float]:
     """Edge of the line family by the fitted lines, both sides together.
 
@@ -94,6 +99,8 @@ def edge_of_lines(
         Strong lines are this many spacings of a fit apart.
     blades : int, optional
         Of a rotor.
+    tail : float, optional
+        Spacing of another comb about the same centre [cycles a sample], whose outer lines may not have been fitted.
 
     Returns
     -------
@@ -111,6 +118,9 @@ def edge_of_lines(
     fitted = np.stack([_amplitudes_at(fit, per_turn * sides) for fit in fits])
     left = LineSpace(rest).at(frequency.ravel())[0].reshape(frequency.shape)
     usable = data.usable(frequency) & ~_covered(spacings, order, data.pulses)[:, None]
+    if tail is not None:
+        away = order * fastest / tail
+        usable &= np.abs(away - np.rint(away)) * tail * data.pulses >= COVERED_BINS
     power = np.abs(left + fitted) ** 2 * data.pulses
     usable &= ~_foreign(np.where(usable, power, 0.0).sum(axis=0), usable.sum(axis=0))
     total = np.where(usable, power, 0.0).sum(axis=(0, 1))
@@ -292,12 +302,14 @@ def edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | Non
     half = int(half_bins * size / pulses)
     middle = np.rint((centre + np.array([[-1], [1]]) * order * nominal) * size).astype(np.intp)
     frequency = (middle[..., None] + np.arange(-half, half + 1)) / size
-    usable = data.usable(frequency)
+    usable = data.usable(frequency) & data.in_band(frequency)
     sides = np.where(usable, data.at(frequency) * data.level_at(frequency), 0.0).sum(axis=-1) * pulses / size
     numbers = usable.sum(axis=-1) * pulses / size
     own = ~_foreign(sides, numbers)
     total, number = (sides * own).sum(axis=0), (numbers * own).sum(axis=0)
     seen = number > 2
+    if not seen.any():
+        return 0.0, np.inf
     count = number[seen]
     # what lies between the lines lifts the local level, and lines that fill most of the span the floor; the lowest
     # means of so many exponentials are those of Wilson and Hilferty's cube

@@ -280,6 +280,8 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     gear, rotors, out["gear_reason"] = find_gear(data, comb, min(edge, span))
     if gear is not None:
         data, comb = gear.alone, gear.first
+        other = gear.second.spacing
+        edge, edge_std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades, other)
         out["chopping_hz"], out["chopping_hz_std"] = comb.chopping * prf_hz, comb.chopping_std * prf_hz
         for name, (rate, std) in zip(("main", "tail"), gear.rates, strict=True):
             out[f"{name}_chopping_hz"], out[f"{name}_chopping_hz_std"] = rate * prf_hz, std * prf_hz

@@ -55,6 +55,9 @@ LEAST_LEVEL = 0.8
 TAPER_FROM_DB = 23.0
 TAPER_BETA = 3.0
 
+#: A receiver's filter stops what lies where the local level is below this share of the floor.
+STOP_SHARE = 0.3
+
 #: A click: one sample so many times over the noise, and over both beside it; fewer in a record than a rotor's flashes.
 #: A flash is as long as the rotor's band is narrow: its samples beside are as strong.
 CLICK_POWER, CLICK_OVER_BESIDE, MOST_CLICKS = 25.0, 4.0, 5
@@ -164,6 +167,10 @@ class Periodogram:
             away = frequency - centre
             ok &= np.abs(away - np.rint(away)) > half + 1.5 / self.pulses
         return ok
+
+    def in_band(self, frequency: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """True where the receiver lets noise through: past its filter there is less than anywhere within."""
+        return self.level_at(frequency) > STOP_SHARE
 
     def removed(self, frequency: NDArray[np.floating]) -> NDArray[np.bool_]:
         """True where a line at this frequency [cycles a sample] was taken out."""

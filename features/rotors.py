@@ -192,7 +192,8 @@ def _power_about(rest: Periodogram, centre: float) -> _About:
     """Of each bin of what is left: how far from a centre it is [cycles a sample], its power, whether it can be seen."""
     frequency = fft.fftfreq(rest.pulses)
     away = np.abs(frequency - centre)
-    return np.abs(away - np.rint(away)), squared(fft.fft(rest.samples)) / rest.pulses, rest.usable(frequency)
+    seen = rest.usable(frequency) & rest.in_band(frequency)
+    return np.abs(away - np.rint(away)), squared(fft.fft(rest.samples)) / rest.pulses, seen
 
 
 def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[float, bool]:

@@ -50,10 +50,6 @@ MOST_BODY_DB, LEAST_SWING = 32.0, 0.5
 #: faster than this [m/s], and the feet about it at most so many times as fast.
 GAIT_HZ, GAIT_MPS, LIMB_SPEEDS = 4.6, 3.0, 2.5
 
-#: A vehicle's wheels are this much weaker than its body [dB], roll so far a turn [m], and their rims move about the
-#: body so many times as fast as it moves itself: once, but for parts that show unlike speeds near the road.
-WHEEL_BODY_DB, WHEEL_TURN_M, RIM_SPEEDS = 6.0, (1.2, 4.5), (0.4, 1.3)
-
 
 @dataclass(frozen=True)
 class Wingbeat:
@@ -105,11 +101,6 @@ class _Motion:
     def reach_mps(self) -> float:
         """Half the range of velocities [m/s]."""
         return max((self.far_mps - self.near_mps) / 2, 0.0)
-
-    @property
-    def centre_mps(self) -> float:
-        """Its middle, without its sign [m/s]."""
-        return abs(self.far_mps + self.near_mps) / 2
 
 
 def wingbeat(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float) -> Wingbeat:
@@ -227,8 +218,4 @@ def _not_wings(found: Repetition, body_mps: float, motion: _Motion, far: LevelSp
         return f"what repeats at {rate:.1f} Hz echoes all the time, as limbs and wheels do, and not in flashes"
     if rate < GAIT_HZ and speed < GAIT_MPS and reach < LIMB_SPEEDS * speed + 1:
         return f"what repeats at {rate:.1f} Hz may be a walker's gait"
-    centre = max(motion.centre_mps, 0.1)
-    rolls = WHEEL_TURN_M[0] < centre / rate < WHEEL_TURN_M[1] and RIM_SPEEDS[0] < reach / centre < RIM_SPEEDS[1]
-    if rolls and motion.body_db > WHEEL_BODY_DB:
-        return f"what repeats at {rate:.1f} Hz may be a wheel's turn"
     return ""

@@ -84,7 +84,7 @@ LAWS: dict[str, Law] = {
     "uav_velocity_mps": Law("uniform", -30.0, 30.0, "m/s", "small UAVs"),
     "fast_uav_mps": Law("uniform", -65.0, 65.0, "m/s", "racing drones and fast fixed wings"),
     "uav_acceleration_mps2": Law("uniform", -4.0, 4.0, "m/s^2", "small UAVs"),
-    "vibration_m": Law("log", 1e-6, 3e-4, "m", "airframe shaken at the rotor rate, at most as `uav.SHAKEN_MPS2` lets it"),
+    "vibration_m": Law("log", 1e-6, 3e-4, "m", "airframe shaken at the rotor rate, within `uav.SHAKEN_MPS2`"),
     # birds
     "bird_mass_kg": Law("log", 0.008, 10.0, "kg", "goldcrest to swan"),
     "wingbeat_scatter": Law("log", 0.75, 1.33, "1", "about Pennycuick 1996"),

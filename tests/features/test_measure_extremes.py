@@ -6,7 +6,7 @@ from bladewing.features import measure, rotors
 from bladewing.features.comb import LEAST_REACH_MPS
 from bladewing.simulate import Radar, draw_records
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors_by_chance, white
 from .signals import rotors as blades
 
 RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
@@ -71,3 +71,15 @@ def test_rotors_of_more_lines_than_are_fitted_together_are_not_told_apart(monkey
     monkeypatch.setattr(rotors, "MOST_LINES", 40)
     found = measure(iq, **RADAR)
     assert (found.rotor_count, found.rotors_resolved) == (1, False)
+
+
+@pytest.mark.parametrize(("dwell_s", "chopping_hz"), [(0.01, 300.5), (0.02, 240.5), (0.02, 200.5)])
+def test_a_short_dwell_does_not_tell_a_moving_rotor_from_hum_and_so_does_not_refuse_it(dwell_s, chopping_hz):
+    """Any place is near a multiple of 50 or 60 Hz where these lie within a few bins of one another."""
+    times_s = np.arange(round(dwell_s * PRF_HZ)) / PRF_HZ
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        blades = rotors_by_chance(rng, [chopping_hz / 2], times_s, wavelength_m=WAVELENGTH_M, length_m=0.1)
+        iq = (blades + 3) * np.exp(-4j * np.pi * rng.uniform(3, 15) * times_s / WAVELENGTH_M)
+        found = measure(10 * iq + white(rng, len(times_s)), carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
+        assert found.chopping_hz == pytest.approx(chopping_hz, rel=0.01)

@@ -73,3 +73,15 @@ def test_a_side_is_empty_only_if_all_of_it_is(bins):
         power[::2, bins // 4] = 1.0  # one line is enough to show that it is not
         assert half_empty(power).tolist() == [False, True] * 3
         assert half_empty(power[1]) == half_empty(power)[1]
+
+
+@pytest.mark.parametrize("passed", [0.75, 0.8, 0.9])
+def test_past_a_receivers_filter_there_is_no_noise_to_compare_with(passed):
+    """Decimation leaves the ends of the span empty: the noise within stood out, and tips were four times too fast."""
+    iq, rng = [], np.random.default_rng(2)
+    for _ in range(4):
+        echo = rotors([rng.uniform(55, 60)], velocity_mps=3.3) * 3 + white(rng, PULSES)
+        iq.append(np.fft.ifft(np.fft.fft(echo) * (np.abs(np.fft.fftfreq(PULSES)) < passed / 2)))
+    found = measure(np.array(iq), **RADAR, blades=2, beta_rad=0.0)
+    assert found.rotors_resolved.all()
+    np.testing.assert_allclose(found.blade_length_m, 0.15, rtol=0.02)

@@ -109,3 +109,10 @@ def test_wingbeat_batch_gain_and_scale():
     for largest in (1e-40, 3.3e38):
         extreme = wingbeat((iq * (largest / abs(iq).max())).astype(np.complex64), **LONG)
         assert extreme.wingbeat_hz == pytest.approx(float(alone.wingbeat_hz), rel=1e-2)
+
+
+@pytest.mark.parametrize(("heading_deg", "velocity_mps"), [(0.0, 6.0), (20.0, 8.0), (40.0, 6.0), (0.0, 12.0)])
+def test_a_gull_flies_as_far_a_beat_as_a_wheel_rolls_a_turn_but_flashes(heading_deg, velocity_mps):
+    iq, truth = bird("herring_gull", 10.0, heading_deg=heading_deg, velocity_mps=velocity_mps)
+    found = wingbeat(iq, **LONG)
+    assert found.wingbeat_hz == pytest.approx(truth["wingbeat_hz"], abs=0.3), found.reason
