@@ -166,10 +166,10 @@ def _tail_rotor(
     ratio = draws.sign() * rate / main_hz
     motion = replace(
         main,
-        rotation_hz=main.rotation_hz * ratio,
+        rotation_hz=np.multiply(main.rotation_hz, ratio),
         phase_rad=draws.value("phase_rad"),
-        drift_hz_per_s=main.drift_hz_per_s * ratio,
-        wander_hz=main.wander_hz * ratio,
+        drift_hz_per_s=np.multiply(main.drift_hz_per_s, ratio),
+        wander_hz=np.multiply(main.wander_hz, ratio),
     )
     beta = LAWS["uav_beta_rad"](draws.uniform())
     hub = 0.4 * np.exp(0.5 * draws.normal() + 1j * draws.value("phase_rad"))
