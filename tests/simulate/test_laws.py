@@ -1,13 +1,15 @@
 """What records are drawn from follows the table of laws, for any seed."""
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from bladewing.simulate import Radar, draw_records
+from bladewing.simulate import Radar, dataset, draw_records, uav
 from bladewing.simulate.bird import wing_size, wingbeat_hz
-from bladewing.simulate.dataset import QUIET
-from bladewing.simulate.laws import LAWS, Draws
+from bladewing.simulate.clutter import draw_clutter
+from bladewing.simulate.dataset import QUIET, WEATHER
+from bladewing.simulate.laws import LAWS, WIDTH, Draws
 from bladewing.simulate.receiver import FAULT_CHANCE, FAULTLESS_CHANCE, Receiver
 from bladewing.simulate.uav import LEAST_ROTATION_HZ, _motion, _tail_rotor
 from hypothesis import given, settings
@@ -130,3 +132,44 @@ def test_a_tail_rotor_drifts_and_wanders_as_its_gear_makes_it():
     times_s = np.linspace(0, 2, 7)
     turned = [np.abs(m.angle_rad(times_s) - m.angle_rad(np.zeros(1))) for m in (rotor.motion, main)]
     np.testing.assert_allclose(turned[0], ratio[:, None] * turned[1], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("pulses", [2.0, 3.0])
+def test_a_canceller_is_a_difference_of_pulses_once_or_twice_but_for_its_delay(pulses):
+    radar, turns = Radar(9.85e9, 1e4, 400), np.array([0.0, 0.05, 0.25, -0.4, 0.5])
+    drawn = Receiver(Draws(np.random.default_rng(0).random((len(turns), 200))))
+    drawn.on = {name: np.full(len(turns), name == "canceller") for name in drawn.on}
+    drawn.canceller_pulses[:], drawn.gain_db[:] = pulses, 0.0
+    tones = np.exp(2j * np.pi * turns[:, None] * np.arange(radar.pulses)).astype(np.complex64)
+    power = np.mean(np.abs(drawn.receive(tones, np.zeros_like(tones), radar, lambda _: None)) ** 2, axis=1)
+    differences = np.diff(tones, n=int(pulses) - 1, axis=1)
+    np.testing.assert_allclose(power, np.mean(np.abs(differences) ** 2, axis=1), rtol=1e-4, atol=1e-6)
+
+
+def test_rain_and_the_sea_stand_behind_targets_as_often_as_they_are_to(monkeypatch):
+    radar, count = Radar(9.85e9, 5e3, 32), 3000
+    drawn = Counter()
+
+    def counted(draws, radar, kind, normals):
+        drawn[kind] += len(draws)
+        return draw_clutter(draws, radar, kind, normals)
+
+    monkeypatch.setattr(dataset, "draw_clutter", counted)
+    behind = draw_records(radar, count, 4, kind="quadcopter").truth["background_db"]
+    share = 0.6 * WEATHER / 2
+    for kind in ("rain", "sea"):
+        assert abs(drawn[kind] - count * share) < 4.5 * np.sqrt(count * share * (1 - share))
+    assert drawn.keys() == {"rain", "sea"}
+    assert abs(np.isfinite(behind).sum() - 0.6 * count) < 4.5 * np.sqrt(0.24 * count)
+
+
+@pytest.mark.parametrize("carrier_hz", [2e9, 94e9])
+def test_no_airframe_is_shaken_harder_than_it_could_fly(monkeypatch, carrier_hz):
+    shaken = {}
+    monkeypatch.setattr(uav, "body_echo", lambda *_, **path: shaken.update(path) or np.zeros((400, 8), np.complex64))
+    uav.draw_uav(Draws(np.random.default_rng(1).random((400, WIDTH))), Radar(carrier_hz, 5e3, 8), "quadcopter")
+    metres = shaken["vibration_rad"] * 299_792_458.0 / carrier_hz / (4 * np.pi)
+    pull_mps2 = metres * (2 * np.pi * shaken["vibration_hz"]) ** 2
+    assert pull_mps2.max() <= uav.SHAKEN_MPS2 * 1.0001
+    assert (pull_mps2 > 0.99 * uav.SHAKEN_MPS2).mean() > 0.05  # the bound is met
+    assert metres.min() >= LAWS["vibration_m"].low * 0.9999
