@@ -22,6 +22,14 @@ MAX_ROTORS = 8
 #: where rotors are not alike. The latter are sought by their inner orders, which part such rates already.
 RATE_SPREAD, FURTHEST_SPREAD, INNER_ORDERS = 0.05, (-0.25, 0.33), 10
 
+#: A rotor that turns slower still has lines at twice its rate, which may lie among these: those at halves of that, out
+#: to so many orders, which other rotors' lines have not filled yet, have this share of their power and so many times
+#: that of noise, all but so large a share of them.
+HALF_ORDERS, HALF_SHARE, HALF_POWER, HALF_QUANTILE = 6, 0.05, 4.0, 0.3
+
+#: What lies within so many bins of a line that is known says nothing of these; so many must be left.
+NEAR_BINS, LEAST_BETWEEN = 2.0, 4
+
 #: The lines of one of these reach this share of what the others' do: else they are what rotors not told apart leave.
 APART_REACH = 0.5
 
@@ -179,6 +187,20 @@ def _strongest_apart(
     return _strongest(data, centre, rate + near, furthest, data.contrast)
 
 
+def _is_twice(rest: Periodogram, centre: float, rate: float, fits: list[CombFit]) -> bool:
+    """True where a comb has its inner lines at halves of its rate too, which then is twice a rotor's."""
+    known = np.concatenate([fit.frequencies for fit in fits])
+
+    def low(orders: NDArray[np.floating]) -> float:
+        places = centre + rate * orders
+        near = np.abs(places[:, None] - known).min(axis=1) * rest.pulses
+        places = places[rest.usable(places) & (near > NEAR_BINS)]
+        return float(np.quantile(rest.at(places), HALF_QUANTILE)) if len(places) >= LEAST_BETWEEN else 0.0
+
+    order = np.arange(-HALF_ORDERS, HALF_ORDERS)
+    return low(order + 0.5) > max(HALF_SHARE * low(order), HALF_POWER)
+
+
 def _holds_another(fit: CombFit, pulses: int) -> bool:
     """True where only every so many-th line of a comb is there: a tail rotor's, whose rate is that multiple."""
     return strong_multiple(fit.orders, 1 + pulses * np.abs(fit.amplitudes) ** 2, MOST_GEAR, GEAR_FACTOR) > 1
@@ -287,6 +309,8 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
             known = max(r * fit.spacing for r, fit in zip(reaches, fits, strict=True))
             if apart[0] * apart[1] > APART_REACH * known and apart[2] > evidence:
                 (rate, far, evidence), is_apart = apart, True
+                if _is_twice(rest, centre, rate, fits):
+                    rate, far = rate / 2, 2 * far
         first = first or evidence
         if evidence < max(LEAST_EVIDENCE, LEAST_SHARE * first):
             break

@@ -6,7 +6,7 @@ from bladewing.features import measure
 from bladewing.features.periodogram import prepare
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, rotors_by_chance, tone, white
 
 RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 
@@ -114,3 +114,20 @@ def test_rotors_just_told_apart_have_their_tips(apart_hz):
         tip_mps = 2 * np.pi * 0.15 * rates_hz[1]
         assert abs(found.tip_speed_mps - tip_mps) < max(0.02 * tip_mps, 3 * found.tip_speed_mps_std)
         assert found.tip_speed_mps_std < 0.05 * tip_mps
+
+
+@pytest.mark.parametrize("snr_db", [5.0, 12.0])
+def test_a_much_slower_rotor_is_not_one_of_twice_its_rate(snr_db):
+    """Every line of a comb of twice its rate is there; 240 Hz was said of 120, a thousandth stated."""
+    times_s = np.arange(PULSES) / PRF_HZ
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        parts = [(93.0, 0.15), (75.0, 0.15), (60.0, 0.18)]
+        one = {"wavelength_m": WAVELENGTH_M}
+        echo = sum(rotors_by_chance(rng, [rate_hz], times_s, length_m=length_m, **one) for rate_hz, length_m in parts)
+        moved = np.exp(-4j * np.pi * rng.uniform(-15, 15) * times_s / WAVELENGTH_M)
+        iq = (echo + 3) * moved * 10 ** (snr_db / 20) + white(rng, PULSES)
+        found = measure(iq, carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
+        given_hz = found.rotor_rates_hz[np.isfinite(found.rotor_rates_hz)]
+        assert np.abs(given_hz - np.array([[120], [150], [186]])).min(axis=1).max() < 0.1
+        assert np.abs(given_hz - 240).min() > 10
