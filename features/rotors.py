@@ -197,7 +197,7 @@ def _is_twice(rest: Periodogram, centre: float, rate: float, fits: list[CombFit]
         places = places[rest.usable(places) & (near > NEAR_BINS)]
         return float(np.quantile(rest.at(places), HALF_QUANTILE)) if len(places) >= LEAST_BETWEEN else 0.0
 
-    order = np.arange(-HALF_ORDERS, HALF_ORDERS)
+    order = np.arange(-HALF_ORDERS, HALF_ORDERS, dtype=float)
     return low(order + 0.5) > max(HALF_SHARE * low(order), HALF_POWER)
 
 
