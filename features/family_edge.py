@@ -117,10 +117,8 @@ def edge_of_lines(
     frequency = np.asarray(centres[:, None, None] + spacings[:, None, None] * sides, np.float64)
     fitted = np.stack([_amplitudes_at(fit, per_turn * sides) for fit in fits])
     left = LineSpace(rest).at(frequency.ravel())[0].reshape(frequency.shape)
-    usable = data.usable(frequency) & ~_covered(spacings, order, data.pulses)[:, None]
-    if tail is not None:
-        away = order * fastest / tail
-        usable &= np.abs(away - np.rint(away)) * tail * data.pulses >= COVERED_BINS
+    every = spacings if tail is None else np.append(spacings, tail)
+    usable = data.usable(frequency) & ~_covered(every, order, data.pulses)[: len(fits), None]
     power = np.abs(left + fitted) ** 2 * data.pulses
     usable &= ~_foreign(np.where(usable, power, 0.0).sum(axis=0), usable.sum(axis=0))
     total = np.where(usable, power, 0.0).sum(axis=(0, 1))

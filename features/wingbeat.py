@@ -84,23 +84,17 @@ class _Motion:
 
     Parameters
     ----------
-    near_mps, far_mps : float
-        Range of its radial velocities [m/s], the cells' own width taken off; empty where it lies within the body's.
+    reach_mps : float
+        Half the range of its radial velocities [m/s], the cells' own width taken off; 0 within the body's.
     body_db : float
         The body's power over it [dB].
     swing : float
         How far its power, all velocities together, swings over a beat: rms over mean times the root of 2 [1].
     """
 
-    near_mps: float
-    far_mps: float
+    reach_mps: float
     body_db: float
     swing: float
-
-    @property
-    def reach_mps(self) -> float:
-        """Half the range of velocities [m/s]."""
-        return max((self.far_mps - self.near_mps) / 2, 0.0)
 
 
 def wingbeat(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float) -> Wingbeat:
@@ -183,8 +177,8 @@ def _motion(
     inner = np.abs(velocity_mps - body_mps) <= lobe
     cells = found.cells & ~inner
     if not cells.any():
-        return _Motion(body_mps, body_mps, np.inf, 0.0)
-    seen = velocity_mps[found.cells]
+        return _Motion(0.0, np.inf, 0.0)
+    reach = max(float(np.ptp(velocity_mps[found.cells])) / 2 - lobe, 0.0)
     over = power[:, cells].sum(axis=1, dtype=np.float64) - floor * cells.sum()
     body = power[:, inner].sum(axis=1).mean() - floor * inner.sum()
     weight = np.hanning(len(over) + 2)[1:-1]
@@ -192,9 +186,7 @@ def _motion(
     swings = np.exp(-1j * np.arange(1, HARMONICS + 1)[:, None] * turn) @ (weight * over)
     mean = float(max(over.mean(), 1e-9 * floor))
     swing = float(np.sqrt(2 * (np.abs(swings) ** 2).sum()) / (weight.sum() * mean))
-    return _Motion(
-        float(seen.min()) + lobe, float(seen.max()) - lobe, 10 * float(np.log10(max(body / mean, 1e-9))), swing
-    )
+    return _Motion(reach, 10 * float(np.log10(max(body / mean, 1e-9))), swing)
 
 
 def _not_wings(found: Repetition, body_mps: float, motion: _Motion, far: LevelSpectrum | None) -> str:

@@ -49,6 +49,9 @@ from .settings import ReportConfig, report_config
 #: Folder of what is measured so far, beside the report's own files while it is being made.
 PARTS = "report-parts"
 
+#: Name of the default model with its products in eight bits.
+EIGHT_BITS = f"{DEFAULT_MODEL}-int8"
+
 # The paper's measured radar: X band, PRF 20 to 30 kHz, 80 ms.
 REFERENCE = Radar(carrier_hz=9.85e9, prf_hz=25e3, pulses=2000)
 # Purpose of the records that are timed, weighed and shown: apart from those that are scored.
@@ -168,7 +171,7 @@ def _in_eight_bits(given: Mapping[str, Given]) -> dict[str, Given]:
     if DEFAULT_MODEL not in given:
         return {}
     whole = given[DEFAULT_MODEL]
-    return {f"{DEFAULT_MODEL}-int8": replace(whole, files=(seal(in_eight_bits(*whole.files)),))}
+    return {EIGHT_BITS: replace(whole, files=(seal(in_eight_bits(*whole.files)),))}
 
 
 def _cascade(given: Mapping[str, Given], account: Mapping[str, Any] | None) -> dict[str, Given]:
@@ -242,7 +245,7 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
     else:
         settle(folder)
         found = {path.stem: _content(path) for path in folder.glob("*.onnx")}
-    own = {*PICTURES, FEATURES, CASCADE, f"{DEFAULT_MODEL}-int8"}
+    own = {*PICTURES, FEATURES, CASCADE, EIGHT_BITS}
     if taken := sorted(found.keys() & own):
         raise BadInput(f"{folder}: {taken[0]}.onnx has the name of what the report makes itself: rename the file")
     if not found:

@@ -15,12 +15,7 @@ def four_rotors(seed, snr_db, velocity_mps=-20.0):
     """Rates 35 rpm apart at phases of chance, and the rates [Hz]."""
     rng = np.random.default_rng(seed)
     rates_hz, times_s = np.linspace(3395, 3500, 4) / 60 * rng.uniform(0.99, 1.01), np.arange(PULSES) / PRF_HZ
-    echo = np.zeros(PULSES, complex)
-    for rate_hz in rates_hz:
-        angle_rad = RotorMotion(rate_hz, rng.uniform(0, 2 * np.pi)).angle_rad(times_s)
-        one = rotor_echo(angle_rad, wavelength_m=WAVELENGTH_M, blade_length_m=0.15)
-        echo += one * np.exp(2j * np.pi * rng.uniform())
-    iq = echo / np.sqrt(np.mean(np.abs(echo) ** 2)) + 10
+    iq = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=WAVELENGTH_M, length_m=0.15) + 10
     iq *= 10 ** (snr_db / 20) * np.exp(-4j * np.pi * velocity_mps * times_s / WAVELENGTH_M)
     return iq + white(rng, PULSES), rates_hz
 
