@@ -118,7 +118,7 @@ def test_a_record_without_noise_is_known_as_well(kind, least):
     assert share(kind, KINDS[kind][0], np.inf) >= least
 
 
-# of 400 walkers at these two radars 11 % are birds (none by the models before, whose birds had no body as far over wings)
+# of 400 walkers at these two radars 11 % are birds: training has no trunk as far over limbs as bodies over wings
 @pytest.mark.parametrize(
     ("kind", "share_of_many"),
     [("person", 0.11), *((kind, 0.02) for kind in ("ground", "rain", "sea", "vehicle", "wind_turbine", "noise"))],
