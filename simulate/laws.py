@@ -92,7 +92,7 @@ LAWS: dict[str, Law] = {
     "bird_acceleration_mps2": Law("uniform", -5.0, 5.0, "m/s^2", "the paper's bird: about 4"),
     "stroke_scale": Law("uniform", 0.6, 1.25, "1", "about the stroke of JEES 2021"),
     "sweep_scale": Law("uniform", -1.0, 1.25, "1", "about the sweep of JEES 2021; models differ in its sign"),
-    # as high over the wings as a UAV's body is over its blades: else a strong lone line is never a bird that glides
+    # with the wings' own level as high as `clutter_snr_db`: else a strong lone line is never a bird that glides
     "bird_body_db": Law("uniform", -12.0, 27.0, "dB", "body over wing power; 17-27 in the catalogue"),
     "down_stroke": Law("uniform", 0.0, 0.7, "1", "down-stroke stronger than up-stroke"),
     "feather_weight": Law("log", 0.05, 2.0, "1", "wrist and tip scatterers against the wing's line"),
