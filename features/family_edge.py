@@ -122,7 +122,7 @@ def edge_of_lines(
     power = np.abs(left + fitted) ** 2 * data.pulses
     usable &= ~_foreign(np.where(usable, power, 0.0).sum(axis=0), usable.sum(axis=0))
     total = np.where(usable, power, 0.0).sum(axis=(0, 1))
-    noise = np.where(usable, data.level_of(rest)(frequency), 0.0).sum(axis=(0, 1))
+    noise = np.where(usable, data.level_of(rest, evened=True)(frequency), 0.0).sum(axis=(0, 1))
     number = usable.sum(axis=(0, 1)).astype(float)
     # where the single rotors' lines lie in one another they add up: those orders stand too high beside the outer ones
     nearest = float(np.diff(np.sort(spacings)).min()) if len(fits) > 1 else 1.0

@@ -48,6 +48,10 @@ LEVEL_PADDING = 2
 BLOCK_BINS = 24
 LEVEL_QUANTILE = -np.log(3 / 4)
 
+#: Of noise alone the logarithms of blocks' levels, transformed as `LEVEL_PADDING` says, are too high by this and have
+#: this variance.
+BLOCK_BIAS, BLOCK_SCATTER = 0.05, 0.106
+
 #: What fitted lines leave is not taken to be below this share of the floor: the fit takes noise out too.
 LEAST_LEVEL = 0.8
 
@@ -180,12 +184,17 @@ class Periodogram:
             out |= np.abs(away - np.rint(away)) < half - 3.0 / self.pulses
         return out
 
-    def level_of(self, rest: NDArray[np.complex128]) -> Callable[[NDArray[np.floating]], NDArray[np.float64]]:
-        """Local level of samples that lines were taken from, as a function of the frequency [cycles a sample]."""
+    def level_of(
+        self, rest: NDArray[np.complex128], *, evened: bool = False
+    ) -> Callable[[NDArray[np.floating]], NDArray[np.float64]]:
+        """Local level of samples that lines were taken from, as a function of the frequency [cycles a sample].
+
+        Evened, blocks whose levels differ by no more than chance have their common one.
+        """
         size = fft.next_fast_len(LEVEL_PADDING * self.pulses)
         power = squared(fft.fft(rest.astype(np.complex64), size)) * np.float32(1 / self.pulses)
         keep = _kept(size, self.blocked, THINNED_BINS / self.pulses)
-        level = _level_at_bins(power, keep, 1.0, _block(size, self.pulses))
+        level = _level_at_bins(power, keep, 1.0, _block(size, self.pulses), evened=evened)
         return lambda frequency: np.maximum(level(np.rint(frequency * size) % size), LEAST_LEVEL)
 
     def left(self, samples: NDArray[np.complex128]) -> "Periodogram":
@@ -258,9 +267,9 @@ def local_level(power: NDArray[np.floating], keep: NDArray[np.bool_], floor: flo
 
 
 def _level_at_bins(
-    power: NDArray[np.floating], keep: NDArray[np.bool_], floor: float, block: int
+    power: NDArray[np.floating], keep: NDArray[np.bool_], floor: float, block: int, *, evened: bool = False
 ) -> Callable[[NDArray], NDArray[np.float64]]:
-    """`local_level` as a function of the bin."""
+    """`local_level` as a function of the bin; evened as in `Periodogram.level_of`."""
     size = len(power)
     count = max(4, size // block)
     length = size // count
@@ -276,6 +285,9 @@ def _level_at_bins(
     if not len(known):
         return lambda bins: np.full(np.shape(bins), floor)
     logs = np.log(np.maximum(levels[known], 0.1 * floor))
+    if evened:  # by the share of their scatter that is chance
+        away = logs - logs.mean()
+        logs = logs - BLOCK_BIAS - BLOCK_SCATTER / max(float(away.var()), BLOCK_SCATTER) * away
     middles = (starts + length / 2)[known]
     return lambda bins: np.exp(np.interp(bins, middles, logs, period=size))
 

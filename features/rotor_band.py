@@ -20,6 +20,9 @@ PROFILES = (0.95, 0.05)
 #: what strong lines leak, and what blades unlike the ideal ones put past the tip.
 LEAK_SHARE = 0.002
 
+#: As likely they leak no more than this share of it; which, is seen where it is more than so large a share of the noise.
+LEAST_LEAK, LEAK_SEEN = 0.01, 0.1
+
 #: How unlike the model the powers of the lines may be: variances over the mean's square. The lines decide.
 SHARES = tuple(1e-6 * 4.0**step for step in range(11))
 
@@ -187,7 +190,7 @@ def fit_edge(
     scatter : ndarray, shape (lines,), or float
         What is known beforehand of how unlike the model the lines' powers are: variance over the mean's square.
     leak : float
-        Share of the family's power that lines leak past its edge.
+        Share of the family's power that lines may leak past its edge: that much or `LEAST_LEAK` of it.
     spread : float
         Range of several rotors' rates over their mean, in whose multiples the orders are counted: what lies about a
         high order is then of its neighbours too.
@@ -210,20 +213,20 @@ def fit_edge(
     prior = SHARE_FALL ** np.arange(len(SHARES))
     prior = np.append(prior[: len(SHARES) - len(every) + 1].sum(), prior[len(SHARES) - len(every) + 1 :])
     few = np.arange(len(every))[::-3]
+    leaks = (leak, LEAST_LEAK * leak) if leak * loud > LEAK_SEEN * float(noise.mean()) else (leak,)
     for search in range(SEARCHES):
         edges = np.arange(max(low, LEAST_EDGE), high + step, step)
         # the first that is seen may lie past where the edge is sought: that nothing is there speaks too
         near = order <= max(high + REACH * high ** (1 / 3) / min(choices) ** (2 / 3), order[0])
         count = int(order[near][-1])
         shapes = [_spread_powers(number * edges, number, count, spread)[..., order[near] - 1] for number in choices]
-        weight = _log_likelihood(
-            np.stack(shapes), power[near], noise[near], bins[near], every[few, None] + scatter[near], leak * loud
-        )
-        weight += np.log(np.outer([BLADES.get(number, 1.0) for number in choices], PROFILES))[..., None, None]
-        weight += np.log(prior[few] / edges[:, None])
+        data = (np.stack(shapes), power[near], noise[near], bins[near], every[few, None] + scatter[near])
+        weight = np.stack([_log_likelihood(*data, share * loud) for share in leaks], axis=-1)
+        weight += np.log(np.outer([BLADES.get(number, 1.0) for number in choices], PROFILES))[..., None, None, None]
+        weight += np.log(prior[few] / edges[:, None])[..., None]
         weight = np.exp(weight - weight.max())
         weight /= weight.sum()
-        along = weight.sum(axis=(0, 1, 3))
+        along = weight.sum(axis=(0, 1, 3, 4))
         edge = float((along * edges).sum())
         std = float(np.sqrt((along * (edges - edge) ** 2).sum()))
         held = np.flatnonzero(along > NEGLIGIBLE)
@@ -234,7 +237,7 @@ def fit_edge(
         low, high = low - wider[0], high + wider[1]
         step = (high - low) / FINE
         choices = [number for number, own in zip(choices, weight, strict=True) if own.sum() > NEGLIGIBLE]
-        live = few[weight.sum(axis=(0, 1, 2)) > NEGLIGIBLE]
+        live = few[weight.sum(axis=(0, 1, 2, 4)) > NEGLIGIBLE]
         few = np.arange(max(live.min() - 2, 0), min(live.max() + 3, len(every)))
     return edge, std
 

@@ -39,10 +39,9 @@ def test_line_powers_are_those_of_bessel_functions(blades, gamma):
     np.testing.assert_allclose(even, (2 * series / gamma) ** 2, atol=1e-9)
 
 
-# points at the tip have lines far under the others, which do not count: at 1e5 the stated errors are twice too large
-@pytest.mark.parametrize(
-    ("profile", "level"), [(0, 5.0), (0, 30.0), (0, 1e3), (0, 1e5), (1, 5.0), (1, 30.0), (1, 1e3)], ids=str
-)
+# points at the tip have lines far under the strongest: what may leak covers them at 1e5, unless it is seen not to
+@pytest.mark.parametrize("profile", [0, 1])
+@pytest.mark.parametrize("level", [5.0, 30.0, 1e3, 1e5])
 def test_errors_are_as_large_as_stated(profile, level):
     rng = np.random.default_rng(4)
     errors, relative = [], []
