@@ -326,19 +326,47 @@ def _turns(spectrum: Spectrum, line: Body) -> float:
     return float(-2 * line.velocity_mps / spectrum.wavelength_m / spectrum.prf_hz)
 
 
+def _line_among(spectrum: Spectrum, where: NDArray[np.bool_], known: list[float]) -> Body:
+    """The strongest line of a part of the spectrum, whole where only its flank lies there.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Of one record.
+    where : ndarray of bool, shape (bins,)
+        True where it is looked for.
+    known : list of float
+        Lines whose flanks are no other's [cycles a sample].
+    """
+    power, place = spectrum.relative_power, np.arange(spectrum.bins)
+
+    def strongest(where: NDArray[np.bool_]) -> Body:
+        return body_line(replace(spectrum, relative_power=np.where(where, power, np.float32(0))))
+
+    line = strongest(where)
+    first = top = int(line.index)
+    while power[(top + 1) % len(power)] > power[top]:
+        top = (top + 1) % len(power)
+    while power[top - 1] > power[top]:
+        top = (top - 1) % len(power)
+    if top == first:
+        return line
+    own = np.abs(place - top) <= LOBE_BINS + 1
+    known_bins = (np.rint(np.array(known) * spectrum.bins).astype(np.intp) + spectrum.bins // 2) % spectrum.bins
+    return strongest(where & ~own) if own[known_bins].any() else strongest(np.abs(place - top) <= 1)
+
+
 def _other_body(spectrum: Spectrum, known: list[float], half_bins: float) -> Body | None:
     """A line that stands out of all others beside these [cycles a sample], each with so much about it: another body."""
 
-    def without(power: NDArray[np.float32], turns: float) -> NDArray[np.float32]:
-        near = fft.fftshift(_within(spectrum.bins, turns, half_bins / spectrum.pulses))
-        return np.where(near, np.float32(0), power)
+    def beside(turns: float) -> NDArray[np.bool_]:
+        return ~fft.fftshift(_within(spectrum.bins, turns, half_bins / spectrum.pulses))
 
-    left = spectrum.relative_power
-    for place in known:
-        left = without(left, place)
-    line = body_line(replace(spectrum, relative_power=left))
-    left = without(left, _turns(spectrum, line))
-    over_db = float(line.level_db) - 10 * float(np.log10(max(left.max(initial=0), 1.0)))
+    left = np.logical_and.reduce([beside(place) for place in known])
+    line = _line_among(spectrum, left, known)
+    left &= beside(_turns(spectrum, line))
+    highest = float(spectrum.relative_power[left].max(initial=1.0))
+    over_db = float(line.level_db) - 10 * float(np.log10(highest))
     return line if line.level_db > LINE_DB and over_db > OTHER_OVER_DB else None
 
 
@@ -395,7 +423,7 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
         slow = abs(_turns(spectrum, body)) * pulses <= rest_half
         line = body
         if slow:
-            line = body_line(replace(spectrum, relative_power=np.where(moving, spectrum.relative_power, np.float32(0))))
+            line = _line_among(spectrum, moving, [0.0])
         centres.append((_turns(spectrum, body), float(body.level_db)) if slow else (0.0, rest_db))
         if line.level_db > LINE_DB:
             centres.append((_turns(spectrum, line), float(line.level_db)))

@@ -395,6 +395,17 @@ def test_a_comb_at_16_db_under_the_noise_is_found():
     assert right >= 12
 
 
+@pytest.mark.parametrize("velocity_mps", [2.95, 3.05, 3.2, 3.39, -3.5, -3.69, 3.74, 3.8, -3.9])
+def test_a_body_at_the_edge_of_the_background_is_seen_whole(velocity_mps):
+    # of a line that the notch about rest cuts, the flank alone was taken for the body
+    background = 200 * (1 + 0.3 * np.sin(2 * np.pi * 1.2 * np.arange(PULSES) / PULSES))
+    found = measure(drone([81.2551], seed=4, velocity_mps=velocity_mps, body=100.0) + background, **RADAR)
+    assert found.body_velocity_mps == pytest.approx(velocity_mps, abs=0.02)
+    assert found.rotor_count == 1
+    assert abs(found.chopping_hz - 2 * 81.2551) < 4 * found.chopping_hz_std
+    assert found.chopping_hz_std < 0.01
+
+
 def test_the_errors_stay_true_beside_a_strong_background():
     rng = np.random.default_rng(9)
     time = np.arange(PULSES)
