@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .periodogram import Periodogram, squared
+from .lines import squared
+from .periodogram import Periodogram
 
 #: A side with fewer lines than this says nothing by its phases.
 LEAST_LINES = 5

@@ -16,6 +16,11 @@ _SHAPE = 2.3 * TAPS
 TAP = np.arange(1 - TAPS // 2, 1 + TAPS // 2)
 
 
+def squared(amplitude: NDArray[np.complexfloating]) -> NDArray[np.floating]:
+    """Power of amplitudes, in their own precision."""
+    return np.asarray(amplitude.real**2 + amplitude.imag**2)
+
+
 def _bell(away: NDArray[np.floating]) -> NDArray[np.float64]:
     """The kernel, -1 <= away <= 1."""
     return np.asarray(np.exp(_SHAPE * (np.sqrt(np.maximum(1 - away**2, 0)) - 1)), np.float64)

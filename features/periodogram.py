@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .clicks import without_clicks
 from .evidence import line_evidence
-from .lines import LineSpace
+from .lines import LineSpace, squared
 from .notch import LOBE_BINS, NOTCH_MPS, Body, body_line
 from .octaves import over_neighbours
 from .slow_lines import remove_bands
@@ -61,18 +62,6 @@ TAPER_BETA = 3.0
 
 #: A receiver's filter stops what lies where the local level is below this share of the floor.
 STOP_SHARE = 0.3
-
-#: A click: one sample so many times over the noise, and over both beside it; fewer in a record than a rotor's flashes.
-#: A flash is as long as the rotor's band is narrow: its samples beside are as strong.
-CLICK_POWER, CLICK_OVER_BESIDE, MOST_CLICKS = 25.0, 4.0, 5
-
-#: Or as many as this share of the pulses, where no distance from click to click, a pulse more or less, is that of more
-#: than so large a share of them: interference at random times.
-CLICKED_SHARE, PERIOD_SHARE = 1 / 64, 0.4
-
-#: A click fills the whole span and leaves it empty; a sample cut out of a rotor's band fills what was empty beside it.
-#: Where that rises by this factor they were no clicks.
-EMPTY_RISE = 1.1
 
 
 @dataclass(frozen=True)
@@ -229,11 +218,6 @@ def _spectrum(samples: NDArray[np.complex128], size: int, *, tapered: bool) -> N
     return np.asarray(fft.fft(shaped.astype(np.complex64), size) * _middle(len(samples), size), np.complex64)
 
 
-def squared(amplitude: NDArray[np.complexfloating]) -> NDArray[np.floating]:
-    """Power of amplitudes, in their own precision."""
-    return np.asarray(amplitude.real**2 + amplitude.imag**2)
-
-
 def _within(size: int, centre: float, half: float) -> NDArray[np.bool_]:
     away = np.arange(size) / size - centre
     return np.abs(away - np.rint(away)) <= half
@@ -290,35 +274,6 @@ def _level_at_bins(
         logs = logs - BLOCK_BIAS - BLOCK_SCATTER / max(float(away.var()), BLOCK_SCATTER) * away
     middles = (starts + length / 2)[known]
     return lambda bins: np.exp(np.interp(bins, middles, logs, period=size))
-
-
-def without_clicks(samples: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Samples with single ones that stand far out set to 0: two clicks are as far apart as the flashes of some rotor.
-
-    Parameters
-    ----------
-    samples : ndarray of complex128, shape (pulses,)
-        One record, strong lines taken out.
-    """
-    power = squared(samples)
-    noise = float(np.median(power)) / np.log(2)
-    beside = np.maximum(np.roll(power, 1), np.roll(power, -1))
-    beside[[0, -1]] = np.inf  # the record may have cut a flash there
-    clicks = (power > CLICK_POWER * noise) & (power > CLICK_OVER_BESIDE * beside)
-    places = np.flatnonzero(clicks)
-    if not len(places) or (len(places) > MOST_CLICKS and not _at_random(places, len(samples))):
-        return samples
-    without = np.where(clicks, 0.0, samples)
-    before, after = np.quantile(squared(fft.fft(np.stack([samples, without]))), 0.25, axis=-1)
-    return without if after < EMPTY_RISE * before else samples
-
-
-def _at_random(places: NDArray[np.intp], pulses: int) -> bool:
-    """True where clicks are few and no distance comes so often among them as a rotor's period would."""
-    if len(places) > CLICKED_SHARE * pulses:
-        return False
-    apart = np.bincount((places[:, None] - places)[np.triu_indices(len(places), 1)[::-1]], minlength=3)
-    return bool((apart[:-2] + apart[1:-1] + apart[2:]).max() < PERIOD_SHARE * len(places))
 
 
 def _turns(spectrum: Spectrum, line: Body) -> float:

@@ -20,7 +20,7 @@ PROFILES = (0.95, 0.05)
 #: what strong lines leak, and what blades unlike the ideal ones put past the tip.
 LEAK_SHARE = 0.002
 
-#: As likely they leak no more than this share of it; which, is seen where it is more than so large a share of the noise.
+#: As likely they leak no more than this share of it; which, shows where it is more than so large a share of the noise.
 LEAST_LEAK, LEAK_SEEN = 0.01, 0.1
 
 #: How unlike the model the powers of the lines may be: variances over the mean's square. The lines decide.

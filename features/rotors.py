@@ -13,7 +13,8 @@ from .comb import Comb, strong_multiple
 from .comb_fit import CombFit, fit_combs
 from .comb_search import even_scores
 from .flashes import flash_nats
-from .periodogram import LINE_DB, Periodogram, squared
+from .lines import squared
+from .periodogram import LINE_DB, Periodogram
 
 #: Rotors looked for at most.
 MAX_ROTORS = 8

@@ -3,18 +3,13 @@ import re
 import numpy as np
 import pytest
 from bladewing.features import measure
+from bladewing.features.clicks import CLICK_OVER_BESIDE, CLICK_POWER, without_clicks
 from bladewing.features.comb import find_comb, strong_multiple
 from bladewing.features.comb_fit import fit_combs
 from bladewing.features.flashes import flash_nats
 from bladewing.features.lines import LineSpace, line_products, sum_of_lines
 from bladewing.features.one_thread import one_thread
-from bladewing.features.periodogram import (
-    CLICK_OVER_BESIDE,
-    CLICK_POWER,
-    MOST_NOTCH_BINS,
-    prepare,
-    without_clicks,
-)
+from bladewing.features.periodogram import MOST_NOTCH_BINS, prepare
 from bladewing.features.rotors import MAX_ROTORS
 from bladewing.features.slow_lines import notched_products, remove_bands, slepian
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
