@@ -67,7 +67,7 @@ def draw_person(draws: Draws, radar: Radar) -> Target:
             limb *= turned(grid.sines(Sine(*(values[:, None] for values in stride))))
         (micro if number else body)[...] += limb
     truth = {"velocity_mps": speed, "gait_hz": gait}
-    return Target(micro, body, 15 * draws.uniform(), truth=truth)
+    return Target(micro, body, 27 * draws.uniform(), truth=truth)
 
 
 def draw_vehicle(draws: Draws, radar: Radar) -> Target:
