@@ -46,7 +46,7 @@ LEAST_SHARE = 0.03
 LEAST_POWER_SHARE = 0.12
 
 #: Steps of the joint fit each time a rotor is added, and once all are found: only then their deviations matter.
-JOINT_STEPS, LAST_STEPS = 2, 3
+JOINT_STEPS, LAST_STEPS = 2, 1
 
 #: A helicopter's tail rotor turns at most so many times as fast as its main rotor: at a fraction of its rate every so
 #: many-th line is there, and that fraction may lie among the rates of rotors like the first one. By so much are these
