@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .bodies import LINE_DB
 from .chopping import CHOPPING_RANGE_HZ
 from .comb_centre import centred
 from .comb_fit import CombFit, fit_combs
 from .comb_search import FINE_STEPS, MIN_SPACING_BINS, SEARCHED_RATIO, best_candidate, heights, spacing_limits
 from .lines import LineSpace
-from .periodogram import LINE_DB, Periodogram
+from .periodogram import Periodogram
 
 #: Score that chance alone exceeds in under 1 % of the records: of white noise; where a line was taken out; where the
 #: static background was, with its skirt [nats]. Checked by tests/benchmarks/measurement_tables.py.

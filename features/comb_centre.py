@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from .bodies import LINE_DB
 from .comb_search import FINE_STEPS, Candidate, even_scores
-from .periodogram import LINE_DB, Periodogram
+from .periodogram import Periodogram
 
 #: What speaks for the comb's centre where a line stands so far over all others of it [nats, dB], and more for each dB
 #: beyond. Blades may be the stronger: then their outermost lines are, and say nothing of the body.
@@ -93,6 +94,12 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
     return best, float(np.sqrt((likely * away**2).sum() / likely.sum()))
 
 
+def _moves(data: Periodogram, centre: float) -> bool:
+    """True where a line is a moving body's: of slow ones, where another is nearer to rest, the background's."""
+    nearer = any(abs(line) < abs(centre) for line in data.centres)
+    return abs(centre) * data.pulses >= AT_REST_BINS and (nearer or abs(centre) > data.rest_half)
+
+
 def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], dict[int, float]]:
     """What speaks for the body's line besides the comb [nats]: by place [cycles a sample], and by order of the comb."""
     middle = found.centre + found.spacing * round((found.high + found.low) / 2)
@@ -110,13 +117,13 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
     others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
     moving = 0.0
     # a line beside rest is a slow body's own, and hides no other
-    hides = abs(data.centres[0]) * data.pulses < AT_REST_BINS and max(map(abs, data.centres)) <= data.rest_half
+    hides = abs(data.centres[0]) * data.pulses < AT_REST_BINS and not any(_moves(data, line) for line in data.centres)
     for centre, level_db in sorted(zip(data.centres, data.centres_db, strict=True), key=lambda line: -abs(line[0])):
         over_db = max(level_db - others_db, 0.0)
         nats = STRONG_LINE * min(over_db / STRONG_OVER_DB, 1.0)
         nats += STRONG_LINE_DB * max(over_db - STRONG_OVER_DB, 0.0)
         # a line at rest that is no background may be an offset of the receiver all the same
-        if abs(centre) > data.rest_half and abs(centre) * data.pulses >= AT_REST_BINS:
+        if _moves(data, centre):
             moving = nats
         elif hides:
             reach = int(data.rest_half / found.spacing) + 1

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .bodies import LINE_DB
 from .notch import body_line
-from .periodogram import LINE_DB
 from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum, finite_complex, require_radar, scaled, unit_scale
 
 #: Dwells by which the body is followed [s].

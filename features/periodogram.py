@@ -8,17 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .bodies import LINE_DB, line_among, other_body, slow_body, turns_of, within
 from .clicks import without_clicks
 from .evidence import line_evidence
 from .lines import LineSpace, squared
-from .notch import LOBE_BINS, NOTCH_MPS, Body, body_line
+from .notch import LOBE_BINS, NOTCH_MPS, body_line
 from .octaves import over_neighbours
 from .slow_lines import remove_bands
 from .spectrum import NOISE_BANDWIDTH_BINS, Spectrum, doppler_spectrum
-
-#: A line counts as present from this level over the floor [dB]. Noise alone stays 3 dB and more below it: the highest
-#: bin of 10 000 spectra stood at 13 dB.
-LINE_DB = 17.0
 
 #: Noise alone seldom has so strong a bin [dB] in the notch about velocity zero; a background's skirt has.
 SKIRT_DB = 9.0
@@ -34,9 +31,6 @@ BODY_NOTCH_MPS = 0.5
 
 #: No wider band is taken out [bins], 3 m/s of 80 ms at 100 GHz: the sequences that span it fill memory.
 MOST_NOTCH_BINS = 160
-
-#: A second body's line stands so far over all others but the first one's [dB]: a bird's beside a drone, or a drone's.
-OTHER_OVER_DB = 8.0
 
 #: Transform length in units of the dwell: between two bins a line loses 0.2 dB.
 PADDING = 4
@@ -218,17 +212,12 @@ def _spectrum(samples: NDArray[np.complex128], size: int, *, tapered: bool) -> N
     return np.asarray(fft.fft(shaped.astype(np.complex64), size) * _middle(len(samples), size), np.complex64)
 
 
-def _within(size: int, centre: float, half: float) -> NDArray[np.bool_]:
-    away = np.arange(size) / size - centre
-    return np.abs(away - np.rint(away)) <= half
-
-
 @lru_cache(maxsize=8)
 def _kept(size: int, blocked: tuple[tuple[float, float], ...], margin: float = 0.0) -> NDArray[np.bool_]:
     """False in the bins of what was taken out, and so far beside [cycles a sample]."""
     keep = np.ones(size, bool)
     for centre, half in blocked:
-        keep &= ~_within(size, centre, half + margin)
+        keep &= ~within(size, centre, half + margin)
     keep.setflags(write=False)
     return keep
 
@@ -276,55 +265,6 @@ def _level_at_bins(
     return lambda bins: np.exp(np.interp(bins, middles, logs, period=size))
 
 
-def _turns(spectrum: Spectrum, line: Body) -> float:
-    """Frequency of a line [cycles a sample]."""
-    return float(-2 * line.velocity_mps / spectrum.wavelength_m / spectrum.prf_hz)
-
-
-def _line_among(spectrum: Spectrum, where: NDArray[np.bool_], known: list[float]) -> Body:
-    """The strongest line of a part of the spectrum, whole where only its flank lies there.
-
-    Parameters
-    ----------
-    spectrum : Spectrum
-        Of one record.
-    where : ndarray of bool, shape (bins,)
-        True where it is looked for.
-    known : list of float
-        Lines whose flanks are no other's [cycles a sample].
-    """
-    power, place = spectrum.relative_power, np.arange(spectrum.bins)
-
-    def strongest(where: NDArray[np.bool_]) -> Body:
-        return body_line(replace(spectrum, relative_power=np.where(where, power, np.float32(0))))
-
-    line = strongest(where)
-    first = top = int(line.index)
-    while power[(top + 1) % len(power)] > power[top]:
-        top = (top + 1) % len(power)
-    while power[top - 1] > power[top]:
-        top = (top - 1) % len(power)
-    if top == first:
-        return line
-    own = np.abs(place - top) <= LOBE_BINS + 1
-    known_bins = (np.rint(np.array(known) * spectrum.bins).astype(np.intp) + spectrum.bins // 2) % spectrum.bins
-    return strongest(where & ~own) if own[known_bins].any() else strongest(np.abs(place - top) <= 1)
-
-
-def _other_body(spectrum: Spectrum, known: list[float], half_bins: float) -> Body | None:
-    """A line that stands out of all others beside these [cycles a sample], each with so much about it: another body."""
-
-    def beside(turns: float) -> NDArray[np.bool_]:
-        return ~fft.fftshift(_within(spectrum.bins, turns, half_bins / spectrum.pulses))
-
-    left = np.logical_and.reduce([beside(place) for place in known])
-    line = _line_among(spectrum, left, known)
-    left &= beside(_turns(spectrum, line))
-    highest = float(spectrum.relative_power[left].max(initial=1.0))
-    over_db = float(line.level_db) - 10 * float(np.log10(highest))
-    return line if line.level_db > LINE_DB and over_db > OTHER_OVER_DB else None
-
-
 def prepare(iq: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float) -> Periodogram | None:
     """Make one record ready: find the body line, take it and the static background out, whiten.
 
@@ -365,7 +305,7 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
     skirt = (offset <= min(rest_half, SKIRT_BINS)) & (np.abs(np.arange(spectrum.bins) - body.index) > LOBE_BINS + 1)
     # the only strong line, at rest, without a skirt: a body that hovers, not a background
     hovers = (
-        abs(_turns(spectrum, body)) * pulses <= rest_half
+        abs(turns_of(spectrum, body)) * pulses <= rest_half
         and 2 * rest_half > 3 * LOBE_BINS
         and float(spectrum.level_db[skirt].max()) < SKIRT_DB
         and float(spectrum.level_db[offset > rest_half].max()) < LINE_DB
@@ -375,18 +315,21 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
         # what stands at rest may be the background; the body is then the strongest line that moves
         moving = offset > rest_half + 2 * NOISE_BANDWIDTH_BINS
         # the strongest line of all, if it is as slow as that, has its own level; if not, it is the one that moves
-        slow = abs(_turns(spectrum, body)) * pulses <= rest_half
+        slow = abs(turns_of(spectrum, body)) * pulses <= rest_half
         line = body
         if slow:
-            line = _line_among(spectrum, moving, [0.0])
-        centres.append((_turns(spectrum, body), float(body.level_db)) if slow else (0.0, rest_db))
+            line = line_among(spectrum, moving, [0.0])
+        centres.append((turns_of(spectrum, body), float(body.level_db)) if slow else (0.0, rest_db))
         if line.level_db > LINE_DB:
-            centres.append((_turns(spectrum, line), float(line.level_db)))
+            centres.append((turns_of(spectrum, line), float(line.level_db)))
     else:
-        centres.append((_turns(spectrum, body), float(body.level_db)))
-    other = _other_body(spectrum, [turn for turn, _ in centres], max(rest_half if bands else 0.0, LOBE_BINS))
+        centres.append((turns_of(spectrum, body), float(body.level_db)))
+    other = other_body(spectrum, [turn for turn, _ in centres], max(rest_half if bands else 0.0, LOBE_BINS))
     if other is not None:
-        centres.append((_turns(spectrum, other), float(other.level_db)))
+        centres.append((turns_of(spectrum, other), float(other.level_db)))
+    hidden = slow_body(spectrum, [turn for turn, _ in centres], offset <= rest_half) if bands else None
+    if hidden is not None:
+        centres.append((turns_of(spectrum, hidden), float(hidden.level_db)))
     centres.sort(key=lambda c: -c[1])
     bands += [
         (turn, half_bins(BODY_NOTCH_MPS))

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .bodies import LINE_DB
 from .comb import Comb, strong_multiple
 from .comb_fit import CombFit, fit_combs
 from .comb_search import even_scores
 from .flashes import flash_nats
 from .lines import squared
-from .periodogram import LINE_DB, Periodogram
+from .periodogram import Periodogram
 
 #: Rotors looked for at most.
 MAX_ROTORS = 8
