@@ -116,10 +116,8 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
         out += [(found.centre + found.spacing * order, 0.0) for order in even]
     others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
     moving = 0.0
-    # a line beside rest is a slow body's own, and hides no other; one as strong as the comb's is the blades'
-    least_db = others_db + STRONG_OVER_DB
-    seen = any(_moves(data, line) and db > least_db for line, db in zip(data.centres, data.centres_db, strict=True))
-    hides = abs(data.centres[0]) * data.pulses < AT_REST_BINS and not seen
+    # a line beside rest is a slow body's own, and hides no other
+    hides = abs(data.centres[0]) * data.pulses < AT_REST_BINS and not any(_moves(data, line) for line in data.centres)
     for centre, level_db in sorted(zip(data.centres, data.centres_db, strict=True), key=lambda line: -abs(line[0])):
         over_db = max(level_db - others_db, 0.0)
         nats = STRONG_LINE * min(over_db / STRONG_OVER_DB, 1.0)
