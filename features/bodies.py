@@ -33,6 +33,16 @@ def turns_of(spectrum: Spectrum, line: Body) -> float:
     return float(-2 * line.velocity_mps / spectrum.wavelength_m / spectrum.prf_hz)
 
 
+def tops(levels: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """True in the bins no lower than both beside them, around the circle."""
+    return np.asarray((levels >= np.roll(levels, 1)) & (levels >= np.roll(levels, -1)))
+
+
+def _strongest(spectrum: Spectrum, where: NDArray[np.bool_]) -> Body:
+    """The strongest line where this is True."""
+    return body_line(replace(spectrum, relative_power=np.where(where, spectrum.relative_power, np.float32(0))))
+
+
 def line_among(spectrum: Spectrum, where: NDArray[np.bool_], known: list[float]) -> Body:
     """The strongest line of a part of the spectrum, whole where only its flank lies there.
 
@@ -46,11 +56,7 @@ def line_among(spectrum: Spectrum, where: NDArray[np.bool_], known: list[float])
         Lines whose flanks are no other's [cycles a sample].
     """
     power, place = spectrum.relative_power, np.arange(spectrum.bins)
-
-    def strongest(where: NDArray[np.bool_]) -> Body:
-        return body_line(replace(spectrum, relative_power=np.where(where, power, np.float32(0))))
-
-    line = strongest(where)
+    line = _strongest(spectrum, where)
     first = top = int(line.index)
     while power[(top + 1) % len(power)] > power[top]:
         top = (top + 1) % len(power)
@@ -60,7 +66,7 @@ def line_among(spectrum: Spectrum, where: NDArray[np.bool_], known: list[float])
         return line
     own = np.abs(place - top) <= LOBE_BINS + 1
     known_bins = (np.rint(np.array(known) * spectrum.bins).astype(np.intp) + spectrum.bins // 2) % spectrum.bins
-    return strongest(where & ~own) if own[known_bins].any() else strongest(np.abs(place - top) <= 1)
+    return _strongest(spectrum, where & ~own if own[known_bins].any() else np.abs(place - top) <= 1)
 
 
 def _beside(spectrum: Spectrum, lines: list[float], half_bins: float) -> NDArray[np.bool_]:
@@ -94,10 +100,9 @@ def slow_body(spectrum: Spectrum, known: list[float], rest: NDArray[np.bool_]) -
     level_db, place = spectrum.level_db, np.arange(spectrum.bins)
     apart = _beside(spectrum, [0.0, *known], LOBE_BINS)
     across_db = maximum_filter1d(level_db[2 * (spectrum.bins // 2) - place - spectrum.bins], 2 * ACROSS_BINS + 1)
-    over_db = np.where(rest & apart, level_db - across_db, -np.inf)
-    over_db[(level_db < np.roll(level_db, 1)) | (level_db < np.roll(level_db, -1))] = -np.inf
+    over_db = np.where(rest & apart & tops(level_db), level_db - across_db, -np.inf)
     top = int(over_db.argmax())
     least_db = max(float(level_db[apart & ~rest].max(initial=-np.inf)) + OTHER_OVER_DB, LINE_DB)
     if over_db[top] < ACROSS_DB or level_db[top] < least_db:
         return None
-    return body_line(replace(spectrum, relative_power=np.where(np.abs(place - top) <= 1, spectrum.relative_power, 0)))
+    return _strongest(spectrum, np.abs(place - top) <= 1)

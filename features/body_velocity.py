@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .bodies import LINE_DB
+from .bodies import LINE_DB, tops
 from .comb_centre import AT_REST_BINS
 from .comb_fit import CombFit
 from .notch import LOBE_BINS
@@ -141,11 +141,11 @@ def _rivals_std(spectrum: Spectrum, own: float, rest: float, at_rest: list[float
     """Deviation of a line's place, where others may be the body's: so far from rest and further, or at these places."""
     power, level_db = spectrum.relative_power, spectrum.level_db
     away = _bins_from(spectrum, own)
-    tops = (power >= np.roll(power, 1)) & (power >= np.roll(power, -1)) & (np.abs(away) > LOBE_BINS)
+    others = tops(power) & (np.abs(away) > LOBE_BINS)
     highest_db = float(level_db[np.abs(away) <= 1].max())
-    tops &= np.abs(spectrum.frequency_hz) >= rest * spectrum.prf_hz
+    others &= np.abs(spectrum.frequency_hz) >= rest * spectrum.prf_hz
     for place in at_rest:
-        tops[np.where(np.abs(_bins_from(spectrum, place)) < LOBE_BINS, power, 0).argmax()] = True
-    rivals = tops & (level_db > max(highest_db - WEAKEST_DB, NOISE_TOP_DB))
+        others[np.where(np.abs(_bins_from(spectrum, place)) < LOBE_BINS, power, 0).argmax()] = True
+    rivals = others & (level_db > max(highest_db - WEAKEST_DB, NOISE_TOP_DB))
     likely = np.exp((np.minimum(level_db[rivals], highest_db) - highest_db) / RIVAL_DB)
     return float(np.sqrt((likely * away[rivals] ** 2).sum() / (1 + likely.sum()))) / spectrum.bins

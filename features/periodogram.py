@@ -12,7 +12,7 @@ from .bodies import LINE_DB, line_among, other_body, slow_body, turns_of, within
 from .clicks import without_clicks
 from .evidence import line_evidence
 from .lines import LineSpace, squared
-from .notch import LOBE_BINS, NOTCH_MPS, body_line
+from .notch import LOBE_BINS, NOTCH_MPS, Body, body_line
 from .octaves import over_neighbours
 from .slow_lines import remove_bands
 from .spectrum import NOISE_BANDWIDTH_BINS, Spectrum, doppler_spectrum
@@ -294,6 +294,9 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
     def half_bins(half_mps: float) -> float:
         return float(np.ceil(2 * min(max(half_mps / bin_mps, 1.0), widest)) / 2)
 
+    def seen(line: Body) -> tuple[float, float]:
+        return turns_of(spectrum, line), float(line.level_db)
+
     bands: list[tuple[float, float]] = []
     centres: list[tuple[float, float]] = []
     body = body_line(spectrum)
@@ -319,17 +322,17 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
         line = body
         if slow:
             line = line_among(spectrum, moving, [0.0])
-        centres.append((turns_of(spectrum, body), float(body.level_db)) if slow else (0.0, rest_db))
+        centres.append(seen(body) if slow else (0.0, rest_db))
         if line.level_db > LINE_DB:
-            centres.append((turns_of(spectrum, line), float(line.level_db)))
+            centres.append(seen(line))
     else:
-        centres.append((turns_of(spectrum, body), float(body.level_db)))
+        centres.append(seen(body))
     other = other_body(spectrum, [turn for turn, _ in centres], max(rest_half if bands else 0.0, LOBE_BINS))
     if other is not None:
-        centres.append((turns_of(spectrum, other), float(other.level_db)))
+        centres.append(seen(other))
     hidden = slow_body(spectrum, [turn for turn, _ in centres], offset <= rest_half) if bands else None
     if hidden is not None:
-        centres.append((turns_of(spectrum, hidden), float(hidden.level_db)))
+        centres.append(seen(hidden))
     centres.sort(key=lambda c: -c[1])
     bands += [
         (turn, half_bins(BODY_NOTCH_MPS))
