@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .chopping import CHOPPING_RANGE_HZ
-from .comb_sums import MOST_SNRS, running_sums
+from .comb_sums import running_sums
+from .evidence import MOST_SNRS, Evidence
 from .flashes import flash_evidence
 from .octaves import MULTIPLE_SHARE, coarsest
 from .periodogram import Periodogram
@@ -98,7 +99,7 @@ def spacing_limits(pulses: int, prf_hz: float) -> tuple[float, float]:
     return max(low / prf_hz, MIN_SPACING_BINS / pulses), min(high / prf_hz, 0.2)
 
 
-def coarse_spacings(data: Periodogram, evidence: NDArray[np.float32], centre: float) -> NDArray[np.float64]:
+def coarse_spacings(data: Periodogram, evidence: Evidence, centre: float) -> NDArray[np.float64]:
     """Spacings worth a closer look [cycles a sample], best of every band first, with their octaves."""
     low, high = spacing_limits(data.pulses, data.prf_hz)
     grid = _grid(data.pulses, 1 / high, 1 / low)
@@ -107,7 +108,7 @@ def coarse_spacings(data: Periodogram, evidence: NDArray[np.float32], centre: fl
     distance = np.abs(offset - np.rint(offset))
     turn = np.exp(-2j * np.pi * centre * np.arange(data.pulses))
     found: list[float] = []
-    for correlation in _correlations(evidence[0], distance, BANDS, data.pulses):
+    for correlation in _correlations(evidence.rows[0], distance, BANDS, data.pulses):
         sums = np.add.reduceat((correlation * turn).real[grid.lags], grid.starts) * grid.weight
         found += _apart(grid.periods, sums, 2 * MAX_PERIODS / data.pulses)
     spacings = (1 / np.array(found))[:, None] * np.array(OCTAVES)
@@ -126,7 +127,7 @@ def _correlations(
     return np.asarray(fft.rfft(part)[:, :lags].conj() / np.float32(len(ripple)), np.complex64)
 
 
-def free_spacings(data: Periodogram, evidence: NDArray[np.float32]) -> list[tuple[float, float]]:
+def free_spacings(data: Periodogram, evidence: Evidence) -> list[tuple[float, float]]:
     """Spacings and centres of combs whose body line hides in the static background [cycles a sample each].
 
     The phase of the autocorrelation at multiples of the period tells the centre, up to whole spacings.
@@ -139,7 +140,7 @@ def free_spacings(data: Periodogram, evidence: NDArray[np.float32]) -> list[tupl
     number = np.arange(1, MAX_PERIODS + 1)
     steering = np.exp(-2j * np.pi * np.outer(np.arange(48) / 48, number))
     found = []
-    for correlation in _correlations(evidence[0], distance, BANDS[1:], data.pulses):
+    for correlation in _correlations(evidence.rows[0], distance, BANDS[1:], data.pulses):
         sums = np.add.reduceat(np.abs(correlation[grid.lags]), grid.starts) * grid.weight
         for period in _apart(grid.periods, sums, 2 * MAX_PERIODS / data.pulses):
             used = number[: max(1, int(0.9 * data.pulses / period))]
@@ -160,7 +161,7 @@ def _apart(periods: NDArray[np.float64], sums: NDArray[np.float64], least: float
 
 
 def score(
-    evidence: NDArray[np.float32],
+    evidence: Evidence,
     spacings: NDArray[np.float64],
     centres: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
@@ -168,8 +169,8 @@ def score(
 
     Parameters
     ----------
-    evidence : ndarray of float32, shape (line SNRs, bins)
-        From `line_evidence`, 0 where a line cannot be seen.
+    evidence : Evidence
+        Of each bin.
     spacings, centres : ndarray, shape (candidates,)
         [cycles a sample].
 
@@ -180,7 +181,7 @@ def score(
     low, high : ndarray of int, shape (candidates,)
         Outermost orders.
     """
-    size = evidence.shape[-1]
+    size = evidence.rows.shape[-1]
     widest = (0.5 / spacings).astype(np.intp)
     order = np.arange(1, widest.max(initial=0) + 1)
     beyond = order > widest[:, None]
@@ -190,7 +191,7 @@ def score(
     number = np.arange(len(spacings))
     best = np.full(len(spacings), -np.inf, np.float32)
     reach = np.zeros((2, len(spacings)), np.intp)
-    for row in evidence:
+    for row in evidence.rows:
         sides = [row.take(place, mode="wrap") for place in places]
         for side in sides:
             side[beyond] = 0.0
@@ -213,14 +214,14 @@ def score(
 
 
 def even_scores(
-    evidence: NDArray[np.float32], spacings: NDArray[np.float64], centres: NDArray[np.float64], furthest: float = 0.5
+    evidence: Evidence, spacings: NDArray[np.float64], centres: NDArray[np.float64], furthest: float = 0.5
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Score combs whose two sides reach equally far.
 
     Parameters
     ----------
-    evidence : ndarray of float32, shape (line SNRs, bins)
-        As for `score`.
+    evidence : Evidence
+        Of each bin.
     spacings, centres : ndarray, shape (candidates,)
         [cycles a sample]; the spacings rise.
     furthest : float
@@ -233,11 +234,11 @@ def even_scores(
     reach : ndarray of int, shape (candidates,)
         Outermost order.
     """
-    best = np.full((len(spacings), len(evidence)), -np.inf, np.float32)
+    best = np.full((len(spacings), len(evidence.rows)), -np.inf, np.float32)
     reach = np.ones(best.shape, np.intp)
     first = 1
     for sums in _sums_of_sides(evidence, spacings, centres, furthest):
-        both = (sums[:, 0] + sums[:, 1])[..., : len(evidence)]
+        both = (sums[:, 0] + sums[:, 1])[..., : len(evidence.rows)]
         far = both.argmax(axis=0)
         highest = np.take_along_axis(both, far[None], axis=0)[0]
         held, ends = best[: len(highest)], reach[: len(highest)]
@@ -250,20 +251,16 @@ def even_scores(
 
 
 def _sums_of_sides(
-    evidence: NDArray[np.float32], spacings: NDArray[np.float64], centres: NDArray[np.float64], furthest: float = 0.5
+    evidence: Evidence, spacings: NDArray[np.float64], centres: NDArray[np.float64], furthest: float = 0.5
 ) -> Iterator[NDArray[np.float32]]:
     """Running sums to both sides of combs, the spacings rising: as `running_sums` gives them."""
-    size = evidence.shape[-1]
-    # half a turn more on each side: a line beyond half the PRF is the alias on the other
-    wide = np.concatenate([evidence[:, size // 2 :], evidence, evidence[:, : size // 2 + 1]], axis=1)
-    start = (centres % 1.0) * size + (size - size // 2)
-    step = spacings * size
-    return running_sums(wide, np.stack([start, start]), np.stack([-step, step]), furthest * size)
+    size = evidence.rows.shape[-1]
+    # a line beyond half the PRF is the alias on the other side; a turn more, that no place is below 0
+    start, step = (1 + centres % 1.0) * size, spacings * size
+    return running_sums(evidence, np.stack([start, start]), np.stack([-step, step]), furthest * size)
 
 
-def heights(
-    evidence: NDArray[np.float32], spacings: NDArray[np.float64], centres: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def heights(evidence: Evidence, spacings: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
     """The scores of many combs, as `score` gives them, without their reaches, shape (candidates,) [nats]."""
     rising = np.argsort(spacings)
     sides = np.zeros((2, len(rising), MOST_SNRS), np.float32)

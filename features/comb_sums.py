@@ -5,24 +5,23 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from .evidence import MOST_SNRS, Evidence
+
 #: Lines summed at once: they must stay in the cache. And orders at least and at most.
 LINES_AT_ONCE, ORDERS_AT_ONCE = 8000, (4, 64)
 
-#: Line SNRs whose evidence is summed side by side, at most: they are taken from the table as one complex number.
-MOST_SNRS = 4
-
 
 def running_sums(
-    evidence: NDArray[np.float32], starts: NDArray[np.float64], steps: NDArray[np.float64], reach: float
+    evidence: Evidence, starts: NDArray[np.float64], steps: NDArray[np.float64], reach: float
 ) -> Iterator[NDArray[np.float32]]:
     """Sum the evidence of the lines of combs, from the first order to each further one.
 
     Parameters
     ----------
-    evidence : ndarray of float32, shape (line SNRs, bins)
-        Of each bin, at most `MOST_SNRS` line SNRs.
+    evidence : Evidence
+        Of each bin; past the last one it begins anew.
     starts : ndarray, shape (sides, combs)
-        Place of each comb's order 0 [bins].
+        Place of each comb's order 0 [bins], so high that no line's is below 0.
     steps : ndarray, shape (sides, combs)
         From line to line [bins]; their sizes rise, and are the same on every side.
     reach : float
@@ -34,9 +33,6 @@ def running_sums(
         Sums out to each of the next orders, of the first combs only: of those that still have lines within reach.
         Past its last line a comb's sums stay as they are; 0 where there is no such line SNR.
     """
-    table = np.zeros((evidence.shape[1], MOST_SNRS), np.float32)
-    table[:, : len(evidence)] = evidence.T
-    lines = table.view(np.complex128)[:, 0]
     nearest = starts + 0.5
     outermost = reach / np.abs(steps[0])
     before = np.zeros((*starts.shape, MOST_SNRS), np.float32)
@@ -50,7 +46,7 @@ def running_sums(
         every = int(falling.searchsorted(-order[-1, 0, 0], side="right"))
         place = order * steps[:, :some]
         place += nearest[:, :some]
-        seen = lines.take(place.astype(np.intp), mode="clip")
+        seen = evidence.table.take(place.astype(np.intp), mode="wrap")
         seen[..., every:] *= order <= outermost[every:some]
         sums = seen.view(np.float32).reshape(*seen.shape, MOST_SNRS)
         for inner, outer in zip((before[:, :some], *sums[:-1]), sums, strict=True):

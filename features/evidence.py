@@ -1,5 +1,8 @@
 """What speaks for a line in each bin of a periodogram."""
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +15,30 @@ LINE_CAP = 5.0
 
 #: A line weaker than its neighbourhood by this factor in power is a leak or an imbalance, not a line of the comb.
 NEIGHBOUR_SHARE = 0.03
+
+
+#: Line SNRs that are looked up side by side, at most: they are taken from the table as one complex number.
+MOST_SNRS = 4
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What speaks for a line in every bin.
+
+    Parameters
+    ----------
+    rows : ndarray of float32, shape (line SNRs, bins)
+        Log likelihood ratio of a line against noise, FFT order; 0 where a line cannot be seen [nats].
+    """
+
+    rows: NDArray[np.float32]
+
+    @cached_property
+    def table(self) -> NDArray[np.complex128]:
+        """All line SNRs of a bin as one number of `MOST_SNRS` float32, 0 where there is no such SNR, shape (bins,)."""
+        table = np.zeros((self.rows.shape[1], MOST_SNRS), np.float32)
+        table[:, : len(self.rows)] = self.rows.T
+        return table.view(np.complex128)[:, 0]
 
 
 def line_evidence(power: NDArray[np.floating], block: int) -> NDArray[np.float32]:

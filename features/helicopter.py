@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from .comb import Comb
 from .comb_fit import MARGIN_ORDERS, CombFit, fit_combs
 from .comb_search import FINE_STEPS, Candidate, heights, score, spacing_limits
-from .comb_sums import MOST_SNRS, running_sums
-from .evidence import line_evidence
+from .comb_sums import running_sums
+from .evidence import MOST_SNRS, Evidence, line_evidence
 from .lines import sum_of_lines
 from .periodogram import LEAST_LEVEL, Periodogram, local_level
 from .rotors import MOST_GEAR, Rotors, judged, separate_rotors
@@ -171,14 +171,14 @@ def _hidden(rest: Periodogram, first: CombFit) -> NDArray[np.bool_]:
     return np.asarray(near | ~rest.usable(bins), np.bool_)
 
 
-def _evidence(rest: Periodogram, hidden: NDArray[np.bool_]) -> NDArray[np.float32]:
+def _evidence(rest: Periodogram, hidden: NDArray[np.bool_]) -> Evidence:
     """Evidence of a line in every bin [nats], 0 where it is hidden."""
     evidence = line_evidence(np.where(hidden, 1.0, rest.power), rest.block)
     evidence[:, hidden] = 0.0
-    return evidence
+    return Evidence(evidence)
 
 
-def _rival(rest: Periodogram, evidence: NDArray[np.float32], hidden: NDArray[np.bool_], best: Candidate) -> float:
+def _rival(rest: Periodogram, evidence: Evidence, hidden: NDArray[np.bool_], best: Candidate) -> float:
     """A fraction or multiple of a spacing that explains the lines as well [cycles a sample]; 0 if none does."""
     multiple = _closest(rest, evidence, best.spacing * MULTIPLES[best.spacing * MULTIPLES < 0.4], best.centre)
     if multiple.score > MULTIPLE_SHARE * best.score:
@@ -199,7 +199,7 @@ def _rival(rest: Periodogram, evidence: NDArray[np.float32], hidden: NDArray[np.
 
 
 def _loudest(
-    rest: Periodogram, evidence: NDArray[np.float32], chopping: float, centre: float, limits: tuple[float, float]
+    rest: Periodogram, evidence: Evidence, chopping: float, centre: float, limits: tuple[float, float]
 ) -> Candidate | None:
     """The comb a gear ratio from the first that speaks loudest."""
     low, high = GEAR_RANGE
@@ -215,12 +215,13 @@ def _loudest(
     return _closest(rest, evidence, loudest, centre)
 
 
-def _even_heights(evidence: NDArray[np.float32], spacings: NDArray[np.float64], centre: float) -> NDArray[np.float32]:
+def _even_heights(evidence: Evidence, spacings: NDArray[np.float64], centre: float) -> NDArray[np.float32]:
     """Best evidence of each spacing, rising, with both sides equally far; at least 0."""
-    size = evidence.shape[-1]
+    size = evidence.rows.shape[-1]
     # both sides at once: the spectrum folded about the centre
     middle, away = round(centre * size), np.arange(size // 2 + 1)
-    folded = evidence.take(middle + away, axis=1, mode="wrap") + evidence.take(middle - away, axis=1, mode="wrap")
+    sides = (evidence.rows.take(middle + sign * away, axis=1, mode="wrap") for sign in (-1, 1))
+    folded = Evidence(np.add(*sides))
     best = np.zeros((len(spacings), MOST_SNRS), np.float32)
     for sums in running_sums(folded, np.zeros((1, len(spacings))), spacings[None] * size, size / 2):
         held = best[: sums.shape[2]]

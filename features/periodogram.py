@@ -10,7 +10,7 @@ from scipy import fft
 
 from .bodies import LINE_DB, line_among, other_body, slow_body, turns_of, within
 from .clicks import without_clicks
-from .evidence import line_evidence
+from .evidence import Evidence, line_evidence
 from .lines import LineSpace, squared
 from .notch import LOBE_BINS, NOTCH_MPS, Body, body_line
 from .octaves import over_neighbours
@@ -113,14 +113,14 @@ class Periodogram:
         return LineSpace(self.samples)
 
     @cached_property
-    def evidence(self) -> NDArray[np.float32]:
-        """Evidence of a line in every bin [nats], 0 where it cannot be seen, shape (line SNRs, bins)."""
-        return self._evidence * self.seen
+    def evidence(self) -> Evidence:
+        """Evidence of a line in every bin, 0 where it cannot be seen."""
+        return Evidence(self._evidence * self.seen)
 
     @cached_property
-    def contrast(self) -> NDArray[np.float32]:
+    def contrast(self) -> Evidence:
         """The same over what any place near by has, where lines fill that: see `octaves.over_neighbours`."""
-        return over_neighbours(self._evidence, self.block) * self.seen
+        return Evidence(over_neighbours(self._evidence, self.block) * self.seen)
 
     @cached_property
     def _evidence(self) -> NDArray[np.float32]:

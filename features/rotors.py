@@ -13,6 +13,7 @@ from .bodies import LINE_DB
 from .comb import Comb, strong_multiple
 from .comb_fit import CombFit, fit_combs
 from .comb_search import even_scores
+from .evidence import Evidence
 from .flashes import flash_nats
 from .lines import squared
 from .periodogram import Periodogram
@@ -113,7 +114,7 @@ class Rotors:
 
 
 def _strongest(
-    data: Periodogram, centre: float, rates: NDArray[np.float64], furthest: float, evidence: NDArray[np.float32]
+    data: Periodogram, centre: float, rates: NDArray[np.float64], furthest: float, evidence: Evidence
 ) -> tuple[float, int, float]:
     """Rate whose lines speak loudest by their powers and their flashes, how far they reach, and their evidence."""
     size = len(data.power)

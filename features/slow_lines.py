@@ -8,6 +8,7 @@ signals of so narrow a band.
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -227,15 +228,16 @@ def notched_products(
 @lru_cache(maxsize=4)
 def _gram_inverse(pulses: int, bands: tuple[tuple[float, float], ...]) -> NDArray[np.float64]:
     """Inverse of the products between the sequences of all bands, odd ones times j, which makes them real."""
-    time = np.arange(pulses) - (pulses - 1) / 2
     bases = [slepian(pulses, half) for _, half in bands]
-    odds = [_odd(basis) for basis in bases]
-    rows = []
-    for (one, _), first, odd in zip(bands, bases, odds, strict=True):
-        row = []
-        for (two, _), second, other in zip(bands, bases, odds, strict=True):
-            turn = np.exp(2j * np.pi * (two - one) * time)
-            product = (first * turn.real) @ second.T + 1j * ((first * turn.imag) @ second.T)
-            row.append((np.where(odd, -1j, 1)[:, None] * product * np.where(other, 1j, 1)).real)
-        rows.append(row)
-    return np.asarray(np.linalg.pinv(np.block(rows), rcond=1e-9, hermitian=True), np.float64)
+    ends = np.cumsum([0, *map(len, bases)])
+    gram = np.eye(ends[-1])
+    for one, two in combinations(range(len(bands)), 2):
+        block = gram[ends[one] : ends[one + 1], ends[two] : ends[two + 1]]
+        turn = _turn(pulses, bands[two][0] - bands[one][0])
+        even, uneven = turn.real.copy(), turn.imag.copy()
+        for odd in (0, 1):
+            own = bases[two][odd::2].T
+            block[odd::2, odd::2] = (bases[one][odd::2] * even) @ own
+            block[1 - odd :: 2, odd::2] = (bases[one][1 - odd :: 2] * (uneven if odd == 0 else -uneven)) @ own
+        gram[ends[two] : ends[two + 1], ends[one] : ends[one + 1]] = block.T
+    return np.asarray(np.linalg.pinv(gram, rcond=1e-9, hermitian=True), np.float64)

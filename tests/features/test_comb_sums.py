@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from bladewing.features.comb_search import even_scores, heights, score
-from bladewing.features.comb_sums import MOST_SNRS, running_sums
+from bladewing.features.comb_sums import running_sums
+from bladewing.features.evidence import MOST_SNRS, Evidence
 
 
 @pytest.mark.parametrize("combs", [1, 40, 900])
@@ -13,7 +14,7 @@ def test_running_sums_are_those_of_a_loop(combs):
     evidence = rng.standard_normal((3, bins)).astype(np.float32)
     steps = np.sort(rng.uniform(7, 120, (1, combs)))
     starts = rng.uniform(5, 90, (1, combs))
-    blocks = list(running_sums(evidence, starts, steps, reach))
+    blocks = list(running_sums(Evidence(evidence), starts, steps, reach))
     for comb in {0, combs // 2, combs - 1}:
         order = np.arange(1, int(reach / steps[0, comb]) + 1)
         places = np.floor(starts[0, comb] + order * steps[0, comb] + 0.5).astype(int)
@@ -30,10 +31,10 @@ def test_heights_are_the_scores():
     evidence = (rng.standard_normal((3, 4001)) - 0.2).astype(np.float32)
     spacings = np.exp(rng.uniform(np.log(0.004), np.log(0.2), 300))
     centres = rng.uniform(-0.7, 0.7, 300)
-    expected, low, high = score(evidence, spacings, centres)
-    np.testing.assert_allclose(heights(evidence, spacings, centres), expected, atol=1e-3)
+    expected, low, high = score(Evidence(evidence), spacings, centres)
+    np.testing.assert_allclose(heights(Evidence(evidence), spacings, centres), expected, atol=1e-3)
     assert np.any(-low != high)  # some of them reach unequally far
-    assert len(heights(evidence, spacings[:0], centres[:0])) == 0
+    assert len(heights(Evidence(evidence), spacings[:0], centres[:0])) == 0
 
 
 def test_even_scores_are_those_of_a_loop():
@@ -41,7 +42,7 @@ def test_even_scores_are_those_of_a_loop():
     size = 4001
     evidence = (rng.standard_normal((3, size)) - 0.2).astype(np.float32)
     spacings, centres = np.sort(rng.uniform(0.004, 0.2, 200)), rng.uniform(-0.7, 0.7, 200)
-    scores, reach = even_scores(evidence, spacings, centres)
+    scores, reach = even_scores(Evidence(evidence), spacings, centres)
     for number in range(0, 200, 7):
         order = np.arange(1, int(0.5 / spacings[number]) + 1)
         sides = [np.rint((centres[number] + sign * spacings[number] * order) * size) for sign in (-1, 1)]
