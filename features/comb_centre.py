@@ -64,13 +64,14 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
     totals: dict[int, float] = {}
     steps = found.spacing * (1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * data.pulses))
     bonuses, even = _bonuses(data, found)
-    for centre, bonus in bonuses.items():
-        shift = round((centre - found.centre) / found.spacing)
-        # one comb for several rotors may pass a little beside the body's line: either place will do
-        beside = found.centre + found.spacing * shift
-        scores, _ = even_scores(evidence, np.repeat(steps, 2), np.tile([centre, beside], len(steps)))
-        index = int(scores.argmax())
-        total = float(scores[index]) + bonus + even.get(shift, 0.0)
+    shifts = [round((centre - found.centre) / found.spacing) for centre in bonuses]
+    # one comb for several rotors may pass a little beside the body's line: either place will do
+    either = np.stack([list(bonuses), found.centre + found.spacing * np.array(shifts)], axis=1)
+    scores, _ = even_scores(evidence, np.repeat(steps, either.size), np.tile(either.ravel(), len(steps)))
+    scores = scores.reshape(len(steps), *either.shape).max(axis=2)
+    for shift, (centre, bonus), own in zip(shifts, bonuses.items(), scores.T, strict=True):
+        index = int(own.argmax())
+        total = float(own[index]) + bonus + even.get(shift, 0.0)
         totals[shift] = max(totals.get(shift, -np.inf), total)
         if total > most:
             most = total
@@ -78,7 +79,7 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
                 best = found
             else:
                 best = Candidate(
-                    float(steps[index // 2]),
+                    float(steps[index]),
                     centre,
                     min(found.low - shift, 0),
                     max(found.high - shift, 0),

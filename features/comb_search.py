@@ -324,12 +324,10 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     finest = loudest_first[np.unique(family[loudest_first], return_index=True)[1]]
     scores, lows, highs = score(evidence, spacings[finest], centres[finest])
     share = REST_FLASH_SHARE if data.rest_half > 0 else FLASH_SHARE
-    found: list[Candidate] = []
-    for index in np.argsort(-scores, kind="stable"):
-        most = max((other.score for other in found), default=-np.inf)
-        if (1 + share) * scores[index] < MULTIPLE_SHARE * most:  # flashes can not bring it near the best
-            break
-        place = (float(spacings[finest[index]]), float(centres[finest[index]]), int(lows[index]), int(highs[index]))
-        flash = flash_evidence(data, *place)
-        found.append(Candidate(*place, float(scores[index]) + min(flash, share * float(scores[index]))))
-    return found[coarsest([c.spacing for c in found], [c.score for c in found])]
+    # flashes can not bring what scores less near the best
+    near = np.flatnonzero((1 + share) * scores >= MULTIPLE_SHARE * scores.max())
+    places = [values[near] for values in (spacings[finest], centres[finest], lows, highs)]
+    totals = scores[near] + np.minimum(flash_evidence(data, *places), share * scores[near])
+    chosen = coarsest(places[0], totals)
+    spacing, centre, low, high, total = (values[chosen].item() for values in (*places, totals))
+    return Candidate(spacing, centre, low, high, total)

@@ -46,30 +46,32 @@ def flash_nats(amplitudes: NDArray[np.complexfloating]) -> NDArray[np.float64]:
     return np.where(lines >= LEAST_LINES, np.maximum(nats, 0.0), 0.0)
 
 
-def flash_evidence(data: Periodogram, spacing: float, centre: float, low: int, high: int) -> float:
-    """Evidence of flashes in a comb, both sides together [nats].
+def flash_evidence(
+    data: Periodogram,
+    spacings: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    lows: NDArray[np.intp],
+    highs: NDArray[np.intp],
+) -> NDArray[np.float64]:
+    """Evidence of flashes in combs, both sides together, shape (combs,) [nats].
 
     Parameters
     ----------
     data : Periodogram
         The record.
-    spacing, centre : float
-        Of the comb [cycles a sample].
-    low, high : int
+    spacings, centres : ndarray, shape (combs,)
+        [cycles a sample].
+    lows, highs : ndarray of int, shape (combs,)
         Outermost orders, low <= 0 <= high.
     """
-    size = len(data.amplitude)
-    sides = []
-    for sign, reach in ((-1, -low), (1, high)):
-        frequency = centre + sign * spacing * np.arange(1, reach + 1)
-        seen = data.amplitude[np.rint(frequency * size).astype(np.intp) % size]
-        sides.append(np.where(data.usable(frequency), seen, 0))
-    left, right = sides
-    if len(left) == len(right):
-        apart = float(flash_nats(np.stack(sides)).sum())
-    else:
-        apart = sum(float(flash_nats(side)) for side in sides if len(side) >= LEAST_LINES)
+    size, reach = len(data.amplitude), np.stack([-lows, highs])
+    order = np.arange(1, reach.max(initial=0) + 1)
+    frequency = centres[:, None] + np.array([-1, 1])[:, None, None] * spacings[:, None] * order
+    counted = data.usable(frequency) & (order <= reach[..., None])
+    left, right = np.where(counted, data.amplitude[np.rint(frequency * size).astype(np.intp) % size], 0)
+    apart = flash_nats(np.stack([left, right])).sum(axis=0)
     # J_-n = (-1)^n J_n: one step for both sides, with half a turn more on the one where the blades are of odd number
-    turned = left * (-1.0) ** np.arange(1, len(left) + 1)
-    both = np.stack([np.concatenate([side[::-1], [0], right]) for side in (left, turned)])
-    return max(apart, float(flash_nats(both).max()) - float(np.log(2)))
+    turned = left * np.float32(-1) ** order
+    rest = np.zeros_like(left[:, :1])
+    both = np.stack([np.concatenate([side[:, ::-1], rest, right], axis=1) for side in (left, turned)])
+    return np.maximum(apart, flash_nats(both).max(axis=0) - np.log(2))

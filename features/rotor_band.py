@@ -125,41 +125,45 @@ def _log_likelihood(
     shares: NDArray[np.float64],
     leak: float,
 ) -> NDArray[np.float64]:
-    """Log likelihood of line powers in noise, the family's level the likeliest, shape (..., shares).
+    """Log likelihood of line powers in noise, the family's level the likeliest, shape (shares, families).
 
-    A mean of |line + noise|^2 as a gamma law of the same mean and variance: exact for noise alone.
+    A mean of |line + noise|^2 as a gamma law of the same mean and variance: exact for noise alone. The families of
+    `shape`, (lines, families), lie side by side in memory, as what is done to each line is the same for all.
     """
-    excess, beat, own = power - noise, 2 * noise / bins, (noise + leak) ** 2 / bins
-    shape = shape[..., None, :]
+    excess = power - noise
+    beat, own = ((2 * noise / bins)[:, None, None], ((noise + leak) ** 2 / bins)[:, None, None])
+    by_line, shape = shares.T[:, :, None], shape[:, None]
     # past the edge of a narrow family there may be no line at all: its level is then anyone's guess
-    level = np.maximum((shape @ excess) / np.maximum((shape**2).sum(axis=-1), LEAST_SUM), 1e-6)
+    level = np.tensordot(excess, shape, 1) / np.maximum((shape**2).sum(axis=0), LEAST_SUM)
+    level = np.maximum(level, 1e-6)
 
     def variance(line: NDArray[np.float64]) -> NDArray[np.float64]:
-        out = shares * line
+        out = by_line * line
         out += beat
         out *= line
         out += own
         return out
 
     for _ in range(LEVEL_STEPS):
-        pull = variance(level[..., None] * shape)
+        pull = variance(level * shape)
         np.divide(shape, pull, out=pull)
-        fisher = (pull[..., None, :] @ shape[..., None])[..., 0, 0]
-        level = np.maximum((pull @ excess) / np.maximum(fisher, LEAST_SUM), 0.05 * level)
-    line = level[..., None] * shape
-    mean = line + (noise + leak)
+        newest = np.tensordot(excess, pull, 1)
+        fisher = np.multiply(pull, shape, out=pull).sum(axis=0)
+        level = np.maximum(newest / np.maximum(fisher, LEAST_SUM), 0.05 * level)
+    line = level * shape
+    mean = line + (noise + leak)[:, None, None]
     number = mean**2
     number /= variance(line)
-    ratio = np.divide(power + leak, mean, out=mean)
+    ratio = np.divide((power + leak)[:, None, None], mean, out=mean)
     each = np.log(ratio)
     each -= ratio
     each += 1
     each *= number
     # Stirling's series for the gamma function
-    each += 0.5 * np.log(number)
+    each += np.multiply(0.5, np.log(number, out=ratio), out=ratio)
     each -= np.divide(1 / 12, number, out=number)
     # a level of any size is as likely: what the data leave of its logarithm
-    return np.asarray(each.sum(axis=-1) - 0.5 * np.log(level**2 * fisher + 1), np.float64)
+    return np.asarray(each.sum(axis=0) - 0.5 * np.log(level**2 * fisher + 1), np.float64)
 
 
 def fit_edge(
@@ -220,9 +224,14 @@ def fit_edge(
         near = order <= max(high + REACH * high ** (1 / 3) / min(choices) ** (2 / 3), order[0])
         count = int(order[near][-1])
         shapes = [_spread_powers(number * edges, number, count, spread)[..., order[near] - 1] for number in choices]
-        data = (np.stack(shapes), power[near], noise[near], bins[near], every[few, None] + scatter[near])
-        weight = np.stack([_log_likelihood(*data, share * loud) for share in leaks], axis=-1)
-        weight += np.log(np.outer([BLADES.get(number, 1.0) for number in choices], PROFILES))[..., None, None, None]
+        families = np.ascontiguousarray(np.stack(shapes).reshape(-1, int(near.sum())).T)
+        data = (families, power[near], noise[near], bins[near], every[few, None] + scatter[near])
+        # the first search asks the one of less sharp an edge alone: it only says about which lines to look
+        nats = np.stack([_log_likelihood(*data, share * loud) for share in leaks[: 1 + search]])
+        weight = np.moveaxis(nats.reshape(*nats.shape[:2], len(choices), 2, len(edges)), (0, 1), (4, 3))
+        weight = (
+            weight + np.log(np.outer([BLADES.get(number, 1.0) for number in choices], PROFILES))[..., None, None, None]
+        )
         weight += np.log(prior[few] / edges[:, None])[..., None]
         weight = np.exp(weight - weight.max())
         weight /= weight.sum()
