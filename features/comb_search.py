@@ -326,8 +326,9 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     share = REST_FLASH_SHARE if data.rest_half > 0 else FLASH_SHARE
     # flashes can not bring what scores less near the best
     near = np.flatnonzero((1 + share) * scores >= MULTIPLE_SHARE * scores.max())
-    places = [values[near] for values in (spacings[finest], centres[finest], lows, highs)]
-    totals = scores[near] + np.minimum(flash_evidence(data, *places), share * scores[near])
-    chosen = coarsest(places[0], totals)
-    spacing, centre, low, high, total = (values[chosen].item() for values in (*places, totals))
-    return Candidate(spacing, centre, low, high, total)
+    spacings, centres, lows, highs = spacings[finest[near]], centres[finest[near]], lows[near], highs[near]
+    flashes = flash_evidence(data, spacings, centres, lows, highs)
+    totals = scores[near] + np.minimum(flashes, share * scores[near])
+    best = coarsest(spacings.tolist(), totals.tolist())
+    low, high = int(lows[best]), int(highs[best])
+    return Candidate(float(spacings[best]), float(centres[best]), low, high, float(totals[best]))

@@ -18,8 +18,9 @@ from .comb_sums import running_sums
 from .evidence import MOST_SNRS, Evidence, line_evidence
 from .lines import sum_of_lines
 from .periodogram import LEAST_LEVEL, Periodogram, local_level
-from .rotors import MOST_GEAR, Rotors, judged, separate_rotors
+from .rotors import MOST_GEAR, Rotors, separate_rotors
 from .slow_lines import remove_bands
+from .unresolved import judged
 
 #: Ratio of tail to main chopping frequency: 4.73 in the paper, 4 to 6 in general, and some room.
 GEAR_RANGE = (2.5, float(MOST_GEAR))
@@ -236,9 +237,7 @@ def _geometric(low: float, high: float, pulses: int) -> NDArray[np.float64]:
     return np.geomspace(low, high, int(np.log(high / low) * pulses / 2) + 2)
 
 
-def _closest(
-    rest: Periodogram, evidence: NDArray[np.float32], spacings: NDArray[np.float64], centre: float
-) -> Candidate:
+def _closest(rest: Periodogram, evidence: Evidence, spacings: NDArray[np.float64], centre: float) -> Candidate:
     """The best of spacings and of those near them."""
     factors = 1 + 0.25 / rest.pulses * np.arange(-2 * FINE_STEPS, 2 * FINE_STEPS + 1)
     tried = np.outer(spacings, factors).ravel()

@@ -180,13 +180,19 @@ class Periodogram:
         level = _level_at_bins(power, keep, 1.0, _block(size, self.pulses), evened=evened)
         return lambda frequency: np.maximum(level(np.rint(frequency * size) % size), LEAST_LEVEL)
 
-    def left(self, samples: NDArray[np.complex128]) -> "Periodogram":
-        """What is left of the same record, at the same local level."""
+    def left(self, samples: NDArray[np.complex128], *, levelled: bool = False) -> "Periodogram":
+        """What is left of the same record, at the same local level.
+
+        Levelled, at its own where that is lower: lines that fill all there is between them have lifted the record's.
+        """
         size = len(self.power)
-        amplitude = (_spectrum(samples, size, tapered=False) / np.sqrt(self.level)).astype(np.complex64)
+        level = self.level
+        if levelled:
+            level = np.minimum(level, np.maximum(self.level_of(samples)(np.arange(size) / size), 1.0))
+        amplitude = (_spectrum(samples, size, tapered=False) / np.sqrt(level)).astype(np.complex64)
         power = squared(amplitude)
         power[~_kept(size, self.blocked)] = 1.0
-        return replace(self, samples=samples, amplitude=amplitude, power=power)
+        return replace(self, samples=samples, amplitude=amplitude, power=power, level=level)
 
 
 def _block(size: int, pulses: int) -> int:

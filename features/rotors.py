@@ -3,11 +3,12 @@
 Rotors of nearly one rate part at the high orders, where the lines lie further from one another than the dwell's bin.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum, auto
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from .bodies import LINE_DB
 from .comb import Comb, strong_multiple
@@ -21,14 +22,17 @@ from .periodogram import Periodogram
 #: Rotors looked for at most.
 MAX_ROTORS = 8
 
-#: How far the rates of one airframe's rotors lie from the comb found first, relative: in hover, and in a manoeuvre or
-#: where rotors are not alike. The latter are sought by their inner orders, which part such rates already.
+#: How far the rates of one airframe's rotors lie from those known, relative, in hover; and in a manoeuvre or where they
+#: are not alike, from the comb found first: these are sought by their inner orders, which part such rates already.
 RATE_SPREAD, FURTHEST_SPREAD, INNER_ORDERS = 0.05, (-0.25, 0.33), 10
 
 #: A rotor that turns slower still has lines at twice its rate, which may lie among these: those at halves of that, out
 #: to so many orders, which other rotors' lines have not filled yet, have this share of their power and so many times
 #: that of noise, all but so large a share of them.
 HALF_ORDERS, HALF_SHARE, HALF_POWER, HALF_QUANTILE = 6, 0.05, 4.0, 0.3
+
+#: Every second, third or fourth line of a rotor passes for a comb of these shares of its rate.
+FRACTIONS = np.array([2 / 3, 3 / 4, 4 / 5, 5 / 4, 4 / 3])
 
 #: What lies within so many bins of a line that is known says nothing of these; so many must be left.
 NEAR_BINS, LEAST_BETWEEN = 2.0, 4
@@ -40,41 +44,22 @@ APART_REACH = 0.5
 #: more are not told apart.
 MOST_LINES = 2000
 
-#: A further rotor must have this much evidence [nats], and this share of the strongest one's.
-LEAST_EVIDENCE = 13.0
-LEAST_SHARE = 0.03
+#: A further rotor must have this much evidence [nats], and this share of the strongest one's. With less than so large a
+#: share it may be what is left of those found, which are fitted to the end first.
+LEAST_EVIDENCE = 20.0
+LEAST_SHARE, DOUBTFUL_SHARE = 0.1, 0.5
 
 #: A comb weaker than this share of the strongest is what a rate that changed within the dwell leaves behind.
 LEAST_POWER_SHARE = 0.12
 
-#: Steps of the joint fit each time a rotor is added, and once all are found: only then their deviations matter.
-JOINT_STEPS, LAST_STEPS = 2, 1
+#: Steps of the joint fit each time a rotor is added, and once all are found: only then their deviations matter. And at
+#: most where what they leave would be called unresolved: strong lines not fitted to the end leave some of themselves.
+JOINT_STEPS, LAST_STEPS, FURTHER_STEPS = 2, 1, 4
 
 #: A helicopter's tail rotor turns at most so many times as fast as its main rotor: at a fraction of its rate every so
 #: many-th line is there, and that fraction may lie among the rates of rotors like the first one. By so much are these
 #: stronger: 20 times and more where a tail is 8 dB under a main rotor of 5 dB, up to 8 where rotors' lines cross.
 MOST_GEAR, GEAR_FACTOR = 9, 12.0
-
-#: A rotor flashes once a period on each side of the body. A second flash of this share of the first one's power is
-#: another rotor's, of a rate that the dwell does not tell apart; so far from the first it is no part of it [1 / lines].
-SECOND_FLASH_SHARE, FLASH_WIDTH, FLASH_PADDING = 0.3, 2.5, 16
-LEAST_FLASH_LINES = 6
-
-#: What is left between the lines within the band, over what is left beyond it, and as a share of the lines' power,
-#: speaks of rotors that were not found where it exceeds both of these.
-LEFT_OVER, LEFT_SHARE = 0.3, 0.05
-LEAST_BINS = 100
-
-#: What a lone rotor leaves may be a change of its rate; from this share of its lines' power on they say little of it.
-LEFT_ALONE = 0.25
-
-#: As does what is left where it comes, with so many of its deviations, to the mean rotor found: one more like it would
-#: not have been seen.
-HIDDEN_DEVIATIONS = 1.5
-
-#: What stands past the edge of a lone rotor's family, out to so many times it, speaks of rotors whose outer lines part
-#: where it comes to so many deviations, and to this share of the lines' power.
-PAST_EDGE, PAST_DEVIATIONS, PAST_SHARE = 4.0, 4.0, 0.2
 
 #: Lines are looked for so far past the edge of the line family: what strong ones leave there may pass for more.
 FURTHEST = 1.5
@@ -129,49 +114,6 @@ def _strongest(
     return float(rates[best]), int(reach[best]), float(sums[best])
 
 
-def _flashes_twice(fit: CombFit, per_turn: int, tip: float) -> bool:
-    """True where a comb's phases show the flashes of two rotors in each period.
-
-    A blade that reflects along its length flashes once on each side. One that reflects at its tip alone is seen twice
-    at every speed below the tip's, before and after that comes straight on: its lines are J_n(Gamma) (the paper's eq.
-    24), and flash once when these are taken for what they are; `tip` is the order its edge has.
-    """
-    return all(_second_flashes(fit, per_turn, blade) for blade in (None, (1, tip), (2, tip), (3, tip)))
-
-
-def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) -> bool:
-    """True where the second flashes on both sides are as strong as another rotor's, for blades of one kind.
-
-    Parameters
-    ----------
-    fit, per_turn
-        The comb, and the strong lines' spacing in lines of it.
-    tip : (int, float), optional
-        Blades that reflect at their tips, and the tip's order; else they reflect along their length.
-    """
-    from scipy.special import jv  # here, because predicting needs no such import
-
-    shares = []
-    for sign in (-1, 1):
-        side = np.flatnonzero((sign * fit.orders > 0) & (fit.orders % per_turn == 0))
-        order = np.abs(fit.orders[side]) // per_turn
-        if len(side) < LEAST_FLASH_LINES:
-            continue
-        lines = np.zeros(order.max() + 1, np.complex128)
-        lines[order] = fit.amplitudes[side]
-        if tip is not None:
-            lines *= jv(tip[0] * np.arange(len(lines)), tip[0] * tip[1])
-        size = FLASH_PADDING * len(lines)
-        power = np.abs(fft.fft(lines, size)) ** 2
-        first = int(power.argmax())
-        lines_away = np.abs((np.arange(size) - first + size // 2) % size - size // 2) / FLASH_PADDING
-        other = lines_away > FLASH_WIDTH
-        for part in (2, 3):  # unequal blades of one rotor flash at fractions of the turn
-            other &= np.abs(lines_away - len(lines) / part) > 1
-        shares.append(power[other].max(initial=0) / power[first])
-    return len(shares) == 2 and min(shares) > SECOND_FLASH_SHARE / 2 and sum(shares) > 2 * SECOND_FLASH_SHARE
-
-
 def _strongest_apart(
     data: Periodogram, centre: float, nominal: float, resolution: float, furthest: float
 ) -> tuple[float, int, float]:
@@ -209,65 +151,142 @@ def _holds_another(fit: CombFit, pulses: int) -> bool:
     return strong_multiple(fit.orders, 1 + pulses * np.abs(fit.amplitudes) ** 2, MOST_GEAR, GEAR_FACTOR) > 1
 
 
-#: Of each bin: how far from a centre it is [cycles a sample], its power, whether it can be seen.
-_About = tuple[NDArray[np.float64], NDArray[np.floating], NDArray[np.bool_]]
+def _powers(fits: list[CombFit]) -> list[float]:
+    """Powers of combs' lines, over the orders that all of them reach.
 
-
-def _power_about(rest: Periodogram, centre: float) -> _About:
-    """Of each bin of what is left: how far from a centre it is [cycles a sample], its power, whether it can be seen."""
-    frequency = fft.fftfreq(rest.pulses)
-    away = np.abs(frequency - centre)
-    seen = rest.usable(frequency) & rest.in_band(frequency)
-    return np.abs(away - np.rint(away)), squared(fft.fft(rest.samples)) / rest.pulses, seen
-
-
-def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[float, bool]:
-    """What is left within the band: its share of the lines' power, and whether it may be a rotor.
-
-    The share is 0 where that is not clearly more than the noise beyond the band.
-
-    Fitted lines take noise out with them: each as much as it was let free, those that lie in one another only once.
+    Not their means: where lines of two rotors lie in one another they may come out as large ones that cancel.
     """
-    away, power, usable = about
-    pulses = len(power)
-    low, high = 2 * fits[0].spacing, 0.9 * edge
-    within = usable & (away < high) & (away > low)
-    beyond = usable & (away > 1.1 * edge)
-    if within.sum() < LEAST_BINS or beyond.sum() < LEAST_BINS:
-        return 0.0, False
-    noise = float(power[beyond].mean())
-    over = float(power[within].mean()) - noise
-    lines = sum(float((np.abs(fit.amplitudes) ** 2).sum()) for fit in fits) * pulses
-    share = over * within.sum() / lines if over > LEFT_OVER * noise else 0.0
-    range_bins = float(np.ptp([fit.spacing for fit in fits])) * pulses
-    held, taken = 0.0, 0.0
-    for fit in fits:
-        order = np.abs(fit.orders)
-        inside = (order * fit.spacing < high) & (order * fit.spacing > low)
-        held += float((np.abs(fit.amplitudes[inside]) ** 2).sum()) * pulses / len(fits)
-        apart = np.minimum(1.0, (1 + order[inside] * range_bins) / len(fits))
-        taken += float((apart * fit.snr[inside] / (1 + fit.snr[inside])).sum())
-    deviation = noise * float(np.sqrt(1 / within.sum() + 1 / beyond.sum()))
-    most = over + noise * taken / within.sum() + HIDDEN_DEVIATIONS * deviation
-    return share, most * within.sum() > held
+    common = min(int(np.abs(fit.orders).max()) for fit in fits)
+    return [float(np.median(squared(fit.amplitudes[np.abs(fit.orders) <= common]))) for fit in fits]
 
 
-def _stands_past(about: _About, fit: CombFit, edge: float) -> bool:
-    """True where more than noise stands past the edge of a line family: near the noise its inner lines alone are seen.
+def _meet(fits: list[CombFit], resolution: float) -> bool:
+    """True where rates lie nearer than the dwell tells apart."""
+    rates = np.sort([fit.spacing for fit in fits])
+    return len(rates) > 1 and float(np.diff(rates).min()) < resolution
 
-    Rotors of unlike rates have their lines in one another at the inner orders, and apart at the outer ones.
-    """
-    away, power, usable = about
-    furthest = min(PAST_EDGE * edge, (edge + 0.5) / 2)
-    past = usable & (away > 1.1 * edge) & (away < furthest)
-    far = usable & (away > furthest)
-    if past.sum() < LEAST_BINS or far.sum() < LEAST_BINS:
-        return False
-    noise = float(power[far].mean())
-    over = float(power[past].mean()) - noise
-    lines = float((np.abs(fit.amplitudes) ** 2).sum()) * len(power)
-    deviation = noise * float(np.sqrt(1 / past.sum() + 1 / far.sum()))
-    return over > PAST_DEVIATIONS * deviation and over * past.sum() > PAST_SHARE * lines
+
+class _Outcome(Enum):
+    """What came of a rate that speaks for a further rotor."""
+
+    ADDED = auto()
+    NO_ROTOR = auto()
+    UNRESOLVED = auto()
+
+
+@dataclass(frozen=True)
+class _Sought:
+    """A rate [cycles a sample], the orders it reaches, its evidence [nats], and whether it is far from the first."""
+
+    rate: float
+    reach: int
+    evidence: float
+    is_apart: bool
+
+
+class _Separation:
+    """The rotors found so far, which grow by one at a time."""
+
+    def __init__(self, data: Periodogram, comb: Comb, centre: float, reach: int) -> None:
+        self.data, self.comb, self.centre = data, comb, centre
+        self.nominal = comb.chopping
+        self.resolution = RESOLVED_BINS / (reach * data.pulses)
+        self.furthest = min(FURTHEST * self.nominal * reach, 0.5)
+        self.fits: list[CombFit] = []
+        self.reaches: list[int] = []
+        self.rest = data
+        self.fitted_out = True  # nothing to gain by fitting these once more
+        self.seeks_apart = True
+        self.spread = 0.0  # of rates that are not told apart [cycles a sample]
+
+    @property
+    def rates(self) -> list[float]:
+        """Of the rotors found [cycles a sample]."""
+        return [fit.spacing for fit in self.fits]
+
+    def sought(self) -> list[_Sought]:
+        """What speaks loudest for a further rotor, near the rates known and far from them; the loudest first."""
+        ends = [self.nominal, *self.rates]
+        rates = np.arange(min(ends) * (1 - RATE_SPREAD), max(ends) * (1 + RATE_SPREAD), self.resolution / 4)
+        out = [_Sought(*_strongest(self.rest, self.centre, rates, self.furthest, self.rest.contrast), False)]
+        if self.fits and self.seeks_apart:
+            found = _strongest_apart(self.rest, self.centre, self.nominal, self.resolution, self.furthest)
+            apart = _Sought(*found, True)
+            known = max(reach * rate for reach, rate in zip(self.reaches, self.rates, strict=True))
+            if apart.rate * apart.reach > APART_REACH * known:
+                out.append(apart)
+        return sorted(out, key=lambda one: -one.evidence)
+
+    def in_turn(self, sought: list[_Sought]) -> Iterator[_Sought]:
+        """These, and where none of them came in what they may be fractions of."""
+        yield from sought
+        yield from self._louder_fraction(sought[0])
+
+    def _louder_fraction(self, one: _Sought) -> list[_Sought]:
+        """A rate far from the first of which every second or third line is that of another: at most one, if louder."""
+        low, high = FURTHEST_SPREAD
+        rates = one.rate * FRACTIONS
+        rates = rates[np.abs(rates / self.nominal - 1 - (low + high) / 2) < (high - low) / 2]
+        near = np.arange(-1, 1.01, 0.25) * self.resolution
+        tried = np.sort((rates[:, None] + near).ravel())
+        if not len(tried):
+            return []
+        found = _Sought(*_strongest(self.rest, self.centre, tried, self.furthest, self.rest.contrast), True)
+        return [found] if found.evidence > one.evidence else []
+
+    def join(self, one: _Sought) -> _Outcome:
+        """Take a rate in, if it is a rotor's."""
+        rate, reach = one.rate, one.reach
+        if one.is_apart and _is_twice(self.rest, self.centre, rate, self.fits):
+            rate, reach = rate / 2, 2 * reach
+        same = [abs(rate - known) < self.resolution for known in self.rates]
+        if any(same):  # lines of a rotor that is known, perhaps past those that were fitted
+            further = [max(r, reach) if own else r for r, own in zip(self.reaches, same, strict=True)]
+            self.fitted_out &= further == self.reaches
+            self.reaches = further
+            return self._unresolved(rate)
+        if not self.fits and self.comb.per_turn == 1 and abs(rate - self.nominal) < self.resolution:
+            self.fits, self.reaches, self.rest = [self.comb.fit], [reach], self.data.left(self.comb.rest)
+            return _Outcome.ADDED
+        if 2 * (sum(self.reaches) + reach) > MOST_LINES:
+            return self._unresolved(rate)
+        fitted = self._fitted([*self.rates, rate], [*self.reaches, reach], JOINT_STEPS)
+        if fitted is None:
+            return _Outcome.NO_ROTOR
+        together, samples = fitted
+        if self.fits and _holds_another(together[-1], self.data.pulses):
+            self.seeks_apart &= not one.is_apart
+            return _Outcome.NO_ROTOR
+        if _meet(together, self.resolution):
+            return self._unresolved(rate)
+        powers = _powers(together)
+        if powers[-1] < LEAST_POWER_SHARE * max(powers):  # beside several, nobody's rate
+            return self._unresolved(rate) if len(self.fits) == 1 else _Outcome.UNRESOLVED
+        self.fits, self.reaches, self.rest = together, [*self.reaches, reach], self.data.left(samples, levelled=True)
+        self.fitted_out = False
+        return _Outcome.ADDED
+
+    def _unresolved(self, rate: float) -> _Outcome:
+        self.spread = float(np.ptp([rate, *self.rates]))
+        return _Outcome.UNRESOLVED
+
+    def fit_out(self, steps: int) -> bool:
+        """Fit what was found once more, if there is anything to gain by it; whether that was done."""
+        if self.fitted_out:
+            return False
+        self.fitted_out = True
+        fitted = self._fitted(self.rates, self.reaches, steps)
+        if fitted is None or _meet(fitted[0], self.resolution):
+            return False
+        self.fits, self.rest = fitted[0], self.data.left(fitted[1], levelled=True)
+        return True
+
+    def _fitted(
+        self, rates: list[float], reaches: list[int], steps: int
+    ) -> tuple[list[CombFit], NDArray[np.complex128]] | None:
+        centre = self.fits[0].centre if len(rates) == len(self.fits) else self.centre
+        outermost = [(-reach, reach) for reach in reaches]
+        return fit_combs(self.data, centre, rates, outermost, steps, rest=self.rest.samples)
 
 
 def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
@@ -293,95 +312,36 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
         if level_db > LINE_DB and abs(line - centre) * data.pulses < 1.5:
             centre = line
     reach = max(comb.last // comb.per_turn, int(np.clip(round(edge / nominal), 1, 0.45 / nominal)))
-    resolution = RESOLVED_BINS / (reach * data.pulses)
     alone = Rotors(np.array([nominal]), np.array([comb.chopping_std]), True, 0.0, [comb.fit], comb.rest, nominal)
     if reach * RATE_SPREAD * nominal * data.pulses < 2:
         return alone
-    rates = np.arange(nominal * (1 - RATE_SPREAD), nominal * (1 + RATE_SPREAD), resolution / 4)
-    furthest = min(FURTHEST * nominal * reach, 0.5)
-    fits: list[CombFit] = []
-    reaches: list[int] = []
-    rest = data
-    first, spread, rate = 0.0, 0.0, nominal
-    resolved, seek_apart = True, True
-    while len(fits) < MAX_ROTORS:
-        rate, far, evidence = _strongest(rest, centre, rates, furthest, rest.evidence)
-        is_apart = False
-        if fits and seek_apart:
-            apart = _strongest_apart(rest, centre, nominal, resolution, furthest)
-            known = max(r * fit.spacing for r, fit in zip(reaches, fits, strict=True))
-            if apart[0] * apart[1] > APART_REACH * known and apart[2] > evidence:
-                (rate, far, evidence), is_apart = apart, True
-                if _is_twice(rest, centre, rate, fits):
-                    rate, far = rate / 2, 2 * far
-        first = first or evidence
-        if evidence < max(LEAST_EVIDENCE, LEAST_SHARE * first):
+    found = _Separation(data, comb, centre, reach)
+    first, most, rate, resolved = 0.0, 0.0, nominal, True
+    while len(found.fits) < MAX_ROTORS:
+        sought = found.sought()
+        evidence = sought[0].evidence
+        rate = next(one.rate for one in sought if not one.is_apart)
+        first, most = first or evidence, max(most, evidence)
+        least = max(LEAST_EVIDENCE, LEAST_SHARE * first)
+        if evidence < least:
             break
-        spread = float(np.ptp([rate, *(fit.spacing for fit in fits)]))
-        if any(abs(rate - fit.spacing) < resolution for fit in fits):
-            resolved = False
-            break
-        if not fits and comb.per_turn == 1 and abs(rate - nominal) < resolution:
-            fits, rest, reaches = [comb.fit], data.left(comb.rest), [far]
+        if evidence < DOUBTFUL_SHARE * most and found.fit_out(FURTHER_STEPS):
             continue
-        if 2 * (sum(reaches) + far) > MOST_LINES:
-            resolved = False
-            break
-        spacings = [*(fit.spacing for fit in fits), rate]
-        outermost = [(-r, r) for r in (*reaches, far)]
-        fitted = fit_combs(data, centre, spacings, outermost, JOINT_STEPS, rest=rest.samples)
-        if fitted is None:
-            break
-        together, samples = fitted
-        if fits and _holds_another(together[-1], data.pulses):
-            if not is_apart:
-                break
-            seek_apart = False
+        tried = (one for one in found.in_turn(sought) if one.evidence >= least)
+        outcomes: list[_Outcome] = []
+        while _Outcome.ADDED not in outcomes and (one := next(tried, None)):
+            outcomes.append(found.join(one))
+        if _Outcome.ADDED in outcomes or found.fit_out(FURTHER_STEPS):
             continue
-        power = [float((np.abs(fit.amplitudes) ** 2).sum()) for fit in together]
-        if power[-1] < LEAST_POWER_SHARE * max(power):
-            resolved = False
-            break
-        fits, rest, reaches = together, data.left(samples), [*reaches, far]
-    if not fits:
+        # a tail's lines far from the first comb say nothing of the rotors about it
+        said = [o for o, one in zip(outcomes, sought, strict=False) if o is _Outcome.UNRESOLVED or not one.is_apart]
+        resolved = said[:1] != [_Outcome.UNRESOLVED]
+        break
+    if not found.fits:
         return alone
-    if len(fits) > 1:
-        spacings, outermost = [fit.spacing for fit in fits], [(-r, r) for r in reaches]
-        polished = fit_combs(data, fits[0].centre, spacings, outermost, LAST_STEPS, rest=rest.samples)
-        if polished is not None:
-            fits, samples = polished
-            rest = data.left(samples)
-    fits.sort(key=lambda fit: fit.spacing)
-    found = np.array([fit.spacing for fit in fits])
-    if len(found) > 1 and np.diff(found).min() < resolution:
-        return replace(alone, resolved=False, spread=float(np.ptp(found)))
-    spread = float(np.ptp(found)) if resolved else max(spread, float(np.ptp(found)))
-    return Rotors(found, np.array([fit.spacing_std for fit in fits]), resolved, spread, fits, rest.samples, rate)
-
-
-def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float) -> Rotors:
-    """Rotors, called unresolved where their flashes, or what they leave, speak of more than were found.
-
-    Parameters
-    ----------
-    rotors : Rotors
-        From `separate_rotors`.
-    data, comb, edge
-        As there.
-    """
-    if not rotors.resolved:
-        return rotors
-    several = len(rotors.fits) > 1
-    per_turn = comb.per_turn if rotors.fits[0] is comb.fit else 1
-    tip = edge / (per_turn * max(fit.spacing for fit in rotors.fits))  # an order is the same for all: blades are alike
-    twice = any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
-    about = _power_about(data.left(rotors.rest), rotors.fits[0].centre)
-    share, hidden = _left_over(about, rotors.fits, edge)
-    past = not several and _stands_past(about, rotors.fits[0], edge)
-    if not (twice or hidden or past or share > (LEFT_SHARE if several else LEFT_ALONE)):
-        return rotors
-    reach = max(int(np.abs(rotors.fits[0].orders).max()), 1)
-    spread = max(rotors.spread, RESOLVED_BINS / (reach * data.pulses))
-    if hidden and not several:
-        spread = max(spread, abs(rotors.next_rate - float(rotors.rates[0])))
-    return replace(rotors, resolved=False, spread=spread)
+    found.fit_out(LAST_STEPS)
+    fits = sorted(found.fits, key=lambda fit: fit.spacing)
+    rates = np.array([fit.spacing for fit in fits])
+    spread = float(np.ptp(rates)) if resolved else max(found.spread, float(np.ptp(rates)), found.resolution)
+    stds = np.array([fit.spacing_std for fit in fits])
+    return Rotors(rates, stds, resolved, spread, fits, found.rest.samples, rate)
