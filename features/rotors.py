@@ -44,9 +44,10 @@ APART_REACH = 0.5
 #: more are not told apart.
 MOST_LINES = 2000
 
-#: A further rotor must have this much evidence [nats], and this share of the strongest one's. With less than so large a
-#: share it may be what is left of those found, which are fitted to the end first.
-LEAST_EVIDENCE = 20.0
+#: A second rotor must have this much evidence, and a further one, as two that were fitted leave more by chance [nats];
+#: and this share of the strongest one's. With less than so large a share it may be what is left of those found, which
+#: are fitted to the end first.
+LEAST_EVIDENCE, FURTHER_EVIDENCE = 13.0, 20.0
 LEAST_SHARE, DOUBTFUL_SHARE = 0.1, 0.5
 
 #: A comb weaker than this share of the strongest is what a rate that changed within the dwell leaves behind.
@@ -322,7 +323,7 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
         evidence = sought[0].evidence
         rate = next(one.rate for one in sought if not one.is_apart)
         first, most = first or evidence, max(most, evidence)
-        least = max(LEAST_EVIDENCE, LEAST_SHARE * first)
+        least = max(FURTHER_EVIDENCE if len(found.fits) > 1 else LEAST_EVIDENCE, LEAST_SHARE * first)
         if evidence < least:
             break
         if evidence < DOUBTFUL_SHARE * most and found.fit_out(FURTHER_STEPS):

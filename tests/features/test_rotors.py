@@ -1,0 +1,60 @@
+"""Single rotors of hexa- and octocopters, and of pairs: every rate found, none made up, at any SNR."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bladewing.features import measure
+from bladewing.features.periodogram import prepare
+
+from ..benchmarks import records
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, white
+
+
+def apart(rng, count, least_hz, low_hz, high_hz):
+    """Rotation rates of chance at least so far from one another, rising [Hz]."""
+    while True:
+        rates_hz = np.sort(rng.uniform(low_hz, high_hz, count))
+        if np.diff(rates_hz).min() >= least_hz:
+            return rates_hz
+
+
+@pytest.mark.parametrize("snr_db", [0.0, 20.0])
+@pytest.mark.parametrize(("count", "least_hz", "high_hz"), [(6, 0.25, 62.0), (8, 0.3, 64.0)])
+def test_rotors_whose_lines_fill_the_spectrum_are_told_apart(count, least_hz, high_hz, snr_db):
+    """Their lines lift the level that what is left of them was read against: of eight, none were counted right."""
+    right = 0
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        rates_hz = apart(rng, count, least_hz, 56.5, high_hz)
+        iq = records.record(rng, rates_hz, snr_db=snr_db, body_db=20, velocity_mps=rng.uniform(-20, 20))
+        found = measure(iq, **records.RADAR)
+        if found.rotors_resolved and found.rotor_count == count:
+            right += 1
+            np.testing.assert_allclose(found.rotor_rates_hz[:count], 2 * rates_hz, rtol=2e-3)
+            assert np.isnan(found.rotor_rates_hz[count:]).all()
+    assert right >= 5
+
+
+def test_strong_pairs_are_told_apart_as_weak_ones_are():
+    """What two fits leave of strong lines passed for a third rotor: fewer were resolved at 20 dB than at 0."""
+    resolved = []
+    for snr_db in (0.0, 20.0, 30.0):
+        found = []
+        for seed in range(8):
+            rng = np.random.default_rng(seed)
+            rates_hz = rng.uniform(56.5, 58.2) + np.array([0, rng.uniform(0.18, 0.3)])
+            iq = records.record(rng, rates_hz, snr_db=snr_db, body_db=20, velocity_mps=rng.uniform(-20, 20))
+            one = measure(iq, **records.RADAR)
+            found.append(bool(one.rotors_resolved) and one.rotor_count == 2)
+        resolved.append(sum(found))
+    assert min(resolved) >= 7
+
+
+def test_what_is_left_is_read_against_its_own_level_where_that_is_lower():
+    noise = white(np.random.default_rng(3), PULSES)
+    data = prepare(noise.astype(np.complex64), carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
+    lifted = replace(data, level=np.where(np.arange(len(data.level)) < PULSES, 10.0, 0.5) * data.level)
+    own = lifted.left(data.samples, levelled=True).power
+    assert own[:PULSES].mean() == pytest.approx(1.0, abs=0.2)
+    np.testing.assert_array_equal(own[PULSES:], lifted.left(data.samples).power[PULSES:])
