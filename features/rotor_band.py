@@ -83,7 +83,8 @@ def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[
     # orders past the middle of the transform stand for what lies beyond the tip, where nothing is
     beyond = int(widest + 6 * widest ** (1 / 3)) // fold
     steps = fft.next_fast_len(max(count * blades // fold, (count * blades // fold + beyond) // 2) + 8, real=True)
-    z = gamma[:, None] * np.cos(np.pi / fold * np.arange(steps + 1) / steps)
+    # single precision, 1e-7 of a blade at rest: lines weaker than 1e-3 of the family's do not count
+    z = (gamma[:, None] * np.cos(np.pi / fold * np.arange(steps + 1) / steps)).astype(np.float32)
     z[np.abs(z) < NEAR_ZERO] = NEAR_ZERO
     sine, cosine = np.sin(z), np.cos(z)
     parts = [np.stack([sine / z, cosine])]

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from time import process_time
+from time import thread_time
 
 import numpy as np
 from scipy.stats import chi2
@@ -79,9 +79,9 @@ def chopping(draws: int) -> None:
                 velocity_mps=velocity_mps,
                 ground_db=ground_db,
             )
-            start = process_time()
+            start = thread_time()
             found = measure(iq, **records.RADAR)
-            spent += process_time() - start
+            spent += thread_time() - start
             bound = records.bound_hz(records.rotors(rng, np.array([rate_hz])), 2 * rate_hz, snr_db)
             off_mps = abs(float(found.body_velocity_mps) - velocity_mps)
             rows.append((float(found.chopping_hz), float(found.chopping_hz_std), 2 * rate_hz, bound, off_mps))
@@ -145,9 +145,9 @@ def single_rotors(draws: int) -> None:
                 rpm = np.sort(rng.uniform(3395, 3500, 4))
             options = {"snr_db": snr_db, "body_db": 20, "velocity_mps": rng.uniform(-30, 30)}
             iq = records.record(rng, rpm / 60, **options)
-            start = process_time()
+            start = thread_time()
             found = measure(iq, **records.RADAR)
-            spent += process_time() - start
+            spent += thread_time() - start
             fours.append(float(found.smearing_index))
             number.append(bool(found.rotor_count == 4))
             rates.append(number[-1] and bool(np.all(np.abs(found.rotor_rates_hz[:4] / (rpm / 30) - 1) < 0.002)))
@@ -316,10 +316,10 @@ def false_alarms(draws: int) -> None:
     }
     for name, scene in scenes.items():
         rng = np.random.default_rng(7)
-        start, hits = process_time(), []
+        start, hits = thread_time(), []
         for _ in range(draws):
             hits.append(bool(np.isfinite(measure(scene(rng), **records.RADAR).chopping_hz)))
-        print(f"{name:20s} {share(np.array(hits))} {1e3 * (process_time() - start) / draws:5.0f} ms", flush=True)
+        print(f"{name:20s} {share(np.array(hits))} {1e3 * (thread_time() - start) / draws:5.0f} ms", flush=True)
 
 
 def joint(draws: int) -> None:
@@ -337,7 +337,7 @@ def joint(draws: int) -> None:
         chopping_hz, band_hz = np.array(truth).T
 
         def line(name, found_hz, bands_hz, start, kib, snr_db=snr_db, chopping_hz=chopping_hz, band_hz=band_hz):
-            spent = process_time() - start
+            spent = thread_time() - start
             error = np.abs(np.asarray(found_hz) / chopping_hz - 1)
             widths = [100 * np.nanmedian(np.abs(np.asarray(width) / band_hz - 1)) for width in bands_hz]
             print(
@@ -347,12 +347,12 @@ def joint(draws: int) -> None:
                 flush=True,
             )
 
-        start = process_time()
+        start = thread_time()
         found = [measure(iq, **records.RADAR) for iq in batch]
         widths = [float(f.bandwidth_hz) for f in found]
         line("measure()", [float(f.chopping_hz) for f in found], [widths], start, 4 * records.PULSES / 1024)
         for window_s, overlap in PAPER_SETTINGS:
-            start, periods, paper, low = process_time(), [], [], []
+            start, periods, paper, low = thread_time(), [], [], []
             for iq in batch:
                 frames = stft(iq, **records.RADAR, window_s=window_s, overlap=overlap)
                 periods.append(float(flash_period_s(frames)))
@@ -370,9 +370,9 @@ def recordings(_draws: int) -> None:
         pulses = round(0.08 * recording.prf_hz)
         count = len(recording.iq) // pulses
         dwells = recording.iq[: count * pulses].reshape(count, pulses)
-        start = process_time()
+        start = thread_time()
         found = measure(dwells, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
-        spent = process_time() - start
+        spent = thread_time() - start
         held = np.isfinite(found.chopping_hz)
         text = f"{path.stem[:36]:36s} rotor in {held.sum():3d} of {count} dwells, {1e3 * spent / count:.0f} ms"
         if held.any():
