@@ -18,7 +18,7 @@ from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .one_thread import one_thread
 from .periodogram import Periodogram, prepared
 from .rotors import MAX_ROTORS
-from .smearing import smearing_index
+from .smearing import wide_smearing_index
 from .spectrum import LEAST_PART, Spectrum, doppler_spectrum, finite_complex, largest_part
 
 #: Radars that are measured [Hz]: beyond, a frequency was given in another unit.
@@ -351,7 +351,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     centre_mps = np.float32(-folded(comb.fit.centre) * prf_hz * wavelength_m / 2)
     energy = np.where(spectrum.level_db > 6.0, residual(spectrum, mask), np.float32(0))
     nothing = np.float32(np.nan)
-    index = smearing_index(
+    index = wide_smearing_index(
         spectrum,
         energy,
         Body(body.index, np.asarray(centre_mps), body.level_db),

@@ -13,6 +13,10 @@ FULLY_SMEARED = 0.2887
 #: Orders that take part: far ones of a weak comb are noise.
 MAX_ORDER = 24
 
+#: Of rates further apart the outer lines fill all there is between the orders and widen no more. Fewer orders are asked
+#: then: these, where the index times them says so [orders].
+FEWER_ORDERS, SATURATED = (12, 8), 0.2
+
 
 def smearing_index(
     spectrum: Spectrum,
@@ -20,6 +24,7 @@ def smearing_index(
     body: Body,
     chopping: Chopping,
     root: NDArray[np.float32] | None = None,
+    max_order: int = MAX_ORDER,
 ) -> NDArray[np.float32]:
     """Relative spread of the rotor rates, from the growth of the line width with the order.
 
@@ -39,6 +44,8 @@ def smearing_index(
         The comb's spacing.
     root : ndarray of float32, shape (..., bins), optional
         Root of the energy if it is at hand.
+    max_order : int
+        Orders that take part.
 
     Returns
     -------
@@ -54,7 +61,7 @@ def smearing_index(
     # Roots of the energy: one strong low line must not outvote the many weak high ones.
     order -= nearest
     x, y = np.square(nearest, out=nearest), np.square(order, out=order)
-    counts = x <= MAX_ORDER**2
+    counts = x <= max_order**2
     counts &= x > 0
     weight = (np.sqrt(energy) if root is None else root) * weights(counts)
     total = sums(weight)
@@ -66,3 +73,20 @@ def smearing_index(
     slope = covariance * (variance > 1e-3) / np.maximum(variance, np.float32(1e-3))
     index = np.sqrt(np.minimum(np.maximum(slope, 0), np.float32(FULLY_SMEARED**2)))
     return np.where((total > 0) & (spacing > 0), index, np.float32(np.nan))
+
+
+def wide_smearing_index(
+    spectrum: Spectrum, energy: NDArray[np.float32], body: Body, chopping: Chopping
+) -> NDArray[np.float32]:
+    """`smearing_index` of rates of any spread: by fewer orders where the outer lines fill the space between them.
+
+    Parameters
+    ----------
+    spectrum, energy, body, chopping
+        As there.
+    """
+    index = smearing_index(spectrum, energy, body, chopping)
+    for orders in FEWER_ORDERS:
+        inner = smearing_index(spectrum, energy, body, chopping, max_order=orders)
+        index = np.where(inner * orders > SATURATED, inner, index)
+    return index

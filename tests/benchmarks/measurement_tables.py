@@ -7,6 +7,7 @@ import argparse
 import sys
 from collections.abc import Callable
 from functools import partial
+from itertools import product
 from pathlib import Path
 from time import thread_time
 
@@ -133,31 +134,31 @@ def bandwidth(draws: int) -> None:
             )
 
 
+#: Rotors of an airframe, the highest rate (the lowest is 3395) and how far apart they are at least [rpm].
+AIRFRAMES_RPM = ((4, 3500, 20), (6, 3720, 15), (8, 3840, 18))
+
+
 def single_rotors(draws: int) -> None:
-    """Four rotors within 3395-3500 rpm, at least 20 rpm apart, and the smearing index of one against four."""
-    print(f"single rotors, {draws} draws a row: number right, each rate within 0.2 % where it is, smearing index")
-    for snr_db in (0, 5, 10):
+    """Rates of four to eight rotors, and the smearing index of one against them."""
+    print(f"single rotors, {draws} draws a row: number right and resolved, each rate within 0.2 %, smearing index")
+    for (count, highest_rpm, least_rpm), snr_db in product(AIRFRAMES_RPM, (0, 10, 20, 30)):
         rng = np.random.default_rng(snr_db)
-        number, rates, ones, fours, spent = [], [], [], [], 0.0
+        number, rates, ones, several, spent = [], [], [], [], 0.0
         for _ in range(draws):
-            rpm = np.sort(rng.uniform(3395, 3500, 4))
-            while np.diff(rpm).min() < 20:
-                rpm = np.sort(rng.uniform(3395, 3500, 4))
+            rpm = records.apart(rng, count, least_rpm, 3395, highest_rpm)
             options = {"snr_db": snr_db, "body_db": 20, "velocity_mps": rng.uniform(-30, 30)}
             iq = records.record(rng, rpm / 60, **options)
             start = thread_time()
             found = measure(iq, **records.RADAR)
             spent += thread_time() - start
-            fours.append(float(found.smearing_index))
-            number.append(bool(found.rotor_count == 4))
-            rates.append(number[-1] and bool(np.all(np.abs(found.rotor_rates_hz[:4] / (rpm / 30) - 1) < 0.002)))
+            several.append(float(found.smearing_index))
+            number.append(bool(found.rotor_count == count and found.rotors_resolved))
+            rates.append(number[-1] and bool(np.all(np.abs(found.rotor_rates_hz[:count] / (rpm / 30) - 1) < 0.002)))
             ones.append(float(measure(records.record(rng, rpm[:1] / 60, **options), **records.RADAR).smearing_index))
-        area = np.mean(np.nan_to_num(np.array(fours))[:, None] > np.nan_to_num(np.array(ones))[None, :])
-        print(
-            f"SNR {snr_db:3d} dB: number {share(np.array(number))}, and rates {share(np.array(rates))}, "
-            f"AUC {area:.3f}, {1e3 * spent / draws:.0f} ms",
-            flush=True,
-        )
+        area = np.mean(np.nan_to_num(np.array(several))[:, None] > np.nan_to_num(np.array(ones))[None, :])
+        hits = f"number {share(np.array(number))}, and rates {share(np.array(rates))}"
+        cost_ms = 1e3 * spent / draws
+        print(f"{count} rotors, SNR {snr_db:3d} dB: {hits}, AUC {area:.3f}, {cost_ms:.0f} ms", flush=True)
 
 
 def near_rotors(draws: int) -> None:

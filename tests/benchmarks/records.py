@@ -15,6 +15,14 @@ def white(rng: np.random.Generator, *shape: int) -> np.ndarray:
     return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) * np.sqrt(0.5)
 
 
+def apart(rng: np.random.Generator, count: int, least: float, low: float, high: float) -> np.ndarray:
+    """Rates of chance within a range, rising, each at least so far from the next, any unit."""
+    while True:
+        rates = np.sort(rng.uniform(low, high, count))
+        if np.diff(rates).min() >= least:
+            return rates
+
+
 def rotors(
     rng: np.random.Generator, rates_hz: np.ndarray, *, length_m: float = 0.15, amplitudes: ArrayLike = (1.0, 1.0)
 ) -> np.ndarray:

@@ -11,14 +11,6 @@ from ..benchmarks import records
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, white
 
 
-def apart(rng, count, least_hz, low_hz, high_hz):
-    """Rotation rates of chance at least so far from one another, rising [Hz]."""
-    while True:
-        rates_hz = np.sort(rng.uniform(low_hz, high_hz, count))
-        if np.diff(rates_hz).min() >= least_hz:
-            return rates_hz
-
-
 @pytest.mark.parametrize("snr_db", [0.0, 20.0])
 @pytest.mark.parametrize(("count", "least_hz", "high_hz"), [(6, 0.25, 62.0), (8, 0.3, 64.0)])
 def test_rotors_whose_lines_fill_the_spectrum_are_told_apart(count, least_hz, high_hz, snr_db):
@@ -26,7 +18,7 @@ def test_rotors_whose_lines_fill_the_spectrum_are_told_apart(count, least_hz, hi
     right = 0
     for seed in range(6):
         rng = np.random.default_rng(seed)
-        rates_hz = apart(rng, count, least_hz, 56.5, high_hz)
+        rates_hz = records.apart(rng, count, least_hz, 56.5, high_hz)
         iq = records.record(rng, rates_hz, snr_db=snr_db, body_db=20, velocity_mps=rng.uniform(-20, 20))
         found = measure(iq, **records.RADAR)
         if found.rotors_resolved and found.rotor_count == count:
@@ -58,3 +50,19 @@ def test_what_is_left_is_read_against_its_own_level_where_that_is_lower():
     own = lifted.left(data.samples, levelled=True).power
     assert own[:PULSES].mean() == pytest.approx(1.0, abs=0.2)
     np.testing.assert_array_equal(own[PULSES:], lifted.left(data.samples).power[PULSES:])
+
+
+@pytest.mark.parametrize(("count", "least_hz", "high_hz"), [(4, 0.33, 58.3), (6, 0.25, 62.0), (8, 0.3, 64.0)])
+def test_the_smearing_index_is_the_spread_of_the_rates_be_it_small_or_large(count, least_hz, high_hz):
+    """Of eight rotors it was a fifth of that: at most of the orders their lines fill all there is between them."""
+    ratios, one = [], []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        rates_hz = records.apart(rng, count, least_hz, 56.5, high_hz)
+        given = {"snr_db": 10.0, "body_db": 20, "velocity_mps": rng.uniform(-20, 20)}
+        found = measure(records.record(rng, rates_hz, **given), **records.RADAR)
+        ratios.append(found.smearing_index / (rates_hz.std() / rates_hz.mean()))
+        one.append(measure(records.record(rng, rates_hz[:1], **given), **records.RADAR).smearing_index)
+    assert 0.7 < np.median(ratios) < 1.3
+    assert min(ratios) > 0.4
+    assert max(one) < 0.004
