@@ -42,6 +42,9 @@ SHADOW_BINS = 1.3
 #: Lines of the two combs nearer than this are one [bins].
 MEETING_BINS = 1.5
 
+#: Tips of main and tail rotor are about as fast: lines of either reach no further than so many times the other's edge.
+FURTHEST_TIP = 2.0
+
 #: Candidates looked at closely.
 CLOSER = 4
 
@@ -112,7 +115,7 @@ def find_gear(data: Periodogram, comb: Comb, edge: float) -> tuple[Gear | None, 
     rotors = judged(separate_rotors(data, comb, edge), data, comb, edge)
     if len(rotors.rates) > 1 and rotors.resolved:
         return None, rotors, SEVERAL
-    gear, reason = _second_comb(data, comb)
+    gear, reason = _second_comb(data, comb, min(FURTHEST_TIP * edge, 0.5))
     if gear is None:
         return None, rotors, reason
     alone = separate_rotors(gear.alone, gear.first, edge)
@@ -121,14 +124,14 @@ def find_gear(data: Periodogram, comb: Comb, edge: float) -> tuple[Gear | None, 
     return gear, alone, ""
 
 
-def _second_comb(data: Periodogram, comb: Comb) -> tuple[Gear | None, str]:
-    """The second comb of a record, or why there is none."""
+def _second_comb(data: Periodogram, comb: Comb, furthest: float) -> tuple[Gear | None, str]:
+    """The second comb of a record, of lines up to so far from the body [cycles a sample], or why there is none."""
     if comb.fit.spacing * data.pulses < 2 * SHADOW_BINS + 1:
         return None, "dwell too short: a second comb could not be told from the first one's lines"
     rest, hidden = _left_over(data, comb)
     evidence = _evidence(rest, hidden)
     limits = spacing_limits(data.pulses, data.prf_hz)
-    best = _loudest(rest, evidence, comb.chopping, comb.fit.centre, limits)
+    best = _loudest(rest, evidence, comb, limits, furthest)
     if best is None or best.score < THRESHOLD:
         return None, f"no second comb: evidence {best.score if best else 0.0:.1f} below {THRESHOLD:.0f} nats"
     rival = _rival(rest, evidence, hidden, best)
@@ -200,10 +203,11 @@ def _rival(rest: Periodogram, evidence: Evidence, hidden: NDArray[np.bool_], bes
 
 
 def _loudest(
-    rest: Periodogram, evidence: Evidence, chopping: float, centre: float, limits: tuple[float, float]
+    rest: Periodogram, evidence: Evidence, first: Comb, limits: tuple[float, float], furthest: float
 ) -> Candidate | None:
     """The comb a gear ratio from the first that speaks loudest."""
     low, high = GEAR_RANGE
+    chopping, centre = first.chopping, first.fit.centre
     spacings = np.concatenate(
         [
             _geometric(max(chopping / high, limits[0]), chopping / low, rest.pulses),
@@ -212,11 +216,13 @@ def _loudest(
     )
     if not len(spacings):
         return None
-    loudest = spacings[np.argsort(_even_heights(evidence, spacings, centre))[: -CLOSER - 1 : -1]]
+    loudest = spacings[np.argsort(_even_heights(evidence, spacings, centre, furthest))[: -CLOSER - 1 : -1]]
     return _closest(rest, evidence, loudest, centre)
 
 
-def _even_heights(evidence: Evidence, spacings: NDArray[np.float64], centre: float) -> NDArray[np.float32]:
+def _even_heights(
+    evidence: Evidence, spacings: NDArray[np.float64], centre: float, furthest: float
+) -> NDArray[np.float32]:
     """Best evidence of each spacing, rising, with both sides equally far; at least 0."""
     size = evidence.rows.shape[-1]
     # both sides at once: the spectrum folded about the centre
@@ -224,7 +230,7 @@ def _even_heights(evidence: Evidence, spacings: NDArray[np.float64], centre: flo
     sides = (evidence.rows.take(middle + sign * away, axis=1, mode="wrap") for sign in (-1, 1))
     folded = Evidence(np.add(*sides))
     best = np.zeros((len(spacings), MOST_SNRS), np.float32)
-    for sums in running_sums(folded, np.zeros((1, len(spacings))), spacings[None] * size, size / 2):
+    for sums in running_sums(folded, np.zeros((1, len(spacings))), spacings[None] * size, furthest * size):
         held = best[: sums.shape[2]]
         np.maximum(held, sums[:, 0].max(axis=0), out=held)
     return np.asarray(best.max(axis=1), np.float32)
