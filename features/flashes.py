@@ -16,7 +16,7 @@ from .periodogram import Periodogram
 #: A side with fewer lines than this says nothing by its phases.
 LEAST_LINES = 5
 
-#: Frequencies tried for each line that a side has.
+#: Frequencies tried for each line that a side has, at least.
 OVERSAMPLING = 4
 
 
@@ -71,7 +71,7 @@ def flash_evidence(
     left, right = np.where(counted, data.amplitude[np.rint(frequency * size).astype(np.intp) % size], 0)
     apart = flash_nats(np.stack([left, right])).sum(axis=0)
     # J_-n = (-1)^n J_n: one step for both sides, with half a turn more on the one where the blades are of odd number
-    turned = left * np.float32(-1) ** order
+    turned = left * np.where(order % 2, -1, 1).astype(np.float32)
     rest = np.zeros_like(left[:, :1])
     both = np.stack([np.concatenate([side[:, ::-1], rest, right], axis=1) for side in (left, turned)])
     return np.maximum(apart, flash_nats(both).max(axis=0) - np.log(2))

@@ -36,6 +36,9 @@ UNSURE_SHARE = 0.03
 #: Why there is no band where one channel was made analytic: the lines on both sides of the body lie in one another.
 ONE_CHANNEL = "no band: one side of the spectrum is empty, one channel has both folded onto the other: record I and Q"
 
+#: Where rates differ by more, the growth of their lines' width does not show it.
+WIDEST_INDEX = 0.04
+
 #: The fields of the body's velocity and its deviation.
 BODY = ("body_velocity_mps", "body_velocity_mps_std")
 
@@ -67,7 +70,8 @@ class Measurements:
     rotor_spread_hz : ndarray
         Range of the rotors' chopping frequencies [Hz], also where they are not resolved; 0 where there is one rate.
     smearing_index : ndarray
-        Relative spread of the rotor rates from the growth of the line width with the order [1].
+        Relative spread of the rotor rates from the growth of the line width with the order, and above `WIDEST_INDEX`,
+        where lines widen no more, from the rates of rotors that are told apart [1].
     bandwidth_hz, bandwidth_hz_std : ndarray
         Doppler bandwidth f_max - f_min from the fitted edge of the line family [Hz] (the paper's eq. 26).
     threshold_bandwidth_hz : ndarray
@@ -357,5 +361,6 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         Body(body.index, np.asarray(centre_mps), body.level_db),
         Chopping(np.asarray(np.float32(out["chopping_hz"])), np.asarray(nothing), np.asarray(nothing)),
     )
-    out["smearing_index"] = float(index)
+    told = float(rotors.rates.std() / rotors.rates.mean()) if rotors.resolved else 0.0
+    out["smearing_index"] = told if told > WIDEST_INDEX else float(index)
     return out

@@ -113,11 +113,6 @@ class Periodogram:
         return LineSpace(self.samples)
 
     @cached_property
-    def evidence(self) -> Evidence:
-        """Evidence of a line in every bin, 0 where it cannot be seen."""
-        return Evidence(self._evidence * self.seen)
-
-    @cached_property
     def contrast(self) -> Evidence:
         """The same over what any place near by has, where lines fill that: see `octaves.over_neighbours`."""
         return Evidence(over_neighbours(self._evidence, self.block) * self.seen)

@@ -35,8 +35,9 @@ REACH = 3.0
 #: Gauss-Newton steps of the level.
 LEVEL_STEPS = 2
 
-#: Lines this weak beside a blade at rest, 60 dB under any that counts, are none: single precision leaves a tenth of it.
-LEAST_AMPLITUDE = 1e-6
+#: Lines this weak beside a blade at rest, 60 dB under any that counts, are none: single precision leaves a third of it,
+#: and beyond so large a phase deviation [rad] more with its root.
+LEAST_AMPLITUDE, EXACT_TO = 1e-6, 300.0
 
 #: In place of 0 [rad], and of sums that may be it.
 NEAR_ZERO, LEAST_SUM = 1e-4, 1e-300
@@ -98,7 +99,8 @@ def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[
         own = orders % 2 == odd if fold == 1 else slice(None)
         powers[..., own] = fft.dct(part, 1)[..., orders[own]]
     powers /= 2 * steps
-    powers *= np.abs(powers) > LEAST_AMPLITUDE  # or rounding would be lines of a family that ends far below them
+    # or rounding would be lines of a family that ends far below them
+    powers *= np.abs(powers) > LEAST_AMPLITUDE * np.sqrt(np.maximum(gamma / EXACT_TO, 1.0))[:, None]
     return powers**2
 
 

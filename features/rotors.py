@@ -4,8 +4,7 @@ Rotors of nearly one rate part at the high orders, where the lines lie further f
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from enum import Enum, auto
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,6 @@ from .bodies import LINE_DB
 from .comb import Comb, strong_multiple
 from .comb_fit import CombFit, fit_combs
 from .comb_search import even_scores
-from .evidence import Evidence
 from .flashes import flash_nats
 from .lines import squared
 from .periodogram import Periodogram
@@ -31,8 +29,8 @@ RATE_SPREAD, FURTHEST_SPREAD, INNER_ORDERS = 0.05, (-0.25, 0.33), 10
 #: that of noise, all but so large a share of them.
 HALF_ORDERS, HALF_SHARE, HALF_POWER, HALF_QUANTILE = 6, 0.05, 4.0, 0.3
 
-#: Every second, third or fourth line of a rotor passes for a comb of these shares of its rate.
-FRACTIONS = np.array([2 / 3, 3 / 4, 4 / 5, 5 / 4, 4 / 3])
+#: A comb may be every second to fifth line of a rotor whose rate is one of these times its own.
+RATIOS = np.array([2 / 3, 3 / 4, 4 / 5, 5 / 4, 4 / 3])
 
 #: What lies within so many bins of a line that is known says nothing of these; so many must be left.
 NEAR_BINS, LEAST_BETWEEN = 2.0, 4
@@ -45,8 +43,8 @@ APART_REACH = 0.5
 MOST_LINES = 2000
 
 #: A second rotor must have this much evidence, and a further one, as two that were fitted leave more by chance [nats];
-#: and this share of the strongest one's. With less than so large a share it may be what is left of those found, which
-#: are fitted to the end first.
+#: and this share of the first one's. With less than so large a share of the most that any had it may be what is left of
+#: those found, which are fitted to the end first.
 LEAST_EVIDENCE, FURTHER_EVIDENCE = 13.0, 20.0
 LEAST_SHARE, DOUBTFUL_SHARE = 0.1, 0.5
 
@@ -87,7 +85,8 @@ class Rotors:
     rest : ndarray of complex128, shape (pulses,)
         Samples that these leave.
     next_rate : float
-        The rate that speaks loudest in these, be it of a rotor or not [cycles a sample].
+        The rate near those found that spoke loudest when a further one was last sought, be it a rotor's or not
+        [cycles a sample].
     """
 
     rates: NDArray[np.float64]
@@ -100,11 +99,11 @@ class Rotors:
 
 
 def _strongest(
-    data: Periodogram, centre: float, rates: NDArray[np.float64], furthest: float, evidence: Evidence
+    data: Periodogram, centre: float, rates: NDArray[np.float64], furthest: float
 ) -> tuple[float, int, float]:
     """Rate whose lines speak loudest by their powers and their flashes, how far they reach, and their evidence."""
     size = len(data.power)
-    powers, reach = even_scores(evidence, rates, np.full(len(rates), centre), furthest)
+    powers, reach = even_scores(data.contrast, rates, np.full(len(rates), centre), furthest)
     order = np.arange(1, reach.max() + 1)
     frequency = centre + np.array([-1, 1])[:, None, None] * rates[:, None] * order
     seen = data.usable(frequency) & (order <= reach[:, None])
@@ -130,7 +129,7 @@ def _strongest_apart(
     inner, _ = even_scores(data.contrast, rates, np.full(len(rates), centre), min(INNER_ORDERS * nominal, furthest))
     rate = float(rates[inner.argmax()])
     near = np.arange(-step, step * 1.01, resolution / 4)
-    return _strongest(data, centre, rate + near, furthest, data.contrast)
+    return _strongest(data, centre, rate + near, furthest)
 
 
 def _is_twice(rest: Periodogram, centre: float, rate: float, fits: list[CombFit]) -> bool:
@@ -167,12 +166,19 @@ def _meet(fits: list[CombFit], resolution: float) -> bool:
     return len(rates) > 1 and float(np.diff(rates).min()) < resolution
 
 
-class _Outcome(Enum):
-    """What came of a rate that speaks for a further rotor."""
+@dataclass(frozen=True)
+class _Verdict:
+    """What came of a rate that spoke for a further rotor: it came in, or is not told apart, or is no rotor's.
 
-    ADDED = auto()
-    NO_ROTOR = auto()
-    UNRESOLVED = auto()
+    `spread` is the range of the rates that are not told apart [cycles a sample].
+    """
+
+    added: bool = False
+    unresolved: bool = False
+    spread: float = 0.0
+
+
+_ADDED, _NO_ROTOR = _Verdict(added=True), _Verdict()
 
 
 @dataclass(frozen=True)
@@ -198,7 +204,6 @@ class _Separation:
         self.rest = data
         self.fitted_out = True  # nothing to gain by fitting these once more
         self.seeks_apart = True
-        self.spread = 0.0  # of rates that are not told apart [cycles a sample]
 
     @property
     def rates(self) -> list[float]:
@@ -209,7 +214,7 @@ class _Separation:
         """What speaks loudest for a further rotor, near the rates known and far from them; the loudest first."""
         ends = [self.nominal, *self.rates]
         rates = np.arange(min(ends) * (1 - RATE_SPREAD), max(ends) * (1 + RATE_SPREAD), self.resolution / 4)
-        out = [_Sought(*_strongest(self.rest, self.centre, rates, self.furthest, self.rest.contrast), False)]
+        out = [_Sought(*_strongest(self.rest, self.centre, rates, self.furthest), False)]
         if self.fits and self.seeks_apart:
             found = _strongest_apart(self.rest, self.centre, self.nominal, self.resolution, self.furthest)
             apart = _Sought(*found, True)
@@ -219,23 +224,25 @@ class _Separation:
         return sorted(out, key=lambda one: -one.evidence)
 
     def in_turn(self, sought: list[_Sought]) -> Iterator[_Sought]:
-        """These, and where none of them came in what they may be fractions of."""
+        """These, and where none of them came in the rotor of which they may hold every so many-th line."""
         yield from sought
-        yield from self._louder_fraction(sought[0])
+        if self.fits:
+            yield from self._louder_whole(sought[0])
 
-    def _louder_fraction(self, one: _Sought) -> list[_Sought]:
-        """A rate far from the first of which every second or third line is that of another: at most one, if louder."""
+    def _louder_whole(self, one: _Sought) -> list[_Sought]:
+        """A rotor far from the first of which a comb holds every so many-th line: at most one, if that is louder."""
         low, high = FURTHEST_SPREAD
-        rates = one.rate * FRACTIONS
-        rates = rates[np.abs(rates / self.nominal - 1 - (low + high) / 2) < (high - low) / 2]
+        rates = one.rate * RATIOS
+        away = rates / self.nominal - 1
+        rates = rates[(away > low - RATE_SPREAD) & (away < high + RATE_SPREAD)]
         near = np.arange(-1, 1.01, 0.25) * self.resolution
         tried = np.sort((rates[:, None] + near).ravel())
         if not len(tried):
             return []
-        found = _Sought(*_strongest(self.rest, self.centre, tried, self.furthest, self.rest.contrast), True)
+        found = _Sought(*_strongest(self.rest, self.centre, tried, self.furthest), True)
         return [found] if found.evidence > one.evidence else []
 
-    def join(self, one: _Sought) -> _Outcome:
+    def join(self, one: _Sought) -> _Verdict:
         """Take a rate in, if it is a rotor's."""
         rate, reach = one.rate, one.reach
         if one.is_apart and _is_twice(self.rest, self.centre, rate, self.fits):
@@ -243,33 +250,32 @@ class _Separation:
         same = [abs(rate - known) < self.resolution for known in self.rates]
         if any(same):  # lines of a rotor that is known, perhaps past those that were fitted
             further = [max(r, reach) if own else r for r, own in zip(self.reaches, same, strict=True)]
-            self.fitted_out &= further == self.reaches
-            self.reaches = further
+            if further != self.reaches and 2 * sum(further) <= MOST_LINES:
+                self.reaches, self.fitted_out = further, False
             return self._unresolved(rate)
         if not self.fits and self.comb.per_turn == 1 and abs(rate - self.nominal) < self.resolution:
             self.fits, self.reaches, self.rest = [self.comb.fit], [reach], self.data.left(self.comb.rest)
-            return _Outcome.ADDED
+            return _ADDED
         if 2 * (sum(self.reaches) + reach) > MOST_LINES:
             return self._unresolved(rate)
         fitted = self._fitted([*self.rates, rate], [*self.reaches, reach], JOINT_STEPS)
         if fitted is None:
-            return _Outcome.NO_ROTOR
+            return _NO_ROTOR
         together, samples = fitted
         if self.fits and _holds_another(together[-1], self.data.pulses):
             self.seeks_apart &= not one.is_apart
-            return _Outcome.NO_ROTOR
+            return _NO_ROTOR
         if _meet(together, self.resolution):
             return self._unresolved(rate)
         powers = _powers(together)
         if powers[-1] < LEAST_POWER_SHARE * max(powers):  # beside several, nobody's rate
-            return self._unresolved(rate) if len(self.fits) == 1 else _Outcome.UNRESOLVED
+            return self._unresolved(rate) if len(self.fits) == 1 else _Verdict(unresolved=True)
         self.fits, self.reaches, self.rest = together, [*self.reaches, reach], self.data.left(samples, levelled=True)
         self.fitted_out = False
-        return _Outcome.ADDED
+        return _ADDED
 
-    def _unresolved(self, rate: float) -> _Outcome:
-        self.spread = float(np.ptp([rate, *self.rates]))
-        return _Outcome.UNRESOLVED
+    def _unresolved(self, rate: float) -> _Verdict:
+        return _Verdict(unresolved=True, spread=float(np.ptp([rate, *self.rates])))
 
     def fit_out(self, steps: int) -> bool:
         """Fit what was found once more, if there is anything to gain by it; whether that was done."""
@@ -317,32 +323,37 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
     if reach * RATE_SPREAD * nominal * data.pulses < 2:
         return alone
     found = _Separation(data, comb, centre, reach)
-    first, most, rate, resolved = 0.0, 0.0, nominal, True
+    first, most, rate, last = 0.0, 0.0, nominal, _NO_ROTOR
     while len(found.fits) < MAX_ROTORS:
         sought = found.sought()
         evidence = sought[0].evidence
         rate = next(one.rate for one in sought if not one.is_apart)
-        first, most = first or evidence, max(most, evidence)
+        first, most = max(first, 0.0 if found.fits else evidence), max(most, evidence)
         least = max(FURTHER_EVIDENCE if len(found.fits) > 1 else LEAST_EVIDENCE, LEAST_SHARE * first)
         if evidence < least:
             break
         if evidence < DOUBTFUL_SHARE * most and found.fit_out(FURTHER_STEPS):
             continue
-        tried = (one for one in found.in_turn(sought) if one.evidence >= least)
-        outcomes: list[_Outcome] = []
-        while _Outcome.ADDED not in outcomes and (one := next(tried, None)):
-            outcomes.append(found.join(one))
-        if _Outcome.ADDED in outcomes or found.fit_out(FURTHER_STEPS):
-            continue
-        # a tail's lines far from the first comb say nothing of the rotors about it
-        said = [o for o, one in zip(outcomes, sought, strict=False) if o is _Outcome.UNRESOLVED or not one.is_apart]
-        resolved = said[:1] != [_Outcome.UNRESOLVED]
-        break
+        said = []
+        for one in found.in_turn(sought):
+            verdict = found.join(one) if one.evidence >= least else _NO_ROTOR
+            if verdict.added:
+                break
+            # a tail's lines far from the first comb say nothing of the rotors about it
+            if one in sought and (verdict.unresolved or not one.is_apart):
+                said.append(verdict)
+        else:
+            if found.fit_out(FURTHER_STEPS):
+                continue
+            last = said[0]
+            break
     if not found.fits:
-        return alone
+        return replace(alone, resolved=not last.unresolved, spread=found.resolution if last.unresolved else 0.0)
     found.fit_out(LAST_STEPS)
     fits = sorted(found.fits, key=lambda fit: fit.spacing)
     rates = np.array([fit.spacing for fit in fits])
-    spread = float(np.ptp(rates)) if resolved else max(found.spread, float(np.ptp(rates)), found.resolution)
+    spread = float(np.ptp(rates))
+    if last.unresolved:
+        spread = max(last.spread, spread, found.resolution)
     stds = np.array([fit.spacing_std for fit in fits])
-    return Rotors(rates, stds, resolved, spread, fits, found.rest.samples, rate)
+    return Rotors(rates, stds, not last.unresolved, spread, fits, found.rest.samples, rate)

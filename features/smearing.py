@@ -78,7 +78,9 @@ def smearing_index(
 def wide_smearing_index(
     spectrum: Spectrum, energy: NDArray[np.float32], body: Body, chopping: Chopping
 ) -> NDArray[np.float32]:
-    """`smearing_index` of rates of any spread: by fewer orders where the outer lines fill the space between them.
+    """`smearing_index` of rates that differ by up to about 4 %: by fewer orders where the outer ones' lines fill all.
+
+    Of rates further apart even the inner lines fill the space between the orders, and nothing widens.
 
     Parameters
     ----------

@@ -66,3 +66,12 @@ def test_the_smearing_index_is_the_spread_of_the_rates_be_it_small_or_large(coun
     assert 0.7 < np.median(ratios) < 1.3
     assert min(ratios) > 0.4
     assert max(one) < 0.004
+
+
+def test_the_smearing_index_of_rates_far_apart_is_that_of_the_rotors():
+    """Their lines fill the space between the orders from the first ones on: the width alone said one rate."""
+    rates_hz = np.array([50.0, 54.0, 58.0, 62.0])
+    for seed in range(3):
+        iq = records.record(np.random.default_rng(seed), rates_hz, snr_db=10.0, body_db=20, velocity_mps=4.0)
+        found = measure(iq, **records.RADAR)
+        assert found.smearing_index == pytest.approx(rates_hz.std() / rates_hz.mean(), rel=0.01)
