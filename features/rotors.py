@@ -45,7 +45,7 @@ MOST_LINES = 2000
 #: A second rotor must have this much evidence, and a further one, as two that were fitted leave more by chance [nats];
 #: and this share of the first one's. With less than so large a share of the most that any had it may be what is left of
 #: those found, which are fitted to the end first.
-LEAST_EVIDENCE, FURTHER_EVIDENCE = 13.0, 20.0
+LEAST_EVIDENCE, FURTHER_EVIDENCE = 13.0, 28.0
 LEAST_SHARE, DOUBTFUL_SHARE = 0.1, 0.5
 
 #: A comb weaker than this share of the strongest is what a rate that changed within the dwell leaves behind.
