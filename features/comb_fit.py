@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .lines import sum_of_lines
-from .periodogram import LEAST_LEVEL, Periodogram
+from .periodogram import LEAST_LEVEL, Level, Periodogram
 from .slow_lines import LineProducts, notched_products, parts, remove_bands, times, whole
 
 #: Gauss-Newton steps at most. They end after one below so many standard deviations: the next would be a tenth of it.
@@ -124,7 +124,7 @@ def fit_combs(
     reaches: Sequence[tuple[int, int]],
     steps: int = STEPS,
     *,
-    rest: NDArray[np.complex128] | None = None,
+    level_about: Level | None = None,
 ) -> tuple[list[CombFit], NDArray[np.complex128]] | None:
     """Refine combs about one centre, jointly, by Gauss-Newton steps on the frequencies of their lines.
 
@@ -145,8 +145,8 @@ def fit_combs(
         Outermost orders of each, low <= 0 <= high.
     steps : int
         Steps at most, >= 1.
-    rest : ndarray of complex128, shape (pulses,), optional
-        Samples without what is known of the combs already: the first step takes the level about the lines from these.
+    level_about : callable, optional
+        Local level without what is known of the combs already: the first step takes the level about the lines from it.
 
     Returns
     -------
@@ -180,7 +180,7 @@ def fit_combs(
     # several combs' lines take so much of the noise out with them that what they leave says little of it
     least = LEAST_LEVEL if count == 1 else 1.0
     snr = np.full(len(order), np.inf)
-    level = data.level_at(frequency) if rest is None else np.maximum(data.level_of(rest)(frequency), least)
+    level = data.level_at(frequency) if level_about is None else np.maximum(level_about(frequency), least)
 
     def left_by(frequency: NDArray[np.float64], amplitudes: NDArray[np.complex128]) -> NDArray[np.complex128]:
         return remove_bands(data.samples - sum_of_lines(pulses, frequency, amplitudes), data.bands)

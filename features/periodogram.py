@@ -58,6 +58,10 @@ TAPER_BETA = 3.0
 STOP_SHARE = 0.3
 
 
+#: A local level as a function of the frequency [cycles a sample].
+Level = Callable[[NDArray[np.floating]], NDArray[np.float64]]
+
+
 @dataclass(frozen=True)
 class Periodogram:
     """One record made ready for the search.
@@ -115,11 +119,7 @@ class Periodogram:
     @cached_property
     def contrast(self) -> Evidence:
         """The same over what any place near by has, where lines fill that: see `octaves.over_neighbours`."""
-        return Evidence(over_neighbours(self._evidence, self.block) * self.seen)
-
-    @cached_property
-    def _evidence(self) -> NDArray[np.float32]:
-        return line_evidence(self.power, self.block)
+        return Evidence(over_neighbours(line_evidence(self.power, self.block), self.block) * self.seen)
 
     @property
     def block(self) -> int:
@@ -162,9 +162,7 @@ class Periodogram:
             out |= np.abs(away - np.rint(away)) < half - 3.0 / self.pulses
         return out
 
-    def level_of(
-        self, rest: NDArray[np.complex128], *, evened: bool = False
-    ) -> Callable[[NDArray[np.floating]], NDArray[np.float64]]:
+    def level_of(self, rest: NDArray[np.complex128], *, evened: bool = False) -> Level:
         """Local level of samples that lines were taken from, as a function of the frequency [cycles a sample].
 
         Evened, blocks whose levels differ by no more than chance have their common one.
@@ -175,15 +173,16 @@ class Periodogram:
         level = _level_at_bins(power, keep, 1.0, _block(size, self.pulses), evened=evened)
         return lambda frequency: np.maximum(level(np.rint(frequency * size) % size), LEAST_LEVEL)
 
-    def left(self, samples: NDArray[np.complex128], *, levelled: bool = False) -> "Periodogram":
+    def left(self, samples: NDArray[np.complex128], own_level: Level | None = None) -> "Periodogram":
         """What is left of the same record, at the same local level.
 
-        Levelled, at its own where that is lower: lines that fill all there is between them have lifted the record's.
+        Where its own, from `level_of`, is given and lower, at that: lines that fill all there is between them have
+        lifted the record's.
         """
         size = len(self.power)
         level = self.level
-        if levelled:
-            level = np.minimum(level, np.maximum(self.level_of(samples)(np.arange(size) / size), 1.0))
+        if own_level is not None:
+            level = np.minimum(level, np.maximum(own_level(np.arange(size) / size), 1.0))
         amplitude = (_spectrum(samples, size, tapered=False) / np.sqrt(level)).astype(np.complex64)
         power = squared(amplitude)
         power[~_kept(size, self.blocked)] = 1.0

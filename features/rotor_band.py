@@ -237,9 +237,7 @@ def fit_edge(
         # the first search asks the one of less sharp an edge alone: it only says about which lines to look
         nats = np.stack([_log_likelihood(*data, share * loud) for share in leaks[: 1 + search]])
         weight = np.moveaxis(nats.reshape(*nats.shape[:2], len(choices), 2, len(edges)), (0, 1), (4, 3))
-        weight = (
-            weight + np.log(np.outer([BLADES.get(number, 1.0) for number in choices], PROFILES))[..., None, None, None]
-        )
+        weight += np.log(np.outer([BLADES.get(number, 1.0) for number in choices], PROFILES))[..., None, None, None]
         weight += np.log(prior[few] / edges[:, None])[..., None]
         weight = np.exp(weight - weight.max())
         weight /= weight.sum()

@@ -15,7 +15,7 @@ from .comb_fit import CombFit, fit_combs
 from .comb_search import even_scores
 from .flashes import flash_nats
 from .lines import squared
-from .periodogram import Periodogram
+from .periodogram import Level, Periodogram
 
 #: Rotors looked for at most.
 MAX_ROTORS = 8
@@ -98,40 +98,6 @@ class Rotors:
     next_rate: float
 
 
-def _strongest(
-    data: Periodogram, centre: float, rates: NDArray[np.float64], furthest: float
-) -> tuple[float, int, float]:
-    """Rate whose lines speak loudest by their powers and their flashes, how far they reach, and their evidence."""
-    size = len(data.power)
-    powers, reach = even_scores(data.contrast, rates, np.full(len(rates), centre), furthest)
-    order = np.arange(1, reach.max() + 1)
-    frequency = centre + np.array([-1, 1])[:, None, None] * rates[:, None] * order
-    seen = data.usable(frequency) & (order <= reach[:, None])
-    place = np.rint(frequency * size).astype(np.intp) % size
-    flashes = flash_nats(np.where(seen, data.amplitude[place], 0)).sum(axis=0)
-    sums = powers + flashes
-    best = int(sums.argmax())
-    return float(rates[best]), int(reach[best]), float(sums[best])
-
-
-def _strongest_apart(
-    data: Periodogram, centre: float, nominal: float, resolution: float, furthest: float
-) -> tuple[float, int, float]:
-    """The same among rates further from the nominal one than those of rotors in hover.
-
-    Were these not sought, their lines would pass for those of rates in between at which only every third or fourth line
-    is there. Where lines not told apart fill all places, none of these speaks for one.
-    """
-    step = max(RESOLVED_BINS / (4 * INNER_ORDERS * data.pulses), resolution / 4)
-    low, high = FURTHEST_SPREAD
-    rates = np.arange(nominal * (1 + low), nominal * (1 + high), step)
-    rates = rates[np.abs(rates / nominal - 1) > RATE_SPREAD]
-    inner, _ = even_scores(data.contrast, rates, np.full(len(rates), centre), min(INNER_ORDERS * nominal, furthest))
-    rate = float(rates[inner.argmax()])
-    near = np.arange(-step, step * 1.01, resolution / 4)
-    return _strongest(data, centre, rate + near, furthest)
-
-
 def _is_twice(rest: Periodogram, centre: float, rate: float, fits: list[CombFit]) -> bool:
     """True where a comb has its inner lines at halves of its rate too, which then is twice a rotor's."""
     known = np.concatenate([fit.frequencies for fit in fits])
@@ -202,6 +168,7 @@ class _Separation:
         self.fits: list[CombFit] = []
         self.reaches: list[int] = []
         self.rest = data
+        self.level: Level | None = None  # of the rest, once it was asked for
         self.fitted_out = True  # nothing to gain by fitting these once more
         self.seeks_apart = True
 
@@ -214,14 +181,41 @@ class _Separation:
         """What speaks loudest for a further rotor, near the rates known and far from them; the loudest first."""
         ends = [self.nominal, *self.rates]
         rates = np.arange(min(ends) * (1 - RATE_SPREAD), max(ends) * (1 + RATE_SPREAD), self.resolution / 4)
-        out = [_Sought(*_strongest(self.rest, self.centre, rates, self.furthest), False)]
+        out = [self._strongest(rates)]
         if self.fits and self.seeks_apart:
-            found = _strongest_apart(self.rest, self.centre, self.nominal, self.resolution, self.furthest)
-            apart = _Sought(*found, True)
+            apart = self._strongest_apart()
             known = max(reach * rate for reach, rate in zip(self.reaches, self.rates, strict=True))
             if apart.rate * apart.reach > APART_REACH * known:
                 out.append(apart)
         return sorted(out, key=lambda one: -one.evidence)
+
+    def _strongest(self, rates: NDArray[np.float64], *, is_apart: bool = False) -> _Sought:
+        """The rate of some, rising, whose lines speak loudest by their powers and their flashes."""
+        data, size = self.rest, len(self.rest.power)
+        powers, reach = even_scores(data.contrast, rates, np.full(len(rates), self.centre), self.furthest)
+        order = np.arange(1, reach.max() + 1)
+        frequency = self.centre + np.array([-1, 1])[:, None, None] * rates[:, None] * order
+        seen = data.usable(frequency) & (order <= reach[:, None])
+        place = np.rint(frequency * size).astype(np.intp) % size
+        flashes = flash_nats(np.where(seen, data.amplitude[place], 0)).sum(axis=0)
+        sums = powers + flashes
+        best = int(sums.argmax())
+        return _Sought(float(rates[best]), int(reach[best]), float(sums[best]), is_apart)
+
+    def _strongest_apart(self) -> _Sought:
+        """The same among rates further from the nominal one than those of rotors in hover.
+
+        Were these not sought, their lines would pass for those of rates in between at which only every third or fourth
+        line is there. Where lines not told apart fill all places, none of these speaks for one.
+        """
+        step = max(RESOLVED_BINS / (4 * INNER_ORDERS * self.data.pulses), self.resolution / 4)
+        low, high = FURTHEST_SPREAD
+        rates = np.arange(self.nominal * (1 + low), self.nominal * (1 + high), step)
+        rates = rates[np.abs(rates / self.nominal - 1) > RATE_SPREAD]
+        inner_reach = min(INNER_ORDERS * self.nominal, self.furthest)
+        inner, _ = even_scores(self.rest.contrast, rates, np.full(len(rates), self.centre), inner_reach)
+        near = np.arange(-step, step * 1.01, self.resolution / 4)
+        return self._strongest(float(rates[inner.argmax()]) + near, is_apart=True)
 
     def in_turn(self, sought: list[_Sought]) -> Iterator[_Sought]:
         """These, and where none of them came in the rotor of which they may hold every so many-th line."""
@@ -239,7 +233,7 @@ class _Separation:
         tried = np.sort((rates[:, None] + near).ravel())
         if not len(tried):
             return []
-        found = _Sought(*_strongest(self.rest, self.centre, tried, self.furthest), True)
+        found = self._strongest(tried, is_apart=True)
         return [found] if found.evidence > one.evidence else []
 
     def join(self, one: _Sought) -> _Verdict:
@@ -254,14 +248,15 @@ class _Separation:
                 self.reaches, self.fitted_out = further, False
             return self._unresolved(rate)
         if not self.fits and self.comb.per_turn == 1 and abs(rate - self.nominal) < self.resolution:
-            self.fits, self.reaches, self.rest = [self.comb.fit], [reach], self.data.left(self.comb.rest)
+            self.fits, self.reaches = [self.comb.fit], [reach]
+            self.rest, self.level = self.data.left(self.comb.rest), None
             return _ADDED
         if 2 * (sum(self.reaches) + reach) > MOST_LINES:
             return self._unresolved(rate)
-        fitted = self._fitted([*self.rates, rate], [*self.reaches, reach], JOINT_STEPS)
+        fitted = self._fitted(self.centre, [*self.rates, rate], [*self.reaches, reach], JOINT_STEPS)
         if fitted is None:
             return _NO_ROTOR
-        together, samples = fitted
+        together, _ = fitted
         if self.fits and _holds_another(together[-1], self.data.pulses):
             self.seeks_apart &= not one.is_apart
             return _NO_ROTOR
@@ -270,7 +265,8 @@ class _Separation:
         powers = _powers(together)
         if powers[-1] < LEAST_POWER_SHARE * max(powers):  # beside several, nobody's rate
             return self._unresolved(rate) if len(self.fits) == 1 else _Verdict(unresolved=True)
-        self.fits, self.reaches, self.rest = together, [*self.reaches, reach], self.data.left(samples, levelled=True)
+        self.reaches = [*self.reaches, reach]
+        self._take(*fitted)
         self.fitted_out = False
         return _ADDED
 
@@ -282,18 +278,23 @@ class _Separation:
         if self.fitted_out:
             return False
         self.fitted_out = True
-        fitted = self._fitted(self.rates, self.reaches, steps)
+        fitted = self._fitted(self.fits[0].centre, self.rates, self.reaches, steps)
         if fitted is None or _meet(fitted[0], self.resolution):
             return False
-        self.fits, self.rest = fitted[0], self.data.left(fitted[1], levelled=True)
+        self._take(*fitted)
         return True
 
+    def _take(self, fits: list[CombFit], samples: NDArray[np.complex128]) -> None:
+        """Hold these fits and what they leave."""
+        self.fits, self.level = fits, self.data.level_of(samples)
+        self.rest = self.data.left(samples, self.level)
+
     def _fitted(
-        self, rates: list[float], reaches: list[int], steps: int
+        self, centre: float, rates: list[float], reaches: list[int], steps: int
     ) -> tuple[list[CombFit], NDArray[np.complex128]] | None:
-        centre = self.fits[0].centre if len(rates) == len(self.fits) else self.centre
+        self.level = self.level or self.data.level_of(self.rest.samples)
         outermost = [(-reach, reach) for reach in reaches]
-        return fit_combs(self.data, centre, rates, outermost, steps, rest=self.rest.samples)
+        return fit_combs(self.data, centre, rates, outermost, steps, level_about=self.level)
 
 
 def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
@@ -328,7 +329,9 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
         sought = found.sought()
         evidence = sought[0].evidence
         rate = next(one.rate for one in sought if not one.is_apart)
-        first, most = max(first, 0.0 if found.fits else evidence), max(most, evidence)
+        most = max(most, evidence)
+        if not found.fits:
+            first = evidence
         least = max(FURTHER_EVIDENCE if len(found.fits) > 1 else LEAST_EVIDENCE, LEAST_SHARE * first)
         if evidence < least:
             break

@@ -81,12 +81,12 @@ def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) 
 _About = tuple[NDArray[np.float64], NDArray[np.floating], NDArray[np.bool_]]
 
 
-def _power_about(rest: Periodogram, centre: float) -> _About:
+def _power_about(data: Periodogram, rest: NDArray[np.complex128], centre: float) -> _About:
     """Of each bin of what is left: how far from a centre it is [cycles a sample], its power, whether it can be seen."""
-    frequency = fft.fftfreq(rest.pulses)
+    frequency = fft.fftfreq(data.pulses)
     away = np.abs(frequency - centre)
-    seen = rest.usable(frequency) & rest.in_band(frequency)
-    return np.abs(away - np.rint(away)), squared(fft.fft(rest.samples)) / rest.pulses, seen
+    seen = data.usable(frequency) & data.in_band(frequency)
+    return np.abs(away - np.rint(away)), squared(fft.fft(rest)) / data.pulses, seen
 
 
 def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[float, bool]:
@@ -154,7 +154,7 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float) -> Rotors
     per_turn = comb.per_turn if rotors.fits[0] is comb.fit else 1
     tip = edge / (per_turn * max(fit.spacing for fit in rotors.fits))  # an order is the same for all: blades are alike
     twice = any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
-    about = _power_about(data.left(rotors.rest), rotors.fits[0].centre)
+    about = _power_about(data, rotors.rest, rotors.fits[0].centre)
     share, hidden = _left_over(about, rotors.fits, edge)
     past = not several and _stands_past(about, rotors.fits[0], edge)
     if not (twice or hidden or past or share > (LEFT_SHARE if several else LEFT_ALONE)):

@@ -47,7 +47,7 @@ def test_what_is_left_is_read_against_its_own_level_where_that_is_lower():
     noise = white(np.random.default_rng(3), PULSES)
     data = prepare(noise.astype(np.complex64), carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
     lifted = replace(data, level=np.where(np.arange(len(data.level)) < PULSES, 10.0, 0.5) * data.level)
-    own = lifted.left(data.samples, levelled=True).power
+    own = lifted.left(data.samples, data.level_of(data.samples)).power
     assert own[:PULSES].mean() == pytest.approx(1.0, abs=0.2)
     np.testing.assert_array_equal(own[PULSES:], lifted.left(data.samples).power[PULSES:])
 
