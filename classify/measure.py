@@ -29,6 +29,8 @@ VALUES = (
     "body_velocity_mps_std",
     "chopping_hz",
     "chopping_hz_std",
+    "chopping_drift_hz_per_s",
+    "chopping_drift_hz_per_s_std",
     "comb_order",
     "comb_snr_db",
     "rotor_count",

@@ -67,11 +67,8 @@ class LineSpace:
     @cached_property
     def _spectra(self) -> NDArray[np.complex128]:
         """Spectra of the samples and of the samples times their time, shape (2, bins)."""
-        pulses = len(self.samples)
-        size, shape = kernel(pulses)
-        time = np.arange(pulses) - (pulses - 1) / 2
-        flat = self.samples * shape
-        return np.asarray(fft.fft(np.stack([flat, flat * time]), size), np.complex128)
+        time = np.arange(len(self.samples)) - (len(self.samples) - 1) / 2
+        return _to_read(np.stack([self.samples, self.samples * time]))
 
     def at(self, frequency: NDArray[np.floating]) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
         """Mean of the samples, and of the samples times time, against unit lines.
@@ -86,9 +83,33 @@ class LineSpace:
         amplitude, moment : ndarray of complex128, shape (lines,)
             Time counts from the middle of the record, in samples.
         """
-        bins, weight = _turned_taps(frequency, len(self.samples))
-        seen = np.einsum("lt,klt->kl", weight, self._spectra.take(bins, axis=1)) / len(self.samples)
+        seen = _read(self._spectra, frequency, len(self.samples))
         return seen[0], seen[1]
+
+
+def _to_read(samples: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Spectra of samples (rows, pulses) that `_read` reads."""
+    size, shape = kernel(samples.shape[-1])
+    return np.asarray(fft.fft(samples * shape, size), np.complex128)
+
+
+def _read(spectra: NDArray[np.complex128], frequency: NDArray[np.floating], pulses: int) -> NDArray[np.complex128]:
+    """Means of each row's samples against unit lines, shape (rows, lines)."""
+    bins, weight = _turned_taps(frequency, pulses)
+    return np.asarray(np.einsum("lt,klt->kl", weight, spectra.take(bins, axis=1)) / pulses, np.complex128)
+
+
+def against_lines(samples: NDArray[np.complex128], frequency: NDArray[np.floating]) -> NDArray[np.complex128]:
+    """Means of samples against unit lines whose time counts from the middle, shape (rows, lines).
+
+    Parameters
+    ----------
+    samples : ndarray of complex128, shape (rows, pulses)
+        Records.
+    frequency : ndarray, shape (lines,)
+        [cycles a sample].
+    """
+    return _read(_to_read(samples), frequency, samples.shape[-1])
 
 
 def sum_of_lines(

@@ -11,12 +11,12 @@ from .allocator import keep_freed
 from .bandwidth import half_empty, threshold_band_hz
 from .body_velocity import body_velocity, folded
 from .chopping import Chopping
-from .comb import LEAST_REACH_MPS, find_comb
+from .drift import bend
+from .family import find_family, slower_than_rotors
 from .family_edge import FASTEST_TIP_MPS, SPAN, edge_around, edge_of_lines, span_of, surer_edge
-from .helicopter import find_gear
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .one_thread import one_thread
-from .periodogram import Periodogram, prepared
+from .periodogram import prepared
 from .rotors import MAX_ROTORS
 from .smearing import wide_smearing_index
 from .spectrum import LEAST_PART, Spectrum, doppler_spectrum, finite_complex, largest_part
@@ -55,7 +55,10 @@ class Measurements:
     body_velocity_mps, body_velocity_mps_std : ndarray
         Radial velocity of the body [m/s], positive when the range grows.
     chopping_hz, chopping_hz_std : ndarray
-        Chopping frequency, blades x rotation rate [Hz]; of several rotors, that of their mean rate.
+        Chopping frequency, blades x rotation rate [Hz]; of several rotors, that of their mean rate. Where the rate
+        changes within the dwell, that of the even turn that comes nearest.
+    chopping_drift_hz_per_s, chopping_drift_hz_per_s_std : ndarray
+        Its even change within the dwell [Hz/s], of one rotor or a helicopter; NaN for several.
     comb_order : ndarray
         Outermost order of chopping lines that speaks for the comb [1].
     comb_snr_db : ndarray
@@ -65,8 +68,8 @@ class Measurements:
     rotor_count : ndarray
         Rotors told apart; NaN without a comb.
     rotors_resolved : ndarray of bool
-        False where rates lie nearer than the dwell tells apart, or changed within it: of steady ones the count is then
-        a lower bound.
+        False where rates lie nearer than the dwell tells apart, or changed within it each in its own way: of steady
+        ones the count is then a lower bound.
     rotor_spread_hz : ndarray
         Range of the rotors' chopping frequencies [Hz], also where they are not resolved; 0 where there is one rate.
     smearing_index : ndarray
@@ -104,6 +107,8 @@ class Measurements:
     body_velocity_mps_std: NDArray[np.float64]
     chopping_hz: NDArray[np.float64]
     chopping_hz_std: NDArray[np.float64]
+    chopping_drift_hz_per_s: NDArray[np.float64]
+    chopping_drift_hz_per_s_std: NDArray[np.float64]
     comb_order: NDArray[np.float64]
     comb_snr_db: NDArray[np.float64]
     rotor_rates_hz: NDArray[np.float64]
@@ -193,9 +198,9 @@ def measure(
     Returns
     -------
     Measurements
-        Standard deviations hold for the model: steady rates within the dwell, white noise about each line. A body that
-        accelerates smears all lines; `bladewing measure` takes that out first (`body_acceleration`,
-        `without_acceleration`).
+        Standard deviations hold for the model: rates that are steady within the dwell or change smoothly and together,
+        white noise about each line. A body that accelerates smears all lines; `bladewing measure` takes that out first
+        (`body_acceleration`, `without_acceleration`).
 
     Raises
     ------
@@ -239,14 +244,6 @@ def _record(spectrum: Spectrum, index: tuple[int, ...]) -> Spectrum:
     )
 
 
-def _slower_than_rotors(data: Periodogram, edge: float, edge_std: float) -> str:
-    """Why a line family of this edge [cycles a sample] is no rotor's; empty where it may be one's."""
-    edge_mps, edge_std_mps = (value * data.prf_hz * data.wavelength_m / 2 for value in (edge, edge_std))
-    if edge_mps + edge_std_mps < LEAST_REACH_MPS:
-        return f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
-    return ""
-
-
 def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | None, beta_rad: float | None) -> dict:
     """The numbers of one record, by the names of `Measurements`."""
     out: dict = {field.name: np.nan for field in fields(Measurements)}
@@ -263,30 +260,22 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     out["notch_residual_db"] = float(notch_residual_db(spectrum, mask))
     low, high = threshold_band_hz(spectrum, PAPER_THRESHOLD_DB)
     out["threshold_bandwidth_hz"] = float(high - low)
-    comb, why = find_comb(data, blades)
     prf_hz, wavelength_m = data.prf_hz, data.wavelength_m
     blank, whole = dict(out), data
 
     def without_rotor(reason: str) -> dict:
         return blank | {"reason": reason} | dict(zip(BODY, body_velocity(whole, spectrum, None), strict=True))
 
-    if comb is None:
+    family, why = find_family(iq, spectrum, data, blades)
+    if family is None:
         return without_rotor(why)
-    edge, edge_std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades)
-    if slow := _slower_than_rotors(data, edge, edge_std):
-        return without_rotor(slow)
-    out["reason"] = ""
+    data, comb, rotors, gear = family.data, family.comb, family.rotors, family.gear
+    edge, edge_std, span = family.edge, family.edge_std, span_of(data)
+    out["reason"], out["gear_reason"] = "", family.gear_reason
     out["chopping_hz"], out["chopping_hz_std"] = comb.chopping * prf_hz, comb.chopping_std * prf_hz
     out["comb_order"] = float(comb.last // comb.per_turn)
     out["comb_snr_db"] = float(10 * np.log10(max(comb.fit.snr.sum() / data.pulses, 1e-9)))
-
-    fills, span = np.isinf(edge), span_of(data)
-    gear, rotors, out["gear_reason"] = find_gear(data, comb, min(edge, span))
     if gear is not None:
-        data, comb = gear.alone, gear.first
-        other = gear.second.spacing
-        edge, edge_std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades, other)
-        out["chopping_hz"], out["chopping_hz_std"] = comb.chopping * prf_hz, comb.chopping_std * prf_hz
         for name, (rate, std) in zip(("main", "tail"), gear.rates, strict=True):
             out[f"{name}_chopping_hz"], out[f"{name}_chopping_hz_std"] = rate * prf_hz, std * prf_hz
         out["gear_ratio"], out["gear_ratio_std"] = gear.ratio, gear.ratio_std
@@ -298,6 +287,12 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     else:
         velocity = body_velocity(data, spectrum, middle, steady=rotors.resolved, open_std=comb.body_std)
     out |= dict(zip(BODY, velocity, strict=True))
+    if family.ahead is not None:
+        ahead, ahead_std = family.ahead
+        for name, value in (("", family.bend + bend(ahead, data.pulses)), ("_std", bend(ahead_std, data.pulses))):
+            out[f"chopping_drift_hz_per_s{name}"] = value * comb.chopping * prf_hz**2
+        if family.bend:  # its mean is told from how it changes
+            out["chopping_hz_std"] = comb.chopping * 2 * float(ahead_std[0]) / data.pulses * prf_hz
     if count > 1:
         # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
         out["chopping_hz"] = float(rotors.rates.mean()) * prf_hz
@@ -309,7 +304,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     elif count > 1 and not edge_std < UNSURE_SHARE * edge:  # the lines of rates just resolved hardly part within it
         around = edge_around(data, comb, rotors, blades)
         edge, edge_std = around if np.isinf(edge) else surer_edge((edge, edge_std), around)
-    if slow := _slower_than_rotors(data, edge, edge_std):
+    if slow := slower_than_rotors(data, edge, edge_std):
         return without_rotor(slow)
     for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):
         padded = np.full(MAX_ROTORS, np.nan)
@@ -324,7 +319,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     if one_channel:
         out["band_reason"] = ONE_CHANNEL
         edge = edge_std = np.nan
-    elif fills or not edge + EDGE_DEVIATIONS * edge_std < furthest:
+    elif family.fills_span or not edge + EDGE_DEVIATIONS * edge_std < furthest:
         least_mps = furthest * prf_hz * wavelength_m / 2
         out["band_reason"] = (
             f"no band: lines may fill the unambiguous span, tips of {least_mps:.1f} m/s and more: raise the PRF"

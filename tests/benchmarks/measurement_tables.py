@@ -161,6 +161,37 @@ def single_rotors(draws: int) -> None:
         print(f"{count} rotors, SNR {snr_db:3d} dB: {hits}, AUC {area:.3f}, {cost_ms:.0f} ms", flush=True)
 
 
+def drifting(draws: int) -> None:
+    """One rotor whose rate changes within the dwell: told as one, its change, rate and tips."""
+    print(f"one rotor, 40 to 110 Hz, {draws} draws a row: over the dwell its rate changes by so much")
+    print("change     SNR | one, resolved       | normalised variance: change  rate              | tips off by")
+    tip = 2 * 0.15 * 2 * np.pi / records.WAVELENGTH_M
+    for change, snr_db in product((0.0, 0.002, 0.01, 0.03), (-5, 0, 10, 20)):
+        rng = np.random.default_rng(int(1000 * change) + snr_db + 5)
+        rows = []
+        for _ in range(draws):
+            rate_hz, signed = rng.uniform(40, 110), change * rng.choice([-1, 1])
+            options = {"snr_db": snr_db, "body_db": 20, "velocity_mps": rng.uniform(-30, 30), "change": signed}
+            found = measure(records.record(rng, np.array([rate_hz]), **options), **records.RADAR)
+            away = found.chopping_drift_hz_per_s - 2 * rate_hz * signed * records.PRF_HZ / records.PULSES
+            rows.append(
+                (
+                    found.rotor_count == 1 and found.rotors_resolved,
+                    away / found.chopping_drift_hz_per_s_std,
+                    (found.chopping_hz - 2 * rate_hz) / found.chopping_hz_std,
+                    abs(found.bandwidth_hz / (2 * tip * rate_hz) - 1),
+                )
+            )
+        one, drift, rate, band = np.array(rows, float).T
+        told = one > 0
+        off = np.median(band[told]) if told.any() else np.nan
+        print(
+            f"{100 * change:4.1f} % {snr_db:4d} dB | {share(told)} | {variance(drift[told])}  {variance(rate[told])} | "
+            f"{100 * off:.2f} %",
+            flush=True,
+        )
+
+
 def near_rotors(draws: int) -> None:
     """Two rotors nearer than the dwell tells apart: reported as unresolved, or as one rate, never as too many."""
     print(f"two rotors so far apart, {draws} draws a row: rates given, resolved, median of the spread")
@@ -388,6 +419,7 @@ TABLES = {
     "bandwidth": bandwidth,
     "rotors": single_rotors,
     "near-rotors": near_rotors,
+    "drifting": drifting,
     "receivers": receivers,
     "random-rotors": random_rotors,
     "helicopters": helicopters,

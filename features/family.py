@@ -1,0 +1,140 @@
+"""The line family of a record's rotors: comb, edge, second comb and single rotors, of rates that may change."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .comb import LEAST_REACH_MPS, Comb, find_comb
+from .drift import ahead_left, is_sure, straightened
+from .family_edge import edge_of_lines, span_of
+from .helicopter import Gear, find_gear
+from .periodogram import Periodogram, prepared
+from .rotors import Rotors
+from .slow_lines import remove_bands
+from .spectrum import Spectrum
+
+#: Before a record is read at other times, what is strong in it goes, so near to its middle [bins]: a record does not
+#: repeat, and the step between its ends would spread. What lies further out is left, as lines of the rotor lie there.
+STRONG_BINS = 3.0
+
+#: What the lines tell of the rate grows by so much once its change is taken out, where several rotors were found that
+#: are one; and where these were told apart.
+SEVERAL_GAIN, BELIEVED_GAIN = 1.0, 1.5
+
+
+@dataclass(frozen=True)
+class Family:
+    """What the lines of a record come to.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record that they were found in: as if the rotor had turned evenly, where that explains more of it, and
+        without a second comb.
+    comb : Comb
+        The comb; a helicopter's first one.
+    edge, edge_std : float
+        Its edge and the standard deviation [cycles a sample from the body].
+    fills_span : bool
+        True where the lines of the comb found first fill all that is searched.
+    gear : Gear or None
+        A helicopter's two combs.
+    rotors : Rotors
+        Single rotors of the comb.
+    gear_reason : str
+        Why there is no second comb; empty where there is one.
+    ahead : (ndarray, ndarray) or None
+        How far ahead of an even rotor a single one is still, as from `ahead_left`; None where there are several.
+    bend : float
+        Even change of the rate that was taken out, relative [1 / sample].
+    """
+
+    data: Periodogram
+    comb: Comb
+    edge: float
+    edge_std: float
+    fills_span: bool
+    gear: Gear | None
+    rotors: Rotors
+    gear_reason: str
+    ahead: tuple[NDArray[np.float64], NDArray[np.float64]] | None
+    bend: float = 0.0
+
+    @property
+    def is_told_apart(self) -> bool:
+        """True where nothing is left that the rotors found do not explain."""
+        return self.gear is not None or self.rotors.resolved
+
+
+def slower_than_rotors(data: Periodogram, edge: float, edge_std: float) -> str:
+    """Why a line family of this edge [cycles a sample] is no rotor's; empty where it may be one's."""
+    edge_mps, edge_std_mps = (value * data.prf_hz * data.wavelength_m / 2 for value in (edge, edge_std))
+    if edge_mps + edge_std_mps < LEAST_REACH_MPS:
+        return f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
+    return ""
+
+
+def find_family(
+    iq: NDArray[np.complex64], spectrum: Spectrum, data: Periodogram, blades: int | None = None
+) -> tuple[Family | None, str]:
+    """Find the line family of a record.
+
+    Where its rotors are not told apart, their rates may have changed instead: if the record as it would be of rotors
+    that turn evenly is explained, it is that.
+
+    Parameters
+    ----------
+    iq : ndarray of complex64, shape (pulses,)
+        The record.
+    spectrum : Spectrum
+        Its spectrum.
+    data : Periodogram
+        From `prepared`.
+    blades : int, optional
+        Of a rotor.
+
+    Returns
+    -------
+    family : Family or None
+        None where there is none.
+    reason : str
+        Why not; empty where there is one.
+    """
+    family, reason = _as_it_is(data, blades)
+    if family is None:
+        return None, reason
+    narrow = family.ahead is not None
+    if family.ahead is not None and not is_sure(*family.ahead):
+        return family, ""
+    noise, edge = float(np.sqrt(spectrum.floor)), min(family.edge, span_of(data))
+    strong = [(turn, min(half, STRONG_BINS)) for turn, half in data.bands]
+    samples = remove_bands(np.asarray(iq / noise, np.complex128), strong)
+    least = 0.0 if len(family.rotors.rates) == 1 else BELIEVED_GAIN if family.is_told_apart else SEVERAL_GAIN
+    even = straightened(samples, data, family.comb, edge, narrow=narrow, least_gain=least)
+    if even is None:
+        return family, ""
+    again = prepared((even.samples * noise).astype(np.complex64), spectrum)
+    other = _as_it_is(again, blades, even.bend)[0] if again is not None else None
+    if other is None or not other.is_told_apart:
+        return family, ""
+    # several that are told apart are believed, but for a single one that changed
+    return (other if len(other.rotors.rates) == 1 or not family.is_told_apart else family), ""
+
+
+def _as_it_is(data: Periodogram, blades: int | None, bend: float = 0.0) -> tuple[Family | None, str]:
+    """`find_family` of rotors that turn evenly."""
+    comb, why = find_comb(data, blades)
+    if comb is None:
+        return None, why
+    edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades)
+    if slow := slower_than_rotors(data, edge, std):
+        return None, slow
+    fills_span = bool(np.isinf(edge))
+    gear, rotors, reason = find_gear(data, comb, min(edge, span_of(data)))
+    if gear is not None:
+        data, comb = gear.alone, gear.first
+        edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades, gear.second.spacing)
+    single = len(rotors.rates) == 1 and (gear is not None or rotors.resolved)
+    ahead = ahead_left(data, comb.fit, comb.rest) if single else None
+    return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead, bend), ""
