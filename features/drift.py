@@ -15,20 +15,22 @@ from .comb import Comb
 from .comb_fit import LEAST_RIDGE, CombFit, fit_combs
 from .lines import LineSpace, against_lines, squared, sum_of_lines
 from .periodogram import Periodogram
-from .slow_lines import notched_products, remove_bands, times
+from .slow_lines import notched_products, parts, remove_bands, whole
 
 #: How far a rotor is ahead of an even one is a sum of Legendre polynomials in time, of these degrees. The first is
 #: another rate, the second one that changes evenly.
 DEGREES = (1, 2, 3, 4, 5)
 
-#: Lines are seen in so many parts of the dwell, at least: within one of them no line turns out of phase.
-PARTS = 64
+#: Lines are seen in so many parts of the dwell, or parts of so many samples where those are longer: within one of them
+#: hardly a line turns out of phase.
+PARTS, LONGEST_PART = 64, 48
 
-#: The change is sought by the inner orders first, on which it has no more effect than this [rad] if the rate changes by
-#: so much over the dwell, relative, and then by so many times more of them, up to all. Before that it is an even one:
-#: the first so many degrees.
-FIRST_DEGREES = 2
-FIRST_RAD, MOST_CHANGE, MORE_ORDERS, LEAST_ORDERS = 1.0, 0.06, 1.3, 4
+#: A rate departs from its mean by no more than this share of it.
+MOST_CHANGE = 0.06
+
+#: The change is sought by the inner orders first, on which an even one that large has about this effect [rad], and then
+#: by so many times more of them, up to all. Before that it is taken to be even: the first so many degrees.
+FIRST_RAD, MORE_ORDERS, LEAST_ORDERS, FIRST_DEGREES = 1.0, 1.3, 4, 2
 
 #: Steps at all orders, at most; they end after one below this many standard deviations.
 LAST_STEPS, ENOUGH = 6, 0.1
@@ -36,11 +38,13 @@ LAST_STEPS, ENOUGH = 6, 0.1
 #: Steps after that, each from a fit of all lines, at most, out to so many times the edge, which smeared lines hide.
 FITTED_STEPS, FURTHER = 8, 2.0
 
-#: Steps to the time at which an even rotor has turned as far: each leaves a hundredth of what the one before did.
-FIXED_STEPS = 3
+#: Steps to the time at which an even rotor has turned as far: each leaves of what the one before did the share by which
+#: the rate changes.
+FIXED_STEPS = 4
 
-#: So many samples at each end, in which a comb that goes on fades out, keep a record from a step where it repeats.
-MARGIN = 64
+#: At each end so many samples, in which a comb that goes on fades out, beside those that may be read keep a record
+#: from a step where it repeats.
+FADING = 64
 
 #: A change is one where it is sure by so many standard deviations; by each line over the dwell, which says less, by
 #: so many.
@@ -54,7 +58,7 @@ class Straightened:
     Parameters
     ----------
     samples : ndarray of complex128, shape (pulses,)
-        Its samples; the body's line is what it was.
+        Its samples, those of `Periodogram` read at other times; the body's line is what it was.
     bend : float
         By how much the rate changed evenly, relative [1 / sample].
     """
@@ -105,19 +109,18 @@ def _continued(samples: NDArray[np.complex128], fit: CombFit, ahead: NDArray[np.
     `fit` is of the record as it is with `ahead` taken out.
     """
     pulses = len(samples)
-    away = np.arange(1, MARGIN + 1)
-    time = np.concatenate([-away[::-1], away]) + np.repeat([-1, 1], MARGIN) * (pulses - 1) / 2
+    margin = FADING + int(MOST_CHANGE * pulses / 6)
+    away = np.arange(1, margin + 1)
+    time = np.concatenate([-away[::-1], away]) + np.repeat([-1, 1], margin) * (pulses - 1) / 2
     even = time + (ahead * (np.array(DEGREES) > 1)) @ _shapes(time, pulses)
     lines = (
         np.exp(2j * np.pi * (fit.frequencies * even[:, None] - fit.centre * (even - time)[:, None])) @ fit.amplitudes
     )
-    fade = np.cos(np.pi / 2 * away / (MARGIN + 1)) ** 2
-    return np.concatenate([lines[:MARGIN] * fade[::-1], samples, lines[MARGIN:] * fade])
+    fade = np.cos(np.pi / 2 * away / (margin + 1)) ** 2
+    return np.concatenate([lines[:margin] * fade[::-1], samples, lines[margin:] * fade])
 
 
-def straightened(
-    samples: NDArray[np.complex128], data: Periodogram, comb: Comb, edge: float, *, narrow: bool, least_gain: float
-) -> Straightened | None:
+def straightened(data: Periodogram, comb: Comb, edge: float, *, narrow: bool, least_gain: float) -> Straightened | None:
     """Take out of a record what its rotor's rate changed by.
 
     By Gauss-Newton steps on the phases of the comb's lines over the dwell: first of each line by itself, from the inner
@@ -125,10 +128,8 @@ def straightened(
 
     Parameters
     ----------
-    samples : ndarray of complex128, shape (pulses,)
-        The record over the rms of its noise, nothing taken out: a band that was would be smeared.
     data : Periodogram
-        The same from `prepare`.
+        The record.
     comb : Comb
         The comb found in it.
     edge : float
@@ -153,25 +154,23 @@ def straightened(
     if gain < least_gain:
         return None
     outermost = min(int(FURTHER * reach), furthest) * comb.per_turn
-    lines, spacing = [(-outermost, outermost)], rate / comb.per_turn
-    whole = _continued(samples, comb.fit, np.zeros(len(DEGREES)))
+    reaches, spacing = [(-outermost, outermost)], rate / comb.per_turn
+    endless = _continued(data.samples, comb.fit, np.zeros(len(DEGREES)))
     for _ in range(FITTED_STEPS):
         spacing *= 1 + 2 * float(ahead[0]) / pulses
-        even = data.left(remove_bands(resampled(whole, centre, _late(ahead, pulses)), data.bands))
-        fitted = fit_combs(even, centre, [spacing], lines)
+        even = data.left(remove_bands(resampled(endless, centre, _late(ahead, pulses)), data.bands))
+        fitted = fit_combs(even, centre, [spacing], reaches)
         if fitted is None:
             return None
         (fit,), rest = fitted
-        whole = _continued(samples, fit, ahead)
+        endless = _continued(data.samples, fit, ahead)
         step, std = ahead_left(even, fit, rest)
         ahead, spacing = np.append(step[0], ahead[1:] + step[1:]), fit.spacing
-        if not _change(ahead, pulses) < MOST_CHANGE:
+        if not is_sure(ahead, std) or not _change(ahead, pulses) < MOST_CHANGE:
             return None
         if np.all(np.abs(step[1:]) < ENOUGH * std[1:]):
             break
-    if not is_sure(ahead, std):
-        return None
-    return Straightened(resampled(whole, centre, _late(ahead, pulses)), bend(ahead, pulses))
+    return Straightened(resampled(endless, centre, _late(ahead, pulses)), bend(ahead, pulses))
 
 
 def _each_by_itself(data: Periodogram, rate: float, centre: float, reach: int) -> tuple[NDArray[np.float64], float]:
@@ -221,8 +220,8 @@ def _each_by_itself(data: Periodogram, rate: float, centre: float, reach: int) -
 
 
 def is_sure(ahead: NDArray[np.float64], std: NDArray[np.float64], deviations: float = SURE_DEVIATIONS) -> bool:
-    """True where a rate changes for sure, by polynomials of `DEGREES` and their deviations [samples]."""
-    return bool(np.any(np.abs(ahead[1:]) > deviations * std[1:]))
+    """True where a rate changes evenly for sure, by polynomials of `DEGREES` and their deviations [samples]."""
+    return bool(abs(ahead[1]) > deviations * std[1])
 
 
 def bend(ahead: NDArray[np.float64], pulses: int) -> float:
@@ -249,12 +248,12 @@ def _over_time(
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
     """What unit lines see in each part of a dwell, shape (lines, parts), and the parts' middles [samples]."""
     pulses = len(samples)
-    length = max(pulses // PARTS, 1)
-    parts = samples[: pulses // length * length].reshape(-1, length)
+    length = min(max(pulses // PARTS, 1), LONGEST_PART)
+    cut = samples[: pulses // length * length].reshape(-1, length)
     within = np.arange(length) - (length - 1) / 2
-    time = np.asarray(np.arange(len(parts)) * length + (length - pulses) / 2, np.float64)
+    time = np.asarray(np.arange(len(cut)) * length + (length - pulses) / 2, np.float64)
     short = np.exp(-2j * np.pi * frequency[:, None] * within) / length
-    return short @ parts.T * np.exp(-2j * np.pi * frequency[:, None] * time), time
+    return short @ cut.T * np.exp(-2j * np.pi * frequency[:, None] * time), time
 
 
 def _change(ahead: NDArray[np.float64], pulses: int) -> float:
@@ -279,21 +278,23 @@ def ahead_left(
     Returns
     -------
     ahead, std : ndarray, shape (degrees,)
-        Of each of `DEGREES`, and standard deviations at the fitted amplitudes [samples]: one Gauss-Newton step, near to
-        the truth where the change leaves the lines narrow.
+        Of each of `DEGREES`, and standard deviations at the fitted amplitudes [samples], whatever velocity and even
+        acceleration the body has: one Gauss-Newton step, near to the truth where the change leaves the lines narrow.
     """
     pulses, frequency = data.pulses, fit.frequencies
+    shapes = _shapes(_time(pulses), pulses)
     lead = 2 * np.pi * fit.spacing * fit.orders
-    turned = 1j * lead * fit.amplitudes
-    # what the record gains by each polynomial, without what other amplitudes would make of it
-    gained = _shapes(_time(pulses), pulses) * sum_of_lines(pulses, frequency, turned)
-    seen = against_lines(gained, frequency)
+    turned, still = (sum_of_lines(pulses, frequency, 1j * a * fit.amplitudes) for a in (lead, 2 * np.pi))
+    # what the record gains by each polynomial, and by another velocity or an acceleration of the body
+    gained = np.concatenate([shapes * turned, shapes[:2] * still])
+    # what other amplitudes would make of it does not count
+    seen = against_lines(np.concatenate([gained, rest[None]]), frequency).T
     products = notched_products(frequency, pulses, data.bands).plain
     products.flat[:: len(products) + 1] += LEAST_RIDGE
-    as_lines = times(np.asarray(np.linalg.inv(products), np.float64), seen.T)
-    own = np.stack([g - sum_of_lines(pulses, frequency, line) for g, line in zip(gained, as_lines.T, strict=True)])
-    level = float(np.average(data.level_of(rest)(frequency), weights=squared(turned) + 1e-30))
-    information = 2 * (own @ own.conj().T).real / level
-    score = 2 * (own.conj() @ rest).real / level
+    as_lines = whole(np.asarray(np.linalg.solve(products, parts(seen)), np.float64))
+    own = gained.conj() @ np.vstack([gained, rest]).T - pulses * seen[:, :-1].conj().T @ as_lines
+    level = float(np.average(data.level_of(rest)(frequency), weights=squared(lead * fit.amplitudes) + 1e-30))
+    information, score = 2 * own[:, :-1].real / level, 2 * own[:, -1].real / level
     covariance = np.linalg.pinv(information, hermitian=True)
-    return covariance @ score, np.sqrt(np.maximum(np.diag(covariance), 0))
+    step, std = covariance @ score, np.sqrt(np.maximum(np.diag(covariance), 0))
+    return step[: len(DEGREES)], std[: len(DEGREES)]

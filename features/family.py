@@ -6,17 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .comb import LEAST_REACH_MPS, Comb, find_comb
-from .drift import ahead_left, is_sure, straightened
+from .drift import Straightened, ahead_left, is_sure, straightened
 from .family_edge import edge_of_lines, span_of
 from .helicopter import Gear, find_gear
 from .periodogram import Periodogram, prepared
 from .rotors import Rotors
-from .slow_lines import remove_bands
 from .spectrum import Spectrum
-
-#: Before a record is read at other times, what is strong in it goes, so near to its middle [bins]: a record does not
-#: repeat, and the step between its ends would spread. What lies further out is left, as lines of the rotor lie there.
-STRONG_BINS = 3.0
 
 #: What the lines tell of the rate grows by so much once its change is taken out, where several rotors were found that
 #: are one; and where these were told apart.
@@ -48,6 +43,8 @@ class Family:
         How far ahead of an even rotor a single one is still, as from `ahead_left`; None where there are several.
     bend : float
         Even change of the rate that was taken out, relative [1 / sample].
+    change_std : float
+        Relative standard deviation that this adds to the rates.
     """
 
     data: Periodogram
@@ -59,7 +56,8 @@ class Family:
     rotors: Rotors
     gear_reason: str
     ahead: tuple[NDArray[np.float64], NDArray[np.float64]] | None
-    bend: float = 0.0
+    bend: float
+    change_std: float
 
     @property
     def is_told_apart(self) -> bool:
@@ -75,9 +73,7 @@ def slower_than_rotors(data: Periodogram, edge: float, edge_std: float) -> str:
     return ""
 
 
-def find_family(
-    iq: NDArray[np.complex64], spectrum: Spectrum, data: Periodogram, blades: int | None = None
-) -> tuple[Family | None, str]:
+def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None) -> tuple[Family | None, str]:
     """Find the line family of a record.
 
     Where its rotors are not told apart, their rates may have changed instead: if the record as it would be of rotors
@@ -85,12 +81,10 @@ def find_family(
 
     Parameters
     ----------
-    iq : ndarray of complex64, shape (pulses,)
-        The record.
-    spectrum : Spectrum
-        Its spectrum.
     data : Periodogram
         From `prepared`.
+    spectrum : Spectrum
+        What that was prepared with.
     blades : int, optional
         Of a rotor.
 
@@ -107,23 +101,21 @@ def find_family(
     narrow = family.ahead is not None
     if family.ahead is not None and not is_sure(*family.ahead):
         return family, ""
-    noise, edge = float(np.sqrt(spectrum.floor)), min(family.edge, span_of(data))
-    strong = [(turn, min(half, STRONG_BINS)) for turn, half in data.bands]
-    samples = remove_bands(np.asarray(iq / noise, np.complex128), strong)
+    edge = min(family.edge, span_of(data))
     least = 0.0 if len(family.rotors.rates) == 1 else BELIEVED_GAIN if family.is_told_apart else SEVERAL_GAIN
-    even = straightened(samples, data, family.comb, edge, narrow=narrow, least_gain=least)
+    even = straightened(data, family.comb, edge, narrow=narrow, least_gain=least)
     if even is None:
         return family, ""
-    again = prepared((even.samples * noise).astype(np.complex64), spectrum)
-    other = _as_it_is(again, blades, even.bend)[0] if again is not None else None
+    again = prepared((even.samples * np.sqrt(spectrum.floor)).astype(np.complex64), spectrum)
+    other = _as_it_is(again, blades, even)[0] if again is not None else None
     if other is None or not other.is_told_apart:
         return family, ""
     # several that are told apart are believed, but for a single one that changed
     return (other if len(other.rotors.rates) == 1 or not family.is_told_apart else family), ""
 
 
-def _as_it_is(data: Periodogram, blades: int | None, bend: float = 0.0) -> tuple[Family | None, str]:
-    """`find_family` of rotors that turn evenly."""
+def _as_it_is(data: Periodogram, blades: int | None, even: Straightened | None = None) -> tuple[Family | None, str]:
+    """`find_family` of rotors that turn evenly, or were made to."""
     comb, why = find_comb(data, blades)
     if comb is None:
         return None, why
@@ -137,4 +129,9 @@ def _as_it_is(data: Periodogram, blades: int | None, bend: float = 0.0) -> tuple
         edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades, gear.second.spacing)
     single = len(rotors.rates) == 1 and (gear is not None or rotors.resolved)
     ahead = ahead_left(data, comb.fit, comb.rest) if single else None
-    return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead, bend), ""
+    change_std = 0.0
+    if even is not None and ahead is not None:  # the mean rate is told from how it changes
+        all_in = 2 * float(ahead[1][0]) / data.pulses
+        change_std = float(np.sqrt(max(all_in**2 - (comb.chopping_std / comb.chopping) ** 2, 0.0)))
+    bend = even.bend if even is not None else 0.0
+    return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead, bend, change_std), ""

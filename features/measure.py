@@ -58,7 +58,8 @@ class Measurements:
         Chopping frequency, blades x rotation rate [Hz]; of several rotors, that of their mean rate. Where the rate
         changes within the dwell, that of the even turn that comes nearest.
     chopping_drift_hz_per_s, chopping_drift_hz_per_s_std : ndarray
-        Its even change within the dwell [Hz/s], of one rotor or a helicopter; NaN for several.
+        Its even change within the dwell [Hz/s], of one rotor or a helicopter; NaN for several. Neither velocity nor an
+        even acceleration of the body passes for it.
     comb_order : ndarray
         Outermost order of chopping lines that speaks for the comb [1].
     comb_snr_db : ndarray
@@ -68,7 +69,7 @@ class Measurements:
     rotor_count : ndarray
         Rotors told apart; NaN without a comb.
     rotors_resolved : ndarray of bool
-        False where rates lie nearer than the dwell tells apart, or changed within it each in its own way: of steady
+        False where rates lie nearer than the dwell tells apart, or several changed within it, or one jerkily: of steady
         ones the count is then a lower bound.
     rotor_spread_hz : ndarray
         Range of the rotors' chopping frequencies [Hz], also where they are not resolved; 0 where there is one rate.
@@ -198,9 +199,9 @@ def measure(
     Returns
     -------
     Measurements
-        Standard deviations hold for the model: rates that are steady within the dwell or change smoothly and together,
-        white noise about each line. A body that accelerates smears all lines; `bladewing measure` takes that out first
-        (`body_acceleration`, `without_acceleration`).
+        Standard deviations hold for the model: rates that are steady within the dwell, or a single one that changes
+        smoothly, white noise about each line. A body that accelerates smears all lines; `bladewing measure` takes that
+        out first (`body_acceleration`, `without_acceleration`).
 
     Raises
     ------
@@ -266,18 +267,20 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     def without_rotor(reason: str) -> dict:
         return blank | {"reason": reason} | dict(zip(BODY, body_velocity(whole, spectrum, None), strict=True))
 
-    family, why = find_family(iq, spectrum, data, blades)
+    family, why = find_family(data, spectrum, blades)
     if family is None:
         return without_rotor(why)
     data, comb, rotors, gear = family.data, family.comb, family.rotors, family.gear
     edge, edge_std, span = family.edge, family.edge_std, span_of(data)
     out["reason"], out["gear_reason"] = "", family.gear_reason
-    out["chopping_hz"], out["chopping_hz_std"] = comb.chopping * prf_hz, comb.chopping_std * prf_hz
+    out["chopping_hz"] = comb.chopping * prf_hz
+    out["chopping_hz_std"] = float(np.hypot(comb.chopping_std, family.change_std * comb.chopping)) * prf_hz
     out["comb_order"] = float(comb.last // comb.per_turn)
     out["comb_snr_db"] = float(10 * np.log10(max(comb.fit.snr.sum() / data.pulses, 1e-9)))
     if gear is not None:
         for name, (rate, std) in zip(("main", "tail"), gear.rates, strict=True):
-            out[f"{name}_chopping_hz"], out[f"{name}_chopping_hz_std"] = rate * prf_hz, std * prf_hz
+            out[f"{name}_chopping_hz"] = rate * prf_hz
+            out[f"{name}_chopping_hz_std"] = float(np.hypot(std, family.change_std * rate)) * prf_hz
         out["gear_ratio"], out["gear_ratio_std"] = gear.ratio, gear.ratio_std
     count = len(rotors.rates)
     middle = rotors.fits[0] if count > 1 else comb.fit
@@ -291,8 +294,6 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         ahead, ahead_std = family.ahead
         for name, value in (("", family.bend + bend(ahead, data.pulses)), ("_std", bend(ahead_std, data.pulses))):
             out[f"chopping_drift_hz_per_s{name}"] = value * comb.chopping * prf_hz**2
-        if family.bend:  # its mean is told from how it changes
-            out["chopping_hz_std"] = comb.chopping * 2 * float(ahead_std[0]) / data.pulses * prf_hz
     if count > 1:
         # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
         out["chopping_hz"] = float(rotors.rates.mean()) * prf_hz
@@ -306,7 +307,8 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         edge, edge_std = around if np.isinf(edge) else surer_edge((edge, edge_std), around)
     if slow := slower_than_rotors(data, edge, edge_std):
         return without_rotor(slow)
-    for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", rotors.stds)):
+    stds = np.hypot(rotors.stds, family.change_std * rotors.rates)
+    for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", stds)):
         padded = np.full(MAX_ROTORS, np.nan)
         padded[:count] = values * prf_hz
         out[name] = padded

@@ -1,4 +1,4 @@
-"""A rate that changes within the dwell: measured, taken out, and never found where several rotors are steady."""
+"""A rate that changes within the dwell: measured, taken out, and not found where several rotors are steady."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,7 @@ from bladewing.features import measure
 from bladewing.features.drift import ahead_left, bend, is_sure, resampled, straightened
 from bladewing.features.family import find_family
 from bladewing.features.periodogram import prepared
+from bladewing.features.slow_lines import remove_bands
 from bladewing.features.spectrum import doppler_spectrum
 
 from ..benchmarks import records
@@ -25,7 +26,7 @@ def family_of(iq: np.ndarray):
     """The record made ready, and its line family."""
     spectrum = doppler_spectrum(iq, **records.RADAR)
     data = prepared(iq, spectrum)
-    return data, find_family(iq, spectrum, data)[0]
+    return data, find_family(data, spectrum)[0]
 
 
 @pytest.mark.parametrize(("margin", "pulses"), [(0, 512), (40, 501), (64, 3000)])
@@ -57,7 +58,7 @@ def test_one_rotor_whose_rate_changes_is_one_rotor(change):
         told.append(bool(found.rotors_resolved) and found.rotor_count == 1)
         if told[-1]:
             drift_hz_per_s = chopping_hz * change / DWELL_S
-            error = max(0.1 * abs(drift_hz_per_s), 5 * found.chopping_drift_hz_per_s_std)
+            error = max(0.02 * abs(drift_hz_per_s), 5 * found.chopping_drift_hz_per_s_std)
             assert found.chopping_drift_hz_per_s == pytest.approx(drift_hz_per_s, abs=error)
             assert found.chopping_hz == pytest.approx(chopping_hz, rel=3e-4)
             tips.append(found.tip_speed_mps / (np.pi * chopping_hz * 0.15) - 1)
@@ -100,18 +101,25 @@ def test_turned_round_in_time_a_rate_that_rises_falls():
     assert loud.chopping_drift_hz_per_s == pytest.approx(there.chopping_drift_hz_per_s, abs=0.1 * std)
 
 
+def measured_both_ways(iq: np.ndarray, monkeypatch) -> tuple:
+    """What is measured, and what would be without a thought of change."""
+    found = measure(iq, **records.RADAR)
+    with monkeypatch.context() as without:
+        without.setattr("bladewing.features.family.straightened", lambda *_, **__: None)
+        return found, measure(iq, **records.RADAR)
+
+
 @pytest.mark.parametrize("snr_db", [0.0, 20.0])
-@pytest.mark.parametrize(("count", "apart_hz"), [(2, 0.1), (3, 0.1), (4, 0.4)])
-def test_several_steady_rotors_are_not_taken_for_one_that_changes(count, apart_hz, snr_db, monkeypatch):
-    """What is said of them is what was said without a thought of change."""
+@pytest.mark.parametrize("weaker", [1.0, 0.6])
+@pytest.mark.parametrize(("count", "apart_hz"), [(2, 0.1), (3, 0.05), (3, 0.1), (4, 0.4)])
+def test_several_steady_rotors_are_not_taken_for_one_that_changes(count, apart_hz, weaker, snr_db, monkeypatch):
+    """Be they as strong as one another or not."""
     rng = np.random.default_rng(5)
     for _ in range(5):
         rates_hz = rng.uniform(50, 90) + apart_hz * np.arange(count)
-        iq = records.record(rng, rates_hz, snr_db=snr_db, body_db=20, velocity_mps=rng.uniform(-20, 20))
-        found = measure(iq, **records.RADAR)
-        with monkeypatch.context() as without:
-            without.setattr("bladewing.features.family.straightened", lambda *_, **__: None)
-            plain = measure(iq, **records.RADAR)
+        options = {"snr_db": snr_db, "body_db": 20, "velocity_mps": rng.uniform(-20, 20)}
+        iq = records.record(rng, rates_hz, strengths=weaker ** np.arange(count), **options)
+        found, plain = measured_both_ways(iq, monkeypatch)
         assert found.rotor_count == plain.rotor_count
         assert found.rotors_resolved == plain.rotors_resolved
 
@@ -125,28 +133,38 @@ def test_several_rotors_have_no_common_drift():
     assert np.isnan(found.chopping_drift_hz_per_s_std)
 
 
-def test_rotors_that_change_together_are_told_apart():
-    """As their throttle is opened."""
-    told = 0
-    for seed in range(6):
-        rng = np.random.default_rng(seed)
-        rates_hz = records.apart(rng, 4, 0.4, 56.5, 58.5)
-        options = {"snr_db": 10, "body_db": 20, "velocity_mps": rng.uniform(-20, 20), "change": 0.01}
-        found = measure(records.record(rng, rates_hz, **options), **records.RADAR)
-        told += bool(found.rotors_resolved and found.rotor_count == 4)
-    assert told >= 3
+def test_a_small_change_that_is_left_comes_with_its_sign_and_size(monkeypatch):
+    monkeypatch.setattr("bladewing.features.family.straightened", lambda *_, **__: None)
+    for change in (-0.0004, 0.0004):
+        data, family = family_of(one_rotor(4, change, snr_db=10.0)[0])
+        assert family.bend == 0.0
+        left, std = (bend(values, records.PULSES) for values in ahead_left(data, family.comb.fit, family.comb.rest))
+        assert left == pytest.approx(change / records.PULSES, abs=max(4 * std, 0.1 * abs(change) / records.PULSES))
+        assert abs(left) > 4 * std
 
 
-def test_what_is_left_of_a_change_comes_with_its_sign():
-    """A record straightened by too little has the rest of it left."""
-    iq, _ = one_rotor(4, 0.004, snr_db=20.0)
-    spectrum = doppler_spectrum(iq, **records.RADAR)
-    data = prepared(iq, spectrum)
-    family = find_family(iq, spectrum, data)[0]
-    even = straightened(iq / np.sqrt(spectrum.floor), data, family.comb, family.edge, narrow=True, least_gain=0.0)
-    assert even.bend == pytest.approx(0.004 / records.PULSES, rel=0.02)
-    left, std = ahead_left(family.data, family.comb.fit, family.comb.rest)
-    assert abs(bend(left, records.PULSES)) < 5 * bend(std, records.PULSES)
+@pytest.mark.parametrize(("change", "pull_mps2"), [(0.0, 0.0), (0.01, 0.0), (0.0, 0.5), (0.0, 2.0)])
+def test_of_a_one_sided_comb_neither_body_nor_acceleration_passes_for_a_change(change, pull_mps2):
+    """There the body's frequency and its change go with those of the rotor's."""
+    rng = np.random.default_rng(8)
+    drifts, rates = [], []
+    for _ in range(24):
+        rate_hz = rng.uniform(45, 105)
+        lines = np.fft.fft(records.rotors(rng, np.array([rate_hz]), change=change))
+        lines[np.fft.fftfreq(records.PULSES) < 0] *= 0.17
+        blades = np.fft.ifft(lines) / np.sqrt(np.mean(np.abs(lines) ** 2) / records.PULSES)
+        time_s = records.TIMES_S - DWELL_S / 2
+        range_m = rng.uniform(-25, 25) * time_s + pull_mps2 * time_s**2 / 2
+        iq = (blades + 10) * np.exp(-4j * np.pi * range_m / records.WAVELENGTH_M) + records.white(rng, records.PULSES)
+        found = measure(iq.astype(np.complex64), **records.RADAR)
+        if found.rotors_resolved and found.rotor_count == 1:
+            away = found.chopping_drift_hz_per_s - 2 * rate_hz * change / DWELL_S
+            drifts.append(away / found.chopping_drift_hz_per_s_std)
+            rates.append((found.chopping_hz - 2 * rate_hz) / found.chopping_hz_std)
+            assert found.rotor_rates_hz_std[0] == pytest.approx(found.chopping_hz_std)
+    assert len(drifts) >= 12
+    assert np.mean(np.square(drifts)) < 2.5  # of 12 draws and more: 1 +- 0.4
+    assert np.mean(np.square(rates)) < 2.5
 
 
 def test_straightened_to_its_ends():
@@ -165,11 +183,11 @@ def test_straightened_to_its_ends():
     iq = iq.astype(np.complex64)
     spectrum = doppler_spectrum(iq, **records.RADAR)
     data = prepared(iq, spectrum)
-    found = find_family(iq, spectrum, data)[0]
+    found = find_family(data, spectrum)[0]
     noise = np.sqrt(spectrum.floor)
-    even = straightened((iq - body) / noise, data, found.comb, found.edge, narrow=False, least_gain=0.0)
+    even = straightened(data, found.comb, found.edge, narrow=False, least_gain=0.0)
     # an even rotor has turned as far, on the mean over the dwell
-    error = even.samples * noise - comb(time + change * records.PULSES / 24)
+    error = even.samples * noise - remove_bands(comb(time + change * records.PULSES / 24), data.bands)
     ends = np.abs(time) > 0.495 * records.PULSES
-    assert np.mean(np.abs(error[ends]) ** 2) < 50  # of 30 samples; the comb has 2880, without margins 430 are wrong
-    assert np.mean(np.abs(error) ** 2) < 1.5  # of which 1 is the noise
+    assert np.mean(np.abs(error[ends]) ** 2) < 300  # of 30 samples; the comb has 2880, without margins 410 are wrong
+    assert np.mean(np.abs(error) ** 2) < 4.5  # of which 1 is the noise; without margins 5.5
