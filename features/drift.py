@@ -46,6 +46,9 @@ FIXED_STEPS = 4
 #: from a step where it repeats.
 FADING = 64
 
+#: So near to its ends a record holds what the step there, where notches end as well, makes of it [samples].
+END_SAMPLES = 8
+
 #: A change is one where it is sure by so many standard deviations; by each line over the dwell, which says less, by
 #: so many.
 SURE_DEVIATIONS, ROUGHLY_SURE = 5.0, 3.0
@@ -59,11 +62,14 @@ class Straightened:
     ----------
     samples : ndarray of complex128, shape (pulses,)
         Its samples, those of `Periodogram` read at other times; the body's line is what it was.
+    within : ndarray of bool, shape (pulses,)
+        False near the ends, where they are as the comb would go on and not what was measured.
     bend : float
         By how much the rate changed evenly, relative [1 / sample].
     """
 
     samples: NDArray[np.complex128]
+    within: NDArray[np.bool_]
     bend: float
 
 
@@ -101,6 +107,12 @@ def resampled(samples: NDArray[np.complex128], centre: float, late: NDArray[np.f
     off = size // 2 - (size - 1) / 2  # of the spectrum's zero from its middle
     read = LineSpace(spectrum).at(-place)[0]
     return np.asarray(read * np.exp(2j * np.pi * (centre * _time(pulses) - off * place)), np.complex128)
+
+
+def _within(late: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """True where samples are read from well within a record, by how much later each is read [samples]."""
+    place = np.arange(len(late)) + late
+    return (place >= END_SAMPLES) & (place <= len(late) - 1 - END_SAMPLES)
 
 
 def _continued(samples: NDArray[np.complex128], fit: CombFit, ahead: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -158,19 +170,21 @@ def straightened(data: Periodogram, comb: Comb, edge: float, *, narrow: bool, le
     endless = _continued(data.samples, comb.fit, np.zeros(len(DEGREES)))
     for _ in range(FITTED_STEPS):
         spacing *= 1 + 2 * float(ahead[0]) / pulses
-        even = data.left(remove_bands(resampled(endless, centre, _late(ahead, pulses)), data.bands))
+        late = _late(ahead, pulses)
+        even = data.left(remove_bands(resampled(endless, centre, late), data.bands))
         fitted = fit_combs(even, centre, [spacing], reaches)
         if fitted is None:
             return None
         (fit,), rest = fitted
         endless = _continued(data.samples, fit, ahead)
-        step, std = ahead_left(even, fit, rest)
+        step, std = ahead_left(even, fit, rest * _within(late))
         ahead, spacing = np.append(step[0], ahead[1:] + step[1:]), fit.spacing
         if not is_sure(ahead, std) or not _change(ahead, pulses) < MOST_CHANGE:
             return None
         if np.all(np.abs(step[1:]) < ENOUGH * std[1:]):
             break
-    return Straightened(resampled(endless, centre, _late(ahead, pulses)), bend(ahead, pulses))
+    late = _late(ahead, pulses)
+    return Straightened(resampled(endless, centre, late), _within(late), bend(ahead, pulses))
 
 
 def _each_by_itself(data: Periodogram, rate: float, centre: float, reach: int) -> tuple[NDArray[np.float64], float]:

@@ -1,6 +1,6 @@
 """The line family of a record's rotors: comb, edge, second comb and single rotors, of rates that may change."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +114,12 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
     return (other if len(other.rotors.rates) == 1 or not family.is_told_apart else family), ""
 
 
+def _faster(comb: Comb, rotors: Rotors, factor: float) -> tuple[Comb, Rotors]:
+    """A comb and its single rotor of another rate."""
+    fit = replace(comb.fit, spacing=factor * comb.fit.spacing)
+    return replace(comb, fit=fit), replace(rotors, rates=factor * rotors.rates, fits=[fit])
+
+
 def _as_it_is(data: Periodogram, blades: int | None, even: Straightened | None = None) -> tuple[Family | None, str]:
     """`find_family` of rotors that turn evenly, or were made to."""
     comb, why = find_comb(data, blades)
@@ -128,10 +134,13 @@ def _as_it_is(data: Periodogram, blades: int | None, even: Straightened | None =
         data, comb = gear.alone, gear.first
         edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades, gear.second.spacing)
     single = len(rotors.rates) == 1 and (gear is not None or rotors.resolved)
-    ahead = ahead_left(data, comb.fit, comb.rest) if single else None
+    measured = 1.0 if even is None else even.within
+    ahead = ahead_left(data, comb.fit, comb.rest * measured) if single else None
     change_std = 0.0
     if even is not None and ahead is not None:  # the mean rate is told from how it changes
         all_in = 2 * float(ahead[1][0]) / data.pulses
         change_std = float(np.sqrt(max(all_in**2 - (comb.chopping_std / comb.chopping) ** 2, 0.0)))
+        if gear is None:  # and without what stands at the ends
+            comb, rotors = _faster(comb, rotors, 1 + 2 * float(ahead[0][0]) / data.pulses)
     bend = even.bend if even is not None else 0.0
     return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead, bend, change_std), ""

@@ -66,20 +66,22 @@ def test_one_rotor_whose_rate_changes_is_one_rotor(change):
     assert np.median(np.abs(tips)) < 0.005
 
 
-@pytest.mark.parametrize(("change", "most"), [(0.0, 2.0), (0.002, 2.5), (0.01, 3.0)])
-def test_deviations_of_the_change_are_true(change, most):
-    """Of 40 draws the mean square of normalised errors is 1 +- 0.22; a few do not converge to the end."""
+@pytest.mark.parametrize(("snr_db", "change"), [(0.0, 0.0), (0.0, 0.002), (0.0, 0.01), (20.0, 0.002), (20.0, 0.01)])
+def test_deviations_of_the_change_are_true(snr_db, change):
+    """Of 40 draws the mean square of normalised errors is 1 +- 0.22, within 2 lie 0.95 +- 0.04; at 20 dB one or two are
+    further off, whose lines lie about a notch."""
     drifts, rates = [], []
     for seed in range(40):
-        iq, chopping_hz = one_rotor(100 + seed, change, snr_db=0.0)
+        iq, chopping_hz = one_rotor(100 + seed, change, snr_db=snr_db)
         found = measure(iq, **records.RADAR)
         if found.rotors_resolved and found.rotor_count == 1:
             away = found.chopping_drift_hz_per_s - chopping_hz * change / DWELL_S
             drifts.append(away / found.chopping_drift_hz_per_s_std)
             rates.append((found.chopping_hz - chopping_hz) / found.chopping_hz_std)
     assert len(drifts) >= 32
-    assert 0.4 < np.mean(np.square(drifts)) < most
-    assert 0.4 < np.mean(np.square(rates)) < most
+    for errors in (drifts, rates):
+        assert np.mean(np.abs(errors) < 2) > 0.8
+        assert 0.4 < np.mean(np.square(errors)) < (2.2 if snr_db < 10 else 4.0)
 
 
 def test_a_steady_rotor_is_left_as_it_is():
