@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .inputs import in_blocks
+from .lines import middle_times
 from .notch import parabola_offset
 from .spectrum import (
     LEAST_PART,
@@ -154,7 +155,7 @@ def _steadied(
 ) -> NDArray[np.complex64]:
     """Samples (..., pulses) with an acceleration taken out; the phase grows, and is float64."""
     pulses = samples.shape[-1]
-    time_s = (np.arange(pulses) - (pulses - 1) / 2) / prf_hz
+    time_s = middle_times(pulses) / prf_hz
     phase = 2 * np.pi / wavelength_m * acceleration_mps2 * time_s**2
     return np.asarray(samples * np.exp(1j * phase).astype(np.complex64))
 

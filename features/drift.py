@@ -13,7 +13,7 @@ from scipy import fft
 
 from .comb import Comb
 from .comb_fit import LEAST_RIDGE, CombFit, fit_combs
-from .lines import LineSpace, against_lines, squared, sum_of_lines
+from .lines import against_lines, middle_times, squared, sum_of_lines
 from .periodogram import Periodogram
 from .slow_lines import notched_products, parts, remove_bands, whole
 
@@ -73,11 +73,6 @@ class Straightened:
     bend: float
 
 
-def _time(pulses: int) -> NDArray[np.float64]:
-    """Of each sample, from the middle of the dwell [samples]."""
-    return np.asarray(np.arange(pulses) - (pulses - 1) / 2, np.float64)
-
-
 def _shapes(time: NDArray[np.float64], pulses: int) -> NDArray[np.float64]:
     """The polynomials of `DEGREES` at times from the middle of the dwell [samples], shape (degrees, times)."""
     values = np.polynomial.legendre.legvander(2 * time / pulses, max(DEGREES)).T[list(DEGREES)]
@@ -101,12 +96,12 @@ def resampled(samples: NDArray[np.complex128], centre: float, late: NDArray[np.f
     ndarray of complex128, shape (pulses,)
     """
     size, pulses = len(samples), len(late)
-    spectrum = fft.fftshift(fft.fft(samples * np.exp(-2j * np.pi * centre * _time(size))))
+    spectrum = fft.fftshift(fft.fft(samples * np.exp(-2j * np.pi * centre * middle_times(size))))
     # a spectrum's samples seen by a unit line are the record's at a time
     place = (np.arange(pulses) + (size - pulses) / 2 + late) / size
     off = size // 2 - (size - 1) / 2  # of the spectrum's zero from its middle
-    read = LineSpace(spectrum).at(-place)[0]
-    return np.asarray(read * np.exp(2j * np.pi * (centre * _time(pulses) - off * place)), np.complex128)
+    read = against_lines(spectrum[None], -place)[0]
+    return np.asarray(read * np.exp(2j * np.pi * (centre * middle_times(pulses) - off * place)), np.complex128)
 
 
 def _within(late: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -124,7 +119,7 @@ def _continued(samples: NDArray[np.complex128], fit: CombFit, ahead: NDArray[np.
     margin = FADING + int(MOST_CHANGE * pulses / 6)
     away = np.arange(1, margin + 1)
     time = np.concatenate([-away[::-1], away]) + np.repeat([-1, 1], margin) * (pulses - 1) / 2
-    even = time + (ahead * (np.array(DEGREES) > 1)) @ _shapes(time, pulses)
+    even = time + _changed(ahead) @ _shapes(time, pulses)
     lines = (
         np.exp(2j * np.pi * (fit.frequencies * even[:, None] - fit.centre * (even - time)[:, None])) @ fit.amplitudes
     )
@@ -169,7 +164,7 @@ def straightened(data: Periodogram, comb: Comb, edge: float, *, narrow: bool, le
     reaches, spacing = [(-outermost, outermost)], rate / comb.per_turn
     endless = _continued(data.samples, comb.fit, np.zeros(len(DEGREES)))
     for _ in range(FITTED_STEPS):
-        spacing *= 1 + 2 * float(ahead[0]) / pulses
+        spacing *= 1 + other_rate(ahead[0], pulses)
         late = _late(ahead, pulses)
         even = data.left(remove_bands(resampled(endless, centre, late), data.bands))
         fitted = fit_combs(even, centre, [spacing], reaches)
@@ -243,12 +238,21 @@ def bend(ahead: NDArray[np.float64], pulses: int) -> float:
     return 12 * float(ahead[1]) / pulses**2
 
 
+def other_rate(ahead: float, pulses: int) -> float:
+    """Relative difference of the mean rate that puts a rotor so far ahead, by the first of `DEGREES`."""
+    return 2 * float(ahead) / pulses
+
+
+def _changed(ahead: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far ahead a rotor is by the change of its rate, without what another mean rate makes of it [samples]."""
+    return np.asarray(ahead * (np.array(DEGREES) > 1), np.float64)
+
+
 def _late(ahead: NDArray[np.float64], pulses: int) -> NDArray[np.float64]:
     """By how much later than an even rotor one that is ahead has turned as far, but for another rate [samples]."""
-    own = ahead * (np.array(DEGREES) > 1)
-    time, late = _time(pulses), np.zeros(pulses)
+    time, late = middle_times(pulses), np.zeros(pulses)
     for _ in range(FIXED_STEPS):
-        late = -own @ _shapes(time + late, pulses)
+        late = -_changed(ahead) @ _shapes(time + late, pulses)
     return late
 
 
@@ -272,7 +276,7 @@ def _over_time(
 
 def _change(ahead: NDArray[np.float64], pulses: int) -> float:
     """How far the rate departs from the one that was known, relative."""
-    return float(np.abs(np.diff(ahead @ _shapes(_time(pulses), pulses))).max())
+    return float(np.abs(np.diff(ahead @ _shapes(middle_times(pulses), pulses))).max())
 
 
 def ahead_left(
@@ -296,7 +300,7 @@ def ahead_left(
         acceleration the body has: one Gauss-Newton step, near to the truth where the change leaves the lines narrow.
     """
     pulses, frequency = data.pulses, fit.frequencies
-    shapes = _shapes(_time(pulses), pulses)
+    shapes = _shapes(middle_times(pulses), pulses)
     lead = 2 * np.pi * fit.spacing * fit.orders
     turned, still = (sum_of_lines(pulses, frequency, 1j * a * fit.amplitudes) for a in (lead, 2 * np.pi))
     # what the record gains by each polynomial, and by another velocity or an acceleration of the body

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .comb import LEAST_REACH_MPS, Comb, find_comb
-from .drift import Straightened, ahead_left, is_sure, straightened
+from .drift import Straightened, ahead_left, bend, is_sure, other_rate, straightened
 from .family_edge import edge_of_lines, span_of
 from .helicopter import Gear, find_gear
 from .periodogram import Periodogram, prepared
@@ -64,6 +64,18 @@ class Family:
         """True where nothing is left that the rotors found do not explain."""
         return self.gear is not None or self.rotors.resolved
 
+    @property
+    def drift(self) -> tuple[float, float] | None:
+        """Even relative change of a single rotor's rate and its standard deviation [1 / sample]; None for several."""
+        if self.ahead is None:
+            return None
+        left, std = (bend(values, self.data.pulses) for values in self.ahead)
+        return self.bend + left, std
+
+    def with_change(self, std: NDArray[np.float64] | float, rate: NDArray[np.float64] | float) -> NDArray[np.float64]:
+        """Standard deviations of rates, with what the change that was taken out adds, in the unit of both."""
+        return np.asarray(np.hypot(std, self.change_std * np.asarray(rate)), np.float64)
+
 
 def slower_than_rotors(data: Periodogram, edge: float, edge_std: float) -> str:
     """Why a line family of this edge [cycles a sample] is no rotor's; empty where it may be one's."""
@@ -98,12 +110,12 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
     family, reason = _as_it_is(data, blades)
     if family is None:
         return None, reason
-    narrow = family.ahead is not None
     if family.ahead is not None and not is_sure(*family.ahead):
         return family, ""
     edge = min(family.edge, span_of(data))
-    least = 0.0 if len(family.rotors.rates) == 1 else BELIEVED_GAIN if family.is_told_apart else SEVERAL_GAIN
-    even = straightened(data, family.comb, edge, narrow=narrow, least_gain=least)
+    several_gain = BELIEVED_GAIN if family.is_told_apart else SEVERAL_GAIN
+    least_gain = several_gain if len(family.rotors.rates) > 1 else 0.0
+    even = straightened(data, family.comb, edge, narrow=family.ahead is not None, least_gain=least_gain)
     if even is None:
         return family, ""
     again = prepared((even.samples * np.sqrt(spectrum.floor)).astype(np.complex64), spectrum)
@@ -111,7 +123,9 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
     if other is None or not other.is_told_apart:
         return family, ""
     # several that are told apart are believed, but for a single one that changed
-    return (other if len(other.rotors.rates) == 1 or not family.is_told_apart else family), ""
+    if family.is_told_apart and len(other.rotors.rates) > 1:
+        return family, ""
+    return other, ""
 
 
 def _faster(comb: Comb, rotors: Rotors, factor: float) -> tuple[Comb, Rotors]:
@@ -138,9 +152,9 @@ def _as_it_is(data: Periodogram, blades: int | None, even: Straightened | None =
     ahead = ahead_left(data, comb.fit, comb.rest * measured) if single else None
     change_std = 0.0
     if even is not None and ahead is not None:  # the mean rate is told from how it changes
-        all_in = 2 * float(ahead[1][0]) / data.pulses
+        all_in = other_rate(ahead[1][0], data.pulses)
         change_std = float(np.sqrt(max(all_in**2 - (comb.chopping_std / comb.chopping) ** 2, 0.0)))
         if gear is None:  # and without what stands at the ends
-            comb, rotors = _faster(comb, rotors, 1 + 2 * float(ahead[0][0]) / data.pulses)
-    bend = even.bend if even is not None else 0.0
-    return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead, bend, change_std), ""
+            comb, rotors = _faster(comb, rotors, 1 + other_rate(ahead[0][0], data.pulses))
+    taken_out = even.bend if even is not None else 0.0
+    return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead, taken_out, change_std), ""

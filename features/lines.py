@@ -21,6 +21,11 @@ def squared(amplitude: NDArray[np.complexfloating]) -> NDArray[np.floating]:
     return np.asarray(amplitude.real**2 + amplitude.imag**2)
 
 
+def middle_times(pulses: int) -> NDArray[np.float64]:
+    """Of each pulse, its time from the middle of the record [samples]."""
+    return np.asarray(np.arange(pulses) - (pulses - 1) / 2, np.float64)
+
+
 def _bell(away: NDArray[np.floating]) -> NDArray[np.float64]:
     """The kernel, -1 <= away <= 1."""
     return np.asarray(np.exp(_SHAPE * (np.sqrt(np.maximum(1 - away**2, 0)) - 1)), np.float64)
@@ -30,7 +35,7 @@ def _bell(away: NDArray[np.floating]) -> NDArray[np.float64]:
 def kernel(pulses: int) -> tuple[int, NDArray[np.float64]]:
     """Transform length, and one over the kernel's own transform at each pulse."""
     size = fft.next_fast_len(2 * pulses)
-    time = np.arange(pulses) - (pulses - 1) / 2
+    time = middle_times(pulses)
     node, weight = np.polynomial.legendre.leggauss(64)
     out = 2 / TAPS / (np.cos(np.pi * TAPS / size * np.outer(time, node)) @ (weight * _bell(node)))
     out.setflags(write=False)
@@ -67,8 +72,7 @@ class LineSpace:
     @cached_property
     def _spectra(self) -> NDArray[np.complex128]:
         """Spectra of the samples and of the samples times their time, shape (2, bins)."""
-        time = np.arange(len(self.samples)) - (len(self.samples) - 1) / 2
-        return _to_read(np.stack([self.samples, self.samples * time]))
+        return _to_read(np.stack([self.samples, self.samples * middle_times(len(self.samples))]))
 
     def at(self, frequency: NDArray[np.floating]) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
         """Mean of the samples, and of the samples times time, against unit lines.

@@ -11,7 +11,6 @@ from .allocator import keep_freed
 from .bandwidth import half_empty, threshold_band_hz
 from .body_velocity import body_velocity, folded
 from .chopping import Chopping
-from .drift import bend
 from .family import find_family, slower_than_rotors
 from .family_edge import FASTEST_TIP_MPS, SPAN, edge_around, edge_of_lines, span_of, surer_edge
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
@@ -274,13 +273,13 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     edge, edge_std, span = family.edge, family.edge_std, span_of(data)
     out["reason"], out["gear_reason"] = "", family.gear_reason
     out["chopping_hz"] = comb.chopping * prf_hz
-    out["chopping_hz_std"] = float(np.hypot(comb.chopping_std, family.change_std * comb.chopping)) * prf_hz
+    out["chopping_hz_std"] = float(family.with_change(comb.chopping_std, comb.chopping)) * prf_hz
     out["comb_order"] = float(comb.last // comb.per_turn)
     out["comb_snr_db"] = float(10 * np.log10(max(comb.fit.snr.sum() / data.pulses, 1e-9)))
     if gear is not None:
         for name, (rate, std) in zip(("main", "tail"), gear.rates, strict=True):
             out[f"{name}_chopping_hz"] = rate * prf_hz
-            out[f"{name}_chopping_hz_std"] = float(np.hypot(std, family.change_std * rate)) * prf_hz
+            out[f"{name}_chopping_hz_std"] = float(family.with_change(std, rate)) * prf_hz
         out["gear_ratio"], out["gear_ratio_std"] = gear.ratio, gear.ratio_std
     count = len(rotors.rates)
     middle = rotors.fits[0] if count > 1 else comb.fit
@@ -290,10 +289,9 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     else:
         velocity = body_velocity(data, spectrum, middle, steady=rotors.resolved, open_std=comb.body_std)
     out |= dict(zip(BODY, velocity, strict=True))
-    if family.ahead is not None:
-        ahead, ahead_std = family.ahead
-        for name, value in (("", family.bend + bend(ahead, data.pulses)), ("_std", bend(ahead_std, data.pulses))):
-            out[f"chopping_drift_hz_per_s{name}"] = value * comb.chopping * prf_hz**2
+    if family.drift is not None:
+        drift, drift_std = (value * comb.chopping * prf_hz**2 for value in family.drift)
+        out["chopping_drift_hz_per_s"], out["chopping_drift_hz_per_s_std"] = drift, drift_std
     if count > 1:
         # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
         out["chopping_hz"] = float(rotors.rates.mean()) * prf_hz
@@ -307,7 +305,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         edge, edge_std = around if np.isinf(edge) else surer_edge((edge, edge_std), around)
     if slow := slower_than_rotors(data, edge, edge_std):
         return without_rotor(slow)
-    stds = np.hypot(rotors.stds, family.change_std * rotors.rates)
+    stds = family.with_change(rotors.stds, rotors.rates)
     for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", stds)):
         padded = np.full(MAX_ROTORS, np.nan)
         padded[:count] = values * prf_hz

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .lines import TAP, TAPS, kernel, line_products, taps
+from .lines import TAP, TAPS, kernel, line_products, middle_times, taps
 
 #: Sequences beyond the time-bandwidth product: what the band leaks past it falls under -100 dB.
 EXTRA_SEQUENCES = 11
@@ -111,7 +111,7 @@ def remove_bands(samples: NDArray[np.complex128], bands: Iterable[tuple[float, f
 @lru_cache(maxsize=4)
 def _turn(pulses: int, frequency: float) -> NDArray[np.complex128]:
     """The unit line of a frequency [cycles a sample], time from the middle of the record."""
-    out = np.exp(2j * np.pi * frequency * (np.arange(pulses) - (pulses - 1) / 2))
+    out = np.exp(2j * np.pi * frequency * middle_times(pulses))
     out.setflags(write=False)
     return out
 
@@ -130,7 +130,7 @@ def _held(pulses: int, half_bins: float) -> NDArray[np.float32]:
     size, shape = kernel(pulses)
     place = np.arange(-(size // 2) - TAPS, size // 2 + TAPS)
     basis = slepian(pulses, half_bins)
-    time = np.arange(pulses) - (pulses - 1) / 2
+    time = middle_times(pulses)
     turn = (np.exp(1j * np.pi * (pulses - 1) / size * place) / np.sqrt(pulses)).astype(np.complex64)
     out = np.empty((len(place), 2, len(basis)), np.float32)
     step = max(1, _AT_ONCE // size)
