@@ -23,7 +23,7 @@ LEAST_RIDGE = 1e-6
 #: Added besides where that is not enough.
 NOTCH_RIDGE = 1e-2
 
-#: Well above this snr a line's amplitude is not held back: what that leaves of it would pull at its neighbours.
+#: Well above this snr the amplitude of a line by itself is not held back: what that leaves would pull at others.
 CLEAR_SNR = 30.0
 
 #: Lines nearer than this share the power seen there [bins].
@@ -65,7 +65,9 @@ class CombFit:
         return np.asarray(self.centre + self.spacing * self.orders, np.float64)
 
 
-def _smoother(comb: NDArray[np.intp], order: NDArray[np.intp]) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+def over_orders(
+    comb: NDArray[np.intp], order: NDArray[np.intp]
+) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
     """Means over neighbouring orders of the same comb; combs one after the other, orders rising."""
     place = order + comb * (2 * np.abs(order).max() + 4 * SMOOTHED_ORDERS)
     first = np.searchsorted(place, place - SMOOTHED_ORDERS)
@@ -76,6 +78,34 @@ def _smoother(comb: NDArray[np.intp], order: NDArray[np.intp]) -> Callable[[NDAr
         return np.asarray((sums[last] - sums[first]) / (last - first), np.float64)
 
     return smooth
+
+
+def orders_within(data: Periodogram, centre: float, spacing: float, reach: tuple[int, int]) -> NDArray[np.intp]:
+    """Orders of the lines that are fitted: some past the outermost that speak, and none that were taken out."""
+    (low, high), widest = reach, int(0.49 / spacing)
+    own = np.arange(max(low - MARGIN_ORDERS, -widest), min(high + MARGIN_ORDERS, widest) + 1)
+    return np.asarray(own[~data.removed(centre + spacing * own)], np.intp)
+
+
+def lines_at_one_place(frequency: NDArray[np.float64], pulses: int) -> NDArray[np.intp]:
+    """How many lines, itself among them, lie within `ONE_BINS` of each."""
+    first, last = np.sort(frequency).searchsorted(frequency + np.array([[-ONE_BINS], [ONE_BINS]]) / pulses)
+    return np.asarray(last - first, np.intp)
+
+
+def ridges(snr: NDArray[np.float64], together: NDArray[np.intp]) -> NDArray[np.float64]:
+    """What holds amplitudes back, added to the lines' products with themselves.
+
+    Parameters
+    ----------
+    snr : ndarray, shape (lines,)
+        Power of each over the noise of a bin.
+    together : ndarray, shape (lines,)
+        From `lines_at_one_place`. Those that lie in one another are held back however strong they are: let go, they
+        come out as large ones that cancel.
+    """
+    let_go = np.where(together > 1, 1.0, 1 + (snr / CLEAR_SNR) ** 2)
+    return np.asarray(1 / (snr * let_go) + LEAST_RIDGE, np.float64)
 
 
 def _weighed(
@@ -158,10 +188,8 @@ def fit_combs(
 
     pulses = data.pulses
     which, orders = [], []
-    for number, (spacing, (low, high)) in enumerate(zip(spacings, reaches, strict=True)):
-        widest = int(0.49 / spacing)
-        own = np.arange(max(low - MARGIN_ORDERS, -widest), min(high + MARGIN_ORDERS, widest) + 1)
-        own = own[~data.removed(centre + spacing * own)]
+    for number, (spacing, reach) in enumerate(zip(spacings, reaches, strict=True)):
+        own = orders_within(data, centre, spacing, reach)
         orders.append(own)
         which.append(np.full(len(own), number))
     count = len(orders)
@@ -174,7 +202,7 @@ def fit_combs(
     design = np.zeros((len(order), 1 + count))
     design[:, 0] = 1.0
     design[np.arange(len(order)), 1 + comb] = order
-    smooth = _smoother(comb, order)
+    smooth = over_orders(comb, order)
     limit = np.concatenate([[0.5], 0.5 / np.array([max(1, np.abs(own).max()) for own in orders])]) / pulses
     frequency = values[0] + values[1 + comb] * order
     # several combs' lines take so much of the noise out with them that what they leave says little of it
@@ -190,10 +218,9 @@ def fit_combs(
         products = notched_products(frequency, pulses, data.bands)
         # lines that lie in one another may come out as large ones that cancel: together they hold no more than is seen
         most = smooth(np.abs(seen) ** 2 * pulses / level) - 1
-        first, last = np.sort(frequency).searchsorted(frequency + np.array([[-ONE_BINS], [ONE_BINS]]) / pulses)
-        shared = last - first
-        snr = np.minimum(snr, np.maximum(most / shared, 1e-3))
-        held_back = 1 / (snr * (1 + (snr / CLEAR_SNR) ** 2)) + LEAST_RIDGE
+        together = lines_at_one_place(frequency, pulses)
+        snr = np.minimum(snr, np.maximum(most / together, 1e-3))
+        held_back = ridges(snr, together)
         factor, failed = _factored(products.plain, held_back)
         if failed:  # what is tabulated of the notch is a little off where nearly all was taken out
             factor, _ = _factored(products.plain, held_back + NOTCH_RIDGE)

@@ -5,53 +5,49 @@ times at which an even rotor has turned as far, counted about the body's line, t
 is full of it: in the measured recordings a multirotor's rates change by one or two parts in a hundred within 80 ms.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
+from .changing_fit import ChangingFit, Start, fit_changing
 from .comb import Comb
-from .comb_fit import LEAST_RIDGE, CombFit, fit_combs
+from .comb_fit import ENOUGH, LEAST_RIDGE, CombFit, lines_at_one_place
 from .lines import against_lines, middle_times, squared, sum_of_lines
 from .periodogram import Periodogram
-from .slow_lines import notched_products, parts, remove_bands, whole
-
-#: How far a rotor is ahead of an even one is a sum of Legendre polynomials in time, of these degrees. The first is
-#: another rate, the second one that changes evenly.
-DEGREES = (1, 2, 3, 4, 5)
+from .slow_lines import notched_products, parts, whole, without_bands
+from .turning import (
+    DEGREES,
+    FIRST_DEGREES,
+    MOST_CHANGE,
+    change_of,
+    changed,
+    inverse_of,
+    is_sure,
+    late_by,
+    margin_of,
+    other_rate,
+    polynomials,
+    resampled,
+)
 
 #: Lines are seen in so many parts of the dwell, or parts of so many samples where those are longer: within one of them
 #: hardly a line turns out of phase.
 PARTS, LONGEST_PART = 64, 48
 
-#: A rate departs from its mean by no more than this share of it.
-MOST_CHANGE = 0.06
-
 #: The change is sought by the inner orders first, on which an even one that large has about this effect [rad], and then
-#: by so many times more of them, up to all. Before that it is taken to be even: the first so many degrees.
-FIRST_RAD, MORE_ORDERS, LEAST_ORDERS, FIRST_DEGREES = 1.0, 1.3, 4, 2
+#: by so many times more of them, up to all.
+FIRST_RAD, MORE_ORDERS, LEAST_ORDERS = 1.0, 1.3, 4
 
-#: Steps at all orders, at most; they end after one below this many standard deviations.
-LAST_STEPS, ENOUGH = 6, 0.1
+#: Steps at all orders, at most; and by each line over the dwell a change is sure by so many standard deviations.
+LAST_STEPS, ROUGHLY_SURE = 6, 3.0
 
-#: Steps after that, each from a fit of all lines, at most, out to so many times the edge, which smeared lines hide.
+#: Steps of the fit of all lines after that, at most, out to so many times the edge, which smeared lines hide.
 FITTED_STEPS, FURTHER = 8, 2.0
 
-#: Steps to the time at which an even rotor has turned as far: each leaves of what the one before did the share by which
-#: the rate changes.
-FIXED_STEPS = 4
-
-#: At each end so many samples, in which a comb that goes on fades out, beside those that may be read keep a record
-#: from a step where it repeats.
-FADING = 64
-
-#: So near to its ends a record holds what the step there, where notches end as well, makes of it [samples].
-END_SAMPLES = 8
-
-#: A change is one where it is sure by so many standard deviations; by each line over the dwell, which says less, by
-#: so many.
-SURE_DEVIATIONS, ROUGHLY_SURE = 5.0, 3.0
+#: Where that is more samples of lines than these, it reaches no further than they allow.
+MOST_SAMPLES = 12_000_000
 
 
 @dataclass(frozen=True)
@@ -62,67 +58,22 @@ class Straightened:
     ----------
     samples : ndarray of complex128, shape (pulses,)
         Its samples, those of `Periodogram` read at other times; the body's line is what it was.
-    within : ndarray of bool, shape (pulses,)
-        False near the ends, where they are as the comb would go on and not what was measured.
-    bend : float
-        By how much the rate changed evenly, relative [1 / sample].
+    fit : ChangingFit
+        The rotor's lines, every blade's.
     """
 
     samples: NDArray[np.complex128]
-    within: NDArray[np.bool_]
-    bend: float
+    fit: ChangingFit
 
 
-def _shapes(time: NDArray[np.float64], pulses: int) -> NDArray[np.float64]:
-    """The polynomials of `DEGREES` at times from the middle of the dwell [samples], shape (degrees, times)."""
-    values = np.polynomial.legendre.legvander(2 * time / pulses, max(DEGREES)).T[list(DEGREES)]
-    return np.asarray(values, np.float64)
-
-
-def resampled(samples: NDArray[np.complex128], centre: float, late: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """Samples read at other times, about a line that stays.
-
-    Parameters
-    ----------
-    samples : ndarray of complex128, shape (margin + pulses + margin,)
-        A record and what comes before and after it; the whole is taken to repeat.
-    centre : float
-        Frequency of the line [cycles a sample].
-    late : ndarray, shape (pulses,)
-        By how much later each is read [samples].
-
-    Returns
-    -------
-    ndarray of complex128, shape (pulses,)
-    """
-    size, pulses = len(samples), len(late)
-    spectrum = fft.fftshift(fft.fft(samples * np.exp(-2j * np.pi * centre * middle_times(size))))
-    # a spectrum's samples seen by a unit line are the record's at a time
-    place = (np.arange(pulses) + (size - pulses) / 2 + late) / size
-    off = size // 2 - (size - 1) / 2  # of the spectrum's zero from its middle
-    read = against_lines(spectrum[None], -place)[0]
-    return np.asarray(read * np.exp(2j * np.pi * (centre * middle_times(pulses) - off * place)), np.complex128)
-
-
-def _within(late: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """True where samples are read from well within a record, by how much later each is read [samples]."""
-    place = np.arange(len(late)) + late
-    return (place >= END_SAMPLES) & (place <= len(late) - 1 - END_SAMPLES)
-
-
-def _continued(samples: NDArray[np.complex128], fit: CombFit, ahead: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """A record with margins in which its comb goes on and fades out: it repeats without a step between its ends.
-
-    `fit` is of the record as it is with `ahead` taken out.
-    """
+def _continued(samples: NDArray[np.complex128], fit: ChangingFit) -> NDArray[np.complex128]:
+    """A record with margins in which its comb goes on and fades out: it repeats without a step between its ends."""
     pulses = len(samples)
-    margin = FADING + int(MOST_CHANGE * pulses / 6)
+    margin = margin_of(pulses)
     away = np.arange(1, margin + 1)
     time = np.concatenate([-away[::-1], away]) + np.repeat([-1, 1], margin) * (pulses - 1) / 2
-    even = time + _changed(ahead) @ _shapes(time, pulses)
-    lines = (
-        np.exp(2j * np.pi * (fit.frequencies * even[:, None] - fit.centre * (even - time)[:, None])) @ fit.amplitudes
-    )
+    turned = fit.spacing * (time + fit.ahead @ polynomials(time, pulses))
+    lines = np.exp(2j * np.pi * (turned[:, None] * fit.orders + fit.centre * time[:, None])) @ fit.amplitudes
     fade = np.cos(np.pi / 2 * away / (margin + 1)) ** 2
     return np.concatenate([lines[:margin] * fade[::-1], samples, lines[margin:] * fade])
 
@@ -160,26 +111,17 @@ def straightened(data: Periodogram, comb: Comb, edge: float, *, narrow: bool, le
         ahead = rough if gain > 1 else ahead
     if gain < least_gain:
         return None
-    outermost = min(int(FURTHER * reach), furthest) * comb.per_turn
-    reaches, spacing = [(-outermost, outermost)], rate / comb.per_turn
-    endless = _continued(data.samples, comb.fit, np.zeros(len(DEGREES)))
-    for _ in range(FITTED_STEPS):
-        spacing *= 1 + other_rate(ahead[0], pulses)
-        late = _late(ahead, pulses)
-        even = data.left(remove_bands(resampled(endless, centre, late), data.bands))
-        fitted = fit_combs(even, centre, [spacing], reaches)
-        if fitted is None:
-            return None
-        (fit,), rest = fitted
-        endless = _continued(data.samples, fit, ahead)
-        step, std = ahead_left(even, fit, rest * _within(late))
-        ahead, spacing = np.append(step[0], ahead[1:] + step[1:]), fit.spacing
-        if not is_sure(ahead, std) or not _change(ahead, pulses) < MOST_CHANGE:
-            return None
-        if np.all(np.abs(step[1:]) < ENOUGH * std[1:]):
-            break
-    late = _late(ahead, pulses)
-    return Straightened(resampled(endless, centre, late), _within(late), bend(ahead, pulses))
+    outermost = min(int(FURTHER * reach), furthest, MOST_SAMPLES // (2 * pulses * comb.per_turn)) * comb.per_turn
+    spacing = rate / comb.per_turn * (1 + other_rate(ahead[0], pulses))
+    starts = [Start(spacing, outermost, changed(ahead))]
+    fitted = fit_changing(data, starts, centre, degrees=len(DEGREES), steps=FITTED_STEPS, level_about=data.level_at)
+    if fitted is None:
+        return None
+    ((fit,), _) = fitted
+    if not is_sure(fit.ahead, fit.ahead_std) or not change_of(fit.ahead, pulses) < MOST_CHANGE:
+        return None
+    late = late_by(fit.ahead, pulses)
+    return Straightened(resampled(_continued(data.samples, fit), fit.centre, late), fit)
 
 
 def _each_by_itself(data: Periodogram, rate: float, centre: float, reach: int) -> tuple[NDArray[np.float64], float]:
@@ -194,7 +136,7 @@ def _each_by_itself(data: Periodogram, rate: float, centre: float, reach: int) -
     # towards the ends parts count less, or each line's neighbours would leak into it
     taper = np.cos(np.pi * time / pulses) ** 2
     taper /= taper.sum()
-    shapes = _shapes(time, pulses)
+    shapes = polynomials(time, pulses)
     about = shapes - (shapes @ taper)[:, None]
     products = (about * taper) @ about.T
     noise = data.level_at(centre + rate * orders) / pulses * len(time) * float((taper**2).sum())
@@ -219,41 +161,13 @@ def _each_by_itself(data: Periodogram, rate: float, centre: float, reach: int) -
         covariance = np.linalg.inv(power * products[:few, :few])
         step, std = covariance @ score, np.sqrt(np.diag(covariance) / 2)
         ahead[:few] += step
-        if not _change(ahead, pulses) < MOST_CHANGE:
+        if not change_of(ahead, pulses) < MOST_CHANGE:
             return ahead, 0.0
         if last == LAST_STEPS or (last and np.all(np.abs(step) < ENOUGH * std)):
             break
         order = min(int(MORE_ORDERS * order) + 1, reach)
     sure = is_sure(ahead, std, ROUGHLY_SURE)
     return ahead, float((lead**2 * snr).sum()) / max(before, 1e-9) if sure else 0.0
-
-
-def is_sure(ahead: NDArray[np.float64], std: NDArray[np.float64], deviations: float = SURE_DEVIATIONS) -> bool:
-    """True where a rate changes evenly for sure, by polynomials of `DEGREES` and their deviations [samples]."""
-    return bool(abs(ahead[1]) > deviations * std[1])
-
-
-def bend(ahead: NDArray[np.float64], pulses: int) -> float:
-    """Even relative change of the rate a sample that puts a rotor so far ahead."""
-    return 12 * float(ahead[1]) / pulses**2
-
-
-def other_rate(ahead: float, pulses: int) -> float:
-    """Relative difference of the mean rate that puts a rotor so far ahead, by the first of `DEGREES`."""
-    return 2 * float(ahead) / pulses
-
-
-def _changed(ahead: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far ahead a rotor is by the change of its rate, without what another mean rate makes of it [samples]."""
-    return np.asarray(ahead * (np.array(DEGREES) > 1), np.float64)
-
-
-def _late(ahead: NDArray[np.float64], pulses: int) -> NDArray[np.float64]:
-    """By how much later than an even rotor one that is ahead has turned as far, but for another rate [samples]."""
-    time, late = middle_times(pulses), np.zeros(pulses)
-    for _ in range(FIXED_STEPS):
-        late = -_changed(ahead) @ _shapes(time + late, pulses)
-    return late
 
 
 def _excess(amplitude: NDArray[np.complex128], noise: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -274,45 +188,48 @@ def _over_time(
     return short @ cut.T * np.exp(-2j * np.pi * frequency[:, None] * time), time
 
 
-def _change(ahead: NDArray[np.float64], pulses: int) -> float:
-    """How far the rate departs from the one that was known, relative."""
-    return float(np.abs(np.diff(ahead @ _shapes(middle_times(pulses), pulses))).max())
-
-
 def ahead_left(
-    data: Periodogram, fit: CombFit, rest: NDArray[np.complex128]
+    data: Periodogram, fits: Sequence[CombFit], rest: NDArray[np.complex128]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How far ahead of an even rotor a comb's is, by what its lines leave.
+    """How far ahead of even rotors those of combs are, by what their lines leave.
 
     Parameters
     ----------
     data : Periodogram
         The record.
-    fit : CombFit
-        The comb.
+    fits : sequence of CombFit
+        The combs, of one centre.
     rest : ndarray of complex128, shape (pulses,)
-        Samples that it leaves.
+        Samples that they leave.
 
     Returns
     -------
-    ahead, std : ndarray, shape (degrees,)
+    ahead, std : ndarray, shape (combs, degrees)
         Of each of `DEGREES`, and standard deviations at the fitted amplitudes [samples], whatever velocity and even
         acceleration the body has: one Gauss-Newton step, near to the truth where the change leaves the lines narrow.
     """
-    pulses, frequency = data.pulses, fit.frequencies
-    shapes = _shapes(middle_times(pulses), pulses)
-    lead = 2 * np.pi * fit.spacing * fit.orders
-    turned, still = (sum_of_lines(pulses, frequency, 1j * a * fit.amplitudes) for a in (lead, 2 * np.pi))
-    # what the record gains by each polynomial, and by another velocity or an acceleration of the body
-    gained = np.concatenate([shapes * turned, shapes[:2] * still])
+    pulses, frequency = data.pulses, np.concatenate([fit.frequencies for fit in fits])
+    amplitudes = np.concatenate([fit.amplitudes for fit in fits])
+    leads = [2 * np.pi * fit.spacing * fit.orders for fit in fits]
+    shapes = polynomials(middle_times(pulses), pulses)
+    turned = [
+        sum_of_lines(pulses, fit.frequencies, 1j * lead * fit.amplitudes) for fit, lead in zip(fits, leads, strict=True)
+    ]
+    still = sum_of_lines(pulses, frequency, 2j * np.pi * amplitudes)
+    # what the record gains by each polynomial of each rotor, and by another velocity or an acceleration of the body
+    gained = without_bands(np.concatenate([*(shapes * one for one in turned), shapes[:2] * still]), data.bands)
     # what other amplitudes would make of it does not count
     seen = against_lines(np.concatenate([gained, rest[None]]), frequency).T
     products = notched_products(frequency, pulses, data.bands).plain
-    products.flat[:: len(products) + 1] += LEAST_RIDGE
+    snr = np.concatenate([fit.snr for fit in fits])
+    products.flat[:: len(products) + 1] += np.where(lines_at_one_place(frequency, pulses) > 1, 1 / snr, LEAST_RIDGE)
     as_lines = whole(np.asarray(np.linalg.solve(products, parts(seen)), np.float64))
     own = gained.conj() @ np.vstack([gained, rest]).T - pulses * seen[:, :-1].conj().T @ as_lines
-    level = float(np.average(data.level_of(rest)(frequency), weights=squared(lead * fit.amplitudes) + 1e-30))
+    level = float(
+        np.average(data.level_of(rest)(frequency), weights=squared(np.concatenate(leads) * amplitudes) + 1e-30)
+    )
     information, score = 2 * own[:, :-1].real / level, 2 * own[:, -1].real / level
-    covariance = np.linalg.pinv(information, hermitian=True)
-    step, std = covariance @ score, np.sqrt(np.maximum(np.diag(covariance), 0))
-    return step[: len(DEGREES)], std[: len(DEGREES)]
+    covariance = inverse_of(information)
+    step, std = covariance @ score, np.sqrt(np.diag(covariance))
+    each = (len(fits), len(DEGREES))
+    return step[:-2].reshape(each), std[:-2].reshape(each)

@@ -5,13 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .changing import ChangingSeparation
 from .comb import LEAST_REACH_MPS, Comb, find_comb
-from .drift import Straightened, ahead_left, bend, is_sure, other_rate, straightened
+from .drift import Straightened, ahead_left, straightened
 from .family_edge import edge_of_lines, span_of
 from .helicopter import Gear, find_gear
 from .periodogram import Periodogram, prepared
-from .rotors import Rotors
+from .rotors import Rotors, separate_rotors
 from .spectrum import Spectrum
+from .turning import bend, is_sure
+from .unresolved import judged
 
 #: What the lines tell of the rate grows by so much once its change is taken out, where several rotors were found that
 #: are one; and where these were told apart.
@@ -40,9 +43,8 @@ class Family:
     gear_reason : str
         Why there is no second comb; empty where there is one.
     ahead : (ndarray, ndarray) or None
-        How far ahead of an even rotor a single one is still, as from `ahead_left`; None where there are several.
-    bend : float
-        Even change of the rate that was taken out, relative [1 / sample].
+        How far ahead of an even rotor a single one is, by the polynomials of `DEGREES`, and standard deviations
+        [samples]; None where there are several.
     change_std : float
         Relative standard deviation that this adds to the rates.
     """
@@ -56,7 +58,6 @@ class Family:
     rotors: Rotors
     gear_reason: str
     ahead: tuple[NDArray[np.float64], NDArray[np.float64]] | None
-    bend: float
     change_std: float
 
     @property
@@ -69,8 +70,8 @@ class Family:
         """Even relative change of a single rotor's rate and its standard deviation [1 / sample]; None for several."""
         if self.ahead is None:
             return None
-        left, std = (bend(values, self.data.pulses) for values in self.ahead)
-        return self.bend + left, std
+        change, std = (bend(values, self.data.pulses) for values in self.ahead)
+        return change, std
 
     def with_change(self, std: NDArray[np.float64] | float, rate: NDArray[np.float64] | float) -> NDArray[np.float64]:
         """Standard deviations of rates, with what the change that was taken out adds, in the unit of both."""
@@ -117,15 +118,29 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
     least_gain = several_gain if len(family.rotors.rates) > 1 else 0.0
     even = straightened(data, family.comb, edge, narrow=family.ahead is not None, least_gain=least_gain)
     if even is None:
-        return family, ""
+        return _changing(data, family, edge), ""
     again = prepared((even.samples * np.sqrt(spectrum.floor)).astype(np.complex64), spectrum)
     other = _as_it_is(again, blades, even)[0] if again is not None else None
     if other is None or not other.is_told_apart:
-        return family, ""
+        return _changing(data, family, edge), ""
     # several that are told apart are believed, but for a single one that changed
     if family.is_told_apart and len(other.rotors.rates) > 1:
         return family, ""
     return other, ""
+
+
+def _changing(data: Periodogram, family: Family, edge: float) -> Family:
+    """A family of several rotors whose rates change; the one given where none do, or that does not tell them apart."""
+    known = family.rotors
+    if family.gear is not None or (known.resolved and len(known.rates) == 1):
+        return family
+    if known.resolved and not any(map(is_sure, *ahead_left(data, known.fits, known.rest))):
+        return family
+    apart = separate_rotors(data, family.comb, edge, ChangingSeparation)
+    rotors = judged(apart, data, family.comb, edge)
+    if not rotors.resolved or len(rotors.rates) < 2 or (known.resolved and len(rotors.rates) != len(known.rates)):
+        return family
+    return replace(family, rotors=rotors)
 
 
 def _faster(comb: Comb, rotors: Rotors, factor: float) -> tuple[Comb, Rotors]:
@@ -148,13 +163,15 @@ def _as_it_is(data: Periodogram, blades: int | None, even: Straightened | None =
         data, comb = gear.alone, gear.first
         edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades, gear.second.spacing)
     single = len(rotors.rates) == 1 and (gear is not None or rotors.resolved)
-    measured = 1.0 if even is None else even.within
-    ahead = ahead_left(data, comb.fit, comb.rest * measured) if single else None
-    change_std = 0.0
-    if even is not None and ahead is not None:  # the mean rate is told from how it changes
-        all_in = other_rate(ahead[1][0], data.pulses)
-        change_std = float(np.sqrt(max(all_in**2 - (comb.chopping_std / comb.chopping) ** 2, 0.0)))
-        if gear is None:  # and without what stands at the ends
-            comb, rotors = _faster(comb, rotors, 1 + other_rate(ahead[0][0], data.pulses))
-    taken_out = even.bend if even is not None else 0.0
-    return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead, taken_out, change_std), ""
+    ahead, change_std = None, 0.0
+    if single and even is not None:  # the mean rate is told from how it changes
+        ahead, fit = (even.fit.ahead, even.fit.ahead_std), even.fit
+        all_in, alone = fit.spacing_std / fit.spacing, comb.chopping_std / comb.chopping
+        change_std = float(np.sqrt(max(all_in**2 - alone**2, 0.0)))
+        if gear is None:
+            lines = comb.chopping / fit.spacing
+            comb, rotors = _faster(comb, rotors, max(round(lines), 1) / lines)
+    elif single:
+        (left,), (std_left,) = ahead_left(data, [comb.fit], comb.rest)
+        ahead = left, std_left
+    return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead, change_std), ""

@@ -3,7 +3,7 @@
 Rotors of nearly one rate part at the high orders, where the lines lie further from one another than the dwell's bin.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -98,7 +98,7 @@ class Rotors:
     next_rate: float
 
 
-def _is_twice(rest: Periodogram, centre: float, rate: float, fits: list[CombFit]) -> bool:
+def _is_twice(rest: Periodogram, centre: float, rate: float, fits: Sequence[CombFit]) -> bool:
     """True where a comb has its inner lines at halves of its rate too, which then is twice a rotor's."""
     known = np.concatenate([fit.frequencies for fit in fits])
 
@@ -117,7 +117,7 @@ def _holds_another(fit: CombFit, pulses: int) -> bool:
     return strong_multiple(fit.orders, 1 + pulses * np.abs(fit.amplitudes) ** 2, MOST_GEAR, GEAR_FACTOR) > 1
 
 
-def _powers(fits: list[CombFit]) -> list[float]:
+def _powers(fits: Sequence[CombFit]) -> list[float]:
     """Powers of combs' lines, over the orders that all of them reach.
 
     Not their means: where lines of two rotors lie in one another they may come out as large ones that cancel.
@@ -126,7 +126,7 @@ def _powers(fits: list[CombFit]) -> list[float]:
     return [float(np.median(squared(fit.amplitudes[np.abs(fit.orders) <= common]))) for fit in fits]
 
 
-def _meet(fits: list[CombFit], resolution: float) -> bool:
+def _meet(fits: Sequence[CombFit], resolution: float) -> bool:
     """True where rates lie nearer than the dwell tells apart."""
     rates = np.sort([fit.spacing for fit in fits])
     return len(rates) > 1 and float(np.diff(rates).min()) < resolution
@@ -148,24 +148,40 @@ _ADDED, _NO_ROTOR = _Verdict(added=True), _Verdict()
 
 
 @dataclass(frozen=True)
-class _Sought:
-    """A rate [cycles a sample], the orders it reaches, its evidence [nats], and whether it is far from the first."""
+class Sought:
+    """What speaks for a rotor.
+
+    Parameters
+    ----------
+    rate : float
+        [cycles a sample].
+    reach : int
+        Outermost order.
+    evidence : float
+        [nats].
+    is_apart : bool
+        Whether it is far from the first one.
+    change : float
+        By how much the rate changes over the dwell, relative.
+    """
 
     rate: float
     reach: int
     evidence: float
     is_apart: bool
+    change: float = 0.0
 
 
-class _Separation:
+class Separation:
     """The rotors found so far, which grow by one at a time."""
 
     def __init__(self, data: Periodogram, comb: Comb, centre: float, reach: int) -> None:
         self.data, self.comb, self.centre = data, comb, centre
         self.nominal = comb.chopping
+        self.reach = reach
         self.resolution = RESOLVED_BINS / (reach * data.pulses)
         self.furthest = min(FURTHEST * self.nominal * reach, 0.5)
-        self.fits: list[CombFit] = []
+        self.fits: Sequence[CombFit] = []
         self.reaches: list[int] = []
         self.rest = data
         self.level: Level | None = None  # of the rest, once it was asked for
@@ -177,7 +193,7 @@ class _Separation:
         """Of the rotors found [cycles a sample]."""
         return [fit.spacing for fit in self.fits]
 
-    def sought(self) -> list[_Sought]:
+    def sought(self) -> list[Sought]:
         """What speaks loudest for a further rotor, near the rates known and far from them; the loudest first."""
         ends = [self.nominal, *self.rates]
         rates = np.arange(min(ends) * (1 - RATE_SPREAD), max(ends) * (1 + RATE_SPREAD), self.resolution / 4)
@@ -189,9 +205,13 @@ class _Separation:
                 out.append(apart)
         return sorted(out, key=lambda one: -one.evidence)
 
-    def _strongest(self, rates: NDArray[np.float64], *, is_apart: bool = False) -> _Sought:
-        """The rate of some, rising, whose lines speak loudest by their powers and their flashes."""
-        data, size = self.rest, len(self.rest.power)
+    def _strongest(self, rates: NDArray[np.float64], *, is_apart: bool = False) -> Sought:
+        """The rate of some, rising, whose lines speak loudest."""
+        return self._loudest_in(self.rest, rates, is_apart=is_apart)
+
+    def _loudest_in(self, data: Periodogram, rates: NDArray[np.float64], *, is_apart: bool) -> Sought:
+        """The same in a record, by the powers of the lines and their flashes."""
+        size = len(data.power)
         powers, reach = even_scores(data.contrast, rates, np.full(len(rates), self.centre), self.furthest)
         order = np.arange(1, reach.max() + 1)
         frequency = self.centre + np.array([-1, 1])[:, None, None] * rates[:, None] * order
@@ -200,9 +220,9 @@ class _Separation:
         flashes = flash_nats(np.where(seen, data.amplitude[place], 0)).sum(axis=0)
         sums = powers + flashes
         best = int(sums.argmax())
-        return _Sought(float(rates[best]), int(reach[best]), float(sums[best]), is_apart)
+        return Sought(float(rates[best]), int(reach[best]), float(sums[best]), is_apart)
 
-    def _strongest_apart(self) -> _Sought:
+    def _strongest_apart(self) -> Sought:
         """The same among rates further from the nominal one than those of rotors in hover.
 
         Were these not sought, their lines would pass for those of rates in between at which only every third or fourth
@@ -217,13 +237,13 @@ class _Separation:
         near = np.arange(-step, step * 1.01, self.resolution / 4)
         return self._strongest(float(rates[inner.argmax()]) + near, is_apart=True)
 
-    def in_turn(self, sought: list[_Sought]) -> Iterator[_Sought]:
+    def in_turn(self, sought: list[Sought]) -> Iterator[Sought]:
         """These, and where none of them came in the rotor of which they may hold every so many-th line."""
         yield from sought
         if self.fits:
             yield from self._louder_whole(sought[0])
 
-    def _louder_whole(self, one: _Sought) -> list[_Sought]:
+    def _louder_whole(self, one: Sought) -> list[Sought]:
         """A rotor far from the first of which a comb holds every so many-th line: at most one, if that is louder."""
         low, high = FURTHEST_SPREAD
         rates = one.rate * RATIOS
@@ -236,24 +256,24 @@ class _Separation:
         found = self._strongest(tried, is_apart=True)
         return [found] if found.evidence > one.evidence else []
 
-    def join(self, one: _Sought) -> _Verdict:
+    def join(self, one: Sought) -> _Verdict:
         """Take a rate in, if it is a rotor's."""
+        if one.is_apart and _is_twice(self.rest, self.centre, one.rate, self.fits):
+            one = replace(one, rate=one.rate / 2, reach=2 * one.reach)
         rate, reach = one.rate, one.reach
-        if one.is_apart and _is_twice(self.rest, self.centre, rate, self.fits):
-            rate, reach = rate / 2, 2 * reach
         same = [abs(rate - known) < self.resolution for known in self.rates]
         if any(same):  # lines of a rotor that is known, perhaps past those that were fitted
             further = [max(r, reach) if own else r for r, own in zip(self.reaches, same, strict=True)]
-            if further != self.reaches and 2 * sum(further) <= MOST_LINES:
+            if further != self.reaches and self._may_fit(further):
                 self.reaches, self.fitted_out = further, False
             return self._unresolved(rate)
-        if not self.fits and self.comb.per_turn == 1 and abs(rate - self.nominal) < self.resolution:
+        if not self.fits and self._is_the_comb(rate):
             self.fits, self.reaches = [self.comb.fit], [reach]
             self.rest, self.level = self.data.left(self.comb.rest), None
             return _ADDED
-        if 2 * (sum(self.reaches) + reach) > MOST_LINES:
+        if not self._may_fit([*self.reaches, reach]):
             return self._unresolved(rate)
-        fitted = self._fitted(self.centre, [*self.rates, rate], [*self.reaches, reach], JOINT_STEPS)
+        fitted = self._fitted(one, JOINT_STEPS)
         if fitted is None:
             return _NO_ROTOR
         together, _ = fitted
@@ -278,26 +298,36 @@ class _Separation:
         if self.fitted_out:
             return False
         self.fitted_out = True
-        fitted = self._fitted(self.fits[0].centre, self.rates, self.reaches, steps)
+        fitted = self._fitted(None, steps)
         if fitted is None or _meet(fitted[0], self.resolution):
             return False
         self._take(*fitted)
         return True
 
-    def _take(self, fits: list[CombFit], samples: NDArray[np.complex128]) -> None:
+    def _take(self, fits: Sequence[CombFit], samples: NDArray[np.complex128]) -> None:
         """Hold these fits and what they leave."""
         self.fits, self.level = fits, self.data.level_of(samples)
         self.rest = self.data.left(samples, self.level)
 
-    def _fitted(
-        self, centre: float, rates: list[float], reaches: list[int], steps: int
-    ) -> tuple[list[CombFit], NDArray[np.complex128]] | None:
+    def _is_the_comb(self, rate: float) -> bool:
+        """True where a rate is that of the comb found, whose fit is known."""
+        return self.comb.per_turn == 1 and abs(rate - self.nominal) < self.resolution
+
+    def _may_fit(self, reaches: list[int]) -> bool:
+        """True where combs of these outermost orders are not too many lines to be fitted together."""
+        return 2 * sum(reaches) <= MOST_LINES
+
+    def _fitted(self, further: Sought | None, steps: int) -> tuple[Sequence[CombFit], NDArray[np.complex128]] | None:
+        """Fit those found together, with a further one if there is one: as from `fit_combs`."""
         self.level = self.level or self.data.level_of(self.rest.samples)
+        centre = self.centre if further else self.fits[0].centre
+        rates = [*self.rates, further.rate] if further else self.rates
+        reaches = [*self.reaches, further.reach] if further else self.reaches
         outermost = [(-reach, reach) for reach in reaches]
         return fit_combs(self.data, centre, rates, outermost, steps, level_about=self.level)
 
 
-def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
+def separate_rotors(data: Periodogram, comb: Comb, edge: float, how: type[Separation] = Separation) -> Rotors:
     """Separate the rotors of one record.
 
     Parameters
@@ -308,6 +338,8 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
         The comb found in it.
     edge : float
         Edge of the line family [cycles a sample from the body].
+    how : type
+        How they are sought and fitted.
 
     Returns
     -------
@@ -323,7 +355,7 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float) -> Rotors:
     alone = Rotors(np.array([nominal]), np.array([comb.chopping_std]), True, 0.0, [comb.fit], comb.rest, nominal)
     if reach * RATE_SPREAD * nominal * data.pulses < 2:
         return alone
-    found = _Separation(data, comb, centre, reach)
+    found = how(data, comb, centre, reach)
     first, most, rate, last = 0.0, 0.0, nominal, _NO_ROTOR
     while len(found.fits) < MAX_ROTORS:
         sought = found.sought()

@@ -19,6 +19,9 @@ from .lines import TAP, TAPS, kernel, line_products, middle_times, taps
 #: Sequences beyond the time-bandwidth product: what the band leaks past it falls under -100 dB.
 EXTRA_SEQUENCES = 11
 
+#: Of what the sequences of several bands hold together, directions of less than this share count for none.
+LEAST_SHARE = 1e-9
+
 #: Values of a table that are made at a time: what lies between takes little memory, whatever the dwell.
 _AT_ONCE = 1 << 22
 
@@ -106,6 +109,25 @@ def remove_bands(samples: NDArray[np.complex128], bands: Iterable[tuple[float, f
     for amplitudes, basis, turn in zip(seen, bases, turns, strict=True):
         out = out - turn * times(basis.T, amplitudes)
     return np.asarray(out, np.complex128)
+
+
+@lru_cache(maxsize=4)
+def band_basis(pulses: int, bands: tuple[tuple[float, float], ...]) -> NDArray[np.complex128]:
+    """What `remove_bands` takes out of a record, as orthonormal sequences, shape (sequences, pulses)."""
+    rows = [slepian(pulses, float(half)) * _turn(pulses, centre) for centre, half in bands]
+    out = np.concatenate([np.zeros((0, pulses), np.complex128), *rows])
+    if len(rows) > 1:  # without what bands that lie in one another hold both
+        value, vector = np.linalg.eigh(out @ out.conj().T)
+        kept = value > LEAST_SHARE * value[-1]
+        out = (vector[:, kept].conj().T / np.sqrt(value[kept])[:, None]) @ out
+    out.setflags(write=False)
+    return out
+
+
+def without_bands(rows: NDArray[np.complex128], bands: tuple[tuple[float, float], ...]) -> NDArray[np.complex128]:
+    """What `remove_bands` leaves of many records, shape (records, pulses)."""
+    basis = band_basis(rows.shape[1], bands)
+    return np.asarray(rows - (rows @ basis.conj().T) @ basis, np.complex128)
 
 
 @lru_cache(maxsize=4)
@@ -240,4 +262,4 @@ def _gram_inverse(pulses: int, bands: tuple[tuple[float, float], ...]) -> NDArra
             block[odd::2, odd::2] = (bases[one][odd::2] * even) @ own
             block[1 - odd :: 2, odd::2] = (bases[one][1 - odd :: 2] * (uneven if odd == 0 else -uneven)) @ own
         gram[ends[two] : ends[two + 1], ends[one] : ends[one + 1]] = block.T
-    return np.asarray(np.linalg.pinv(gram, rcond=1e-9, hermitian=True), np.float64)
+    return np.asarray(np.linalg.pinv(gram, rcond=LEAST_SHARE, hermitian=True), np.float64)

@@ -30,16 +30,18 @@ def rotors(
     length_m: float = 0.15,
     amplitudes: ArrayLike = (1.0, 1.0),
     strengths: ArrayLike = 1.0,
-    change: float = 0.0,
+    change: ArrayLike = 0.0,
 ) -> np.ndarray:
     """Blades of rotors of random phases, unit power a sample together, equal ones or of some strengths.
 
-    Over the dwell their rates change evenly by a share of themselves; those given are the middle's.
+    Over the dwell their rates change evenly by a share of themselves, all alike or each by its own; those given are the
+    middle's.
     """
     echo = np.zeros(PULSES, complex)
-    for rate_hz, strength in zip(rates_hz, np.broadcast_to(strengths, np.shape(rates_hz)), strict=True):
-        drift_hz_per_s = rate_hz * change * PRF_HZ / PULSES
-        motion = RotorMotion(rate_hz * (1 - change / 2), rng.uniform(0, 2 * np.pi), drift_hz_per_s=drift_hz_per_s)
+    each = (np.broadcast_to(values, np.shape(rates_hz)) for values in (strengths, change))
+    for rate_hz, strength, own_change in zip(rates_hz, *each, strict=True):
+        drift_hz_per_s = rate_hz * own_change * PRF_HZ / PULSES
+        motion = RotorMotion(rate_hz * (1 - own_change / 2), rng.uniform(0, 2 * np.pi), drift_hz_per_s=drift_hz_per_s)
         angle = motion.angle_rad(TIMES_S)
         one = rotor_echo(angle, wavelength_m=WAVELENGTH_M, blade_length_m=length_m, blade_amplitudes=amplitudes)
         echo += strength * one * np.exp(2j * np.pi * rng.uniform())

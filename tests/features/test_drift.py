@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
-from bladewing.features.drift import ahead_left, bend, is_sure, resampled, straightened
+from bladewing.features.drift import ahead_left, straightened
 from bladewing.features.family import find_family
 from bladewing.features.periodogram import prepared
 from bladewing.features.slow_lines import remove_bands
 from bladewing.features.spectrum import doppler_spectrum
+from bladewing.features.turning import bend, is_sure, resampled
 
 from ..benchmarks import records
 
@@ -87,7 +88,7 @@ def test_deviations_of_the_change_are_true(snr_db, change):
 def test_a_steady_rotor_is_left_as_it_is():
     for seed in range(6):
         data, family = family_of(one_rotor(seed, 0.0)[0])
-        assert family.bend == 0.0
+        assert family.change_std == 0.0
         assert family.ahead is not None
         assert not is_sure(*family.ahead)
         assert family.data is data
@@ -139,8 +140,10 @@ def test_a_small_change_that_is_left_comes_with_its_sign_and_size(monkeypatch):
     monkeypatch.setattr("bladewing.features.family.straightened", lambda *_, **__: None)
     for change in (-0.0004, 0.0004):
         data, family = family_of(one_rotor(4, change, snr_db=10.0)[0])
-        assert family.bend == 0.0
-        left, std = (bend(values, records.PULSES) for values in ahead_left(data, family.comb.fit, family.comb.rest))
+        assert family.change_std == 0.0
+        left, std = (
+            bend(values, records.PULSES) for (values,) in ahead_left(data, [family.comb.fit], family.comb.rest)
+        )
         assert left == pytest.approx(change / records.PULSES, abs=max(4 * std, 0.1 * abs(change) / records.PULSES))
         assert abs(left) > 4 * std
 

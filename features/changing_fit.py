@@ -1,0 +1,199 @@
+"""Combs whose rates change within the dwell, each in its own way: fitted to the record as it is, all together.
+
+A line turns with its rotor, whatever way that turns. Inner products of such lines have no closed form: each step forms
+them, for ten times what one of `fit_combs` takes.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .comb_fit import ENOUGH, NOTCH_RIDGE, CombFit, lines_at_one_place, orders_within, over_orders, ridges
+from .lines import middle_times, squared
+from .periodogram import LEAST_LEVEL, Level, Periodogram
+from .slow_lines import band_basis, remove_bands, without_bands
+from .turning import inverse_of, other_rate, polynomials
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where the fit of a comb begins.
+
+    Parameters
+    ----------
+    rate : float
+        Spacing of its lines [cycles a sample].
+    reach : int
+        Outermost order to both sides.
+    ahead : ndarray, shape (degrees,)
+        How far ahead of one that turns evenly it is, by polynomials of `DEGREES` [samples].
+    """
+
+    rate: float
+    reach: int
+    ahead: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ChangingFit(CombFit):
+    """A comb of lines that turn with a rotor whose rate changes.
+
+    Parameters
+    ----------
+    ahead, ahead_std : ndarray of float64, shape (degrees,)
+        How far ahead of one that turns evenly it is, by polynomials of `DEGREES`, and standard deviations [samples];
+        infinite where it was taken to be 0.
+    """
+
+    ahead: NDArray[np.float64]
+    ahead_std: NDArray[np.float64]
+
+
+def turning_lines(
+    body: NDArray[np.float64], rate: float, ahead: NDArray[np.float64], orders: NDArray[np.intp], pulses: int
+) -> NDArray[np.complex64]:
+    """Unit lines that turn with a rotor, shape (lines, pulses); their phases count from the middle of the record.
+
+    Parameters
+    ----------
+    body : ndarray, shape (pulses,)
+        Turns of the body's line.
+    rate : float
+        From order to order [cycles a sample].
+    ahead : ndarray, shape (degrees,)
+        As of `ChangingFit`.
+    orders : ndarray of int, shape (lines,)
+        Orders.
+    pulses : int
+        Pulses of the record.
+    """
+    time = middle_times(pulses)
+    turn = 2 * np.pi * rate * (time + ahead @ polynomials(time, pulses))
+    powers = np.empty((int(np.abs(orders).max()) + 1, pulses), np.complex64)
+    powers[0] = 1
+    powers[1:2] = np.exp(1j * turn)
+    for order in range(2, len(powers)):  # of two halves: errors grow with the logarithm of the order
+        np.multiply(powers[order // 2], powers[order - order // 2], out=powers[order])
+    out = powers[np.abs(orders)]
+    np.conjugate(out, out=out, where=(orders < 0)[:, None])
+    out *= np.exp(2j * np.pi * body).astype(np.complex64)
+    return out
+
+
+def _products(lines: NDArray[np.complex64], basis: NDArray[np.complex64]) -> NDArray[np.complex128]:
+    """Mean products of lines that what a basis spans was taken from; the upper triangle."""
+    from scipy.linalg import blas  # here, because predicting needs no such import
+
+    share = 1 / lines.shape[1]
+    out = blas.cherk(share, lines.T, trans=2)
+    held = lines @ basis.conj().T
+    return np.asarray(blas.cherk(-share, held.T, beta=1.0, c=out, trans=2, overwrite_c=True), np.complex128)
+
+
+def fit_changing(
+    data: Periodogram,
+    starts: Sequence[Start],
+    centre: float,
+    *,
+    degrees: int,
+    steps: int,
+    level_about: Level,
+) -> tuple[list[ChangingFit], NDArray[np.complex128]] | None:
+    """Fit combs whose rates change, by Gauss-Newton steps on how far ahead each is and on the body they are about.
+
+    That may accelerate. As `fit_combs` does it: amplitudes are Gaussian of the power seen about their lines, and
+    eliminated.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    starts : sequence of Start
+        Where each begins.
+    centre : float
+        Start of the centre [cycles a sample].
+    degrees : int
+        The first so many of `DEGREES` are fitted.
+    steps : int
+        Steps at most, >= 1.
+    level_about : callable
+        Local level without what is known of the combs already.
+
+    Returns
+    -------
+    (list of ChangingFit, ndarray of complex128 of shape (pulses,)) or None
+        A fit for each and the samples that they leave. None where a comb has fewer than three usable lines.
+    """
+    from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+    pulses, count = data.pulses, len(starts)
+    time = middle_times(pulses)
+    shapes = polynomials(time, pulses)[:degrees]
+    rates, ahead, pull = np.array([one.rate for one in starts]), np.array([one.ahead for one in starts]), 0.0
+    orders = [orders_within(data, centre, one.rate, (-one.reach, one.reach)) for one in starts]
+    order, comb = np.concatenate(orders), np.repeat(np.arange(count), [len(own) for own in orders])
+    used = data.usable(centre + rates[comb] * order)
+    if min(np.bincount(comb[used], minlength=count)) < 3:
+        return None
+    smooth, basis = over_orders(comb, order), band_basis(pulses, data.bands).astype(np.complex64)
+    least = LEAST_LEVEL if count == 1 else 1.0
+    furthest = 0.5 / np.array([max(1, np.abs(own).max()) for own in orders]) / rates
+    samples, snr, level = data.samples.astype(np.complex64), np.full(len(order), np.inf), level_about
+    for number in range(steps):
+        frequency = np.asarray(centre + rates[comb] * order, np.float64)
+        body = centre * time + pull * shapes[1]
+        lines = np.concatenate(
+            [turning_lines(body, *rotor, pulses) for rotor in zip(rates, ahead, orders, strict=True)]
+        )
+        noise = np.maximum(level(frequency), least)
+        products = _products(lines, basis)
+        seen = (lines @ samples.conj()).conj() / pulses
+        together = lines_at_one_place(frequency, pulses)
+        snr = np.minimum(snr, np.maximum((smooth(squared(seen) * pulses / noise) - 1) / together, 1e-3))
+        held_back = ridges(snr, together)
+        diagonal = products.diagonal().copy()
+        products.flat[:: len(products) + 1] = diagonal + held_back
+        try:
+            factor = cho_factor(products, check_finite=False)
+        except LinAlgError:
+            held_back = held_back + NOTCH_RIDGE
+            products.flat[:: len(products) + 1] = diagonal + held_back
+            factor = cho_factor(products, check_finite=False)
+        amplitudes = cho_solve(factor, seen, check_finite=False)
+        snr = np.maximum(smooth(squared(amplitudes * (1 + held_back)) * pulses / noise) - 1, 1e-3)
+        rest = remove_bands(data.samples - amplitudes.astype(np.complex64) @ lines, data.bands)
+        # what the record gains by another velocity or an acceleration of the body, and by each polynomial of each rotor
+        counted = np.where(used, amplitudes, 0).astype(np.complex64)
+        gained = list(2j * np.pi * (counted @ lines) * shapes[:2])
+        for rotor, rate in enumerate(rates):
+            own = comb == rotor
+            gained += list(2j * np.pi * rate * ((counted * order)[own].astype(np.complex64) @ lines[own]) * shapes)
+        columns = without_bands(np.array(gained), data.bands)
+        leaked = (lines @ columns.conj().T).conj() / pulses
+        mean_noise = float(np.average(noise, weights=squared(counted * order) + 1e-30))
+        kept = leaked.conj().T @ cho_solve(factor, leaked, check_finite=False)
+        fisher = 2 / mean_noise * (columns.conj() @ columns.T - pulses * kept).real
+        covariance = inverse_of(fisher)
+        step = covariance @ (2 / mean_noise * (columns.conj() @ rest).real)
+        std = np.sqrt(covariance.diagonal())
+        steps_ahead, own_std = (values[2:].reshape(count, degrees) for values in (step, std))
+        centre += float(np.clip(2 * step[0] / pulses, -0.5 / pulses, 0.5 / pulses))
+        pull += float(np.clip(step[1], -0.5, 0.5))
+        ahead[:, :degrees] += np.clip(steps_ahead, -furthest[:, None], furthest[:, None])
+        # its first polynomial is another rate
+        faster = 1 + np.array([other_rate(first, pulses) for first in ahead[:, 0]])
+        rates, ahead = rates * faster, ahead / faster[:, None]
+        ahead[:, 0] = 0
+        if number and np.all(np.abs(step) < ENOUGH * std):
+            break
+        level = data.level_of(rest)
+    out = []
+    for rotor, rate in enumerate(rates):
+        own = (comb == rotor) & used
+        known = (float(rate), centre, other_rate(own_std[rotor, 0], pulses) * rate, 2 * float(std[0]) / pulses)
+        ahead_std = np.full(ahead.shape[1], np.inf)
+        ahead_std[:degrees] = own_std[rotor]
+        out.append(ChangingFit(*known, order[own], amplitudes[own], snr[own], ahead[rotor], ahead_std))
+    return out, rest

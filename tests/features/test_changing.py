@@ -1,0 +1,172 @@
+"""Rotors that each change in their own way: told apart, with true deviations; steady ones and near ones as before."""
+
+from dataclasses import replace
+
+import bladewing.features.changing as changing
+import numpy as np
+import pytest
+from bladewing.features import measure
+from bladewing.features.changing_fit import ChangingFit, Start, fit_changing, turning_lines
+from bladewing.features.comb_fit import lines_at_one_place
+from bladewing.features.drift import ahead_left
+from bladewing.features.family import find_family
+from bladewing.features.periodogram import prepared
+from bladewing.features.slow_lines import remove_bands, without_bands
+from bladewing.features.spectrum import doppler_spectrum
+from bladewing.features.turning import DEGREES, even_change, is_sure, polynomials
+
+from ..benchmarks import records
+from .signals import white
+
+PULSES = records.PULSES
+TIME = np.arange(PULSES) - (PULSES - 1) / 2
+
+
+def several(
+    seed: int, count: int, change: float, *, snr_db: float, least_hz: float = 0.35, high_hz: float = 58.3
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A record of rotors, their chopping frequencies, and by how much each changes over the dwell."""
+    rng = np.random.default_rng(seed)
+    rates_hz = records.apart(rng, count, least_hz, 56.5, high_hz)
+    changes = rng.uniform(0.3, 1.0, count) * change * rng.choice([-1, 1], count)
+    options = {"snr_db": snr_db, "body_db": 20, "velocity_mps": rng.uniform(-25, 25)}
+    return records.record(rng, rates_hz, change=changes, **options), 2 * rates_hz, changes
+
+
+def family_of(iq: np.ndarray):
+    """The record made ready, and its line family."""
+    spectrum = doppler_spectrum(iq, **records.RADAR)
+    data = prepared(iq, spectrum)
+    return data, find_family(data, spectrum)[0]
+
+
+def test_lines_that_turn_with_a_rotor_are_the_closed_form():
+    rng = np.random.default_rng(2)
+    ahead, orders, rate, body = (
+        rng.normal(0, 2, len(DEGREES)),
+        np.arange(-70, 71),
+        1 / 300,
+        0.07 * TIME + 1e-6 * TIME**2,
+    )
+    turned = rate * (TIME + ahead @ polynomials(TIME, PULSES))
+    exact = np.exp(2j * np.pi * (orders[:, None] * turned + body))
+    np.testing.assert_allclose(turning_lines(body, rate, ahead, orders, PULSES), exact, atol=3e-5)
+
+
+@pytest.mark.parametrize("bands", [(), ((0.05, 4.0),), ((0.0, 9.5), (0.004, 3.0), (-0.2, 4.0))])
+def test_bands_leave_many_records_as_they_leave_one(bands):
+    rows = white(np.random.default_rng(3), 4, PULSES)
+    one_by_one = np.stack([remove_bands(row, bands) for row in rows])
+    np.testing.assert_allclose(without_bands(rows, bands), one_by_one, atol=1e-6)
+
+
+def test_combs_are_fitted_whatever_way_each_changes():
+    """Lines of chance that turn with two rotors a tenth of a bin apart at the first order, about a body that pulls."""
+    rng = np.random.default_rng(4)
+    orders = np.arange(-30, 31)
+    rates_hz, centre = np.array([114.0, 115.2]), 0.031
+    truth = np.zeros((2, len(DEGREES)))
+    truth[:, 1:4] = [[1.7, -0.4, 0.1], [-2.2, 0.3, 0.2]]
+    samples, body = 1e-2 * white(rng, PULSES), centre * TIME + 0.15 * polynomials(TIME, PULSES)[1]
+    for rate_hz, ahead in zip(rates_hz, truth, strict=True):
+        own = white(rng, len(orders))
+        samples = samples + own @ turning_lines(body, rate_hz / records.PRF_HZ, ahead, orders, PULSES)
+    data, _ = family_of(white(rng, PULSES).astype(np.complex64))
+    data = replace(data, samples=samples * 100, bands=())
+    starts = [
+        Start((rate_hz + 0.05) / records.PRF_HZ, 30, even_change(change, PULSES))
+        for rate_hz, change in zip(rates_hz, (0.005, -0.01), strict=True)
+    ]
+    found = fit_changing(
+        data, starts, centre + 1e-6, degrees=len(DEGREES), steps=12, level_about=lambda f: np.ones(np.shape(f))
+    )
+    fits, rest = found
+    for fit, rate_hz, ahead in zip(fits, rates_hz, truth, strict=True):
+        assert fit.spacing * records.PRF_HZ == pytest.approx(rate_hz, abs=2e-4)
+        np.testing.assert_allclose(fit.ahead, ahead, atol=0.01)
+    assert fits[0].centre == pytest.approx(centre, abs=1e-7)
+    assert np.mean(np.abs(rest) ** 2) == pytest.approx(1.0, abs=0.15)
+
+
+@pytest.mark.parametrize(("count", "change"), [(2, 0.003), (2, 0.015), (4, 0.003), (4, 0.01)])
+def test_rotors_that_each_change_are_told_apart(count, change):
+    """Fitted as steady ones none of these was: strong lines show that they are not straight."""
+    told = 0
+    for seed in range(5):
+        iq, chopping_hz, _ = several(seed, count, change, snr_db=20.0)
+        found = measure(iq, **records.RADAR)
+        if found.rotors_resolved and found.rotor_count == count:
+            told += 1
+            np.testing.assert_allclose(found.rotor_rates_hz[:count], chopping_hz, rtol=5e-4)
+            assert np.isnan(found.chopping_drift_hz_per_s)
+    assert told >= 4
+
+
+def test_their_deviations_are_true_and_so_are_their_changes():
+    off, changed = [], []
+    for seed in range(40):
+        iq, chopping_hz, changes = several(seed, 2, 0.01, snr_db=12.0)
+        _, family = family_of(iq)
+        fits = family.rotors.fits
+        if len(fits) == 2 and isinstance(fits[0], ChangingFit):
+            off += list((family.rotors.rates * records.PRF_HZ - chopping_hz) / (family.rotors.stds * records.PRF_HZ))
+            changed += [fit.ahead[1] * 12 / PULSES - change for fit, change in zip(fits, changes, strict=True)]
+    assert len(off) >= 60
+    # the variance of so many normal errors is off by a root of 2 in so many
+    assert np.mean(np.square(off)) == pytest.approx(1.0, abs=4 * np.sqrt(2 / len(off)))
+    assert np.abs(changed).max() < 1e-3
+
+
+@pytest.mark.parametrize(("count", "snr_db"), [(2, 0.0), (4, 20.0), (6, 10.0)])
+def test_steady_rotors_are_not_taken_to_change(count, snr_db):
+    for seed in range(4):
+        iq, _, _ = several(seed, count, 0.0, snr_db=snr_db, high_hz=59.4)
+        data, family = family_of(iq)
+        assert len(family.rotors.rates) == count
+        assert not any(isinstance(fit, ChangingFit) for fit in family.rotors.fits)
+        assert not any(map(is_sure, *ahead_left(data, family.rotors.fits, family.rotors.rest)))
+
+
+def test_rotors_told_apart_as_steady_ones_are_fitted_anew_where_they_change():
+    """At 5 dB a change of 0.5 % leaves them apart, and the rates off by several of their deviations."""
+    plain, anew = [], 0
+    for seed in range(8):
+        iq, chopping_hz, _ = several(seed, 3, 0.006, snr_db=5.0, least_hz=0.5)
+        _, family = family_of(iq)
+        if family.rotors.resolved and len(family.rotors.rates) == 3:
+            plain += list((family.rotors.rates * records.PRF_HZ - chopping_hz) / (family.rotors.stds * records.PRF_HZ))
+            anew += isinstance(family.rotors.fits[0], ChangingFit)
+    assert anew >= 5
+    assert np.mean(np.square(plain)) < 2.5
+
+
+def test_rotors_nearer_than_the_dwell_tells_apart_are_not_told_apart_if_they_change():
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        rates_hz = rng.uniform(56, 58) + np.array([0.0, 0.06])
+        iq = records.record(rng, rates_hz, snr_db=20, body_db=20, velocity_mps=3.0, change=[0.004, -0.002])
+        found = measure(iq, **records.RADAR)
+        assert not (found.rotors_resolved and found.rotor_count > 1)
+
+
+def test_too_many_samples_are_not_fitted(monkeypatch):
+    iq, _, _ = several(1, 2, 0.01, snr_db=20.0)
+    assert measure(iq, **records.RADAR).rotors_resolved
+    monkeypatch.setattr(changing, "MOST_SAMPLES", 60 * PULSES)
+    assert not measure(iq, **records.RADAR).rotors_resolved
+
+
+def test_strong_rotors_near_one_another_are_not_lines_that_cancel():
+    """Their inner lines, let go, came out ten times too large: a second flash, by which they were unresolved."""
+    right, largest = 0, []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        rates_hz = rng.uniform(45, 60) + 0.3 * np.arange(4) + rng.uniform(-0.07, 0.07, 4)
+        data, family = family_of(records.record(rng, rates_hz, snr_db=20, body_db=20, velocity_mps=5.0))
+        right += family.rotors.resolved and len(family.rotors.rates) == 4
+        if len(family.rotors.rates) == 4:
+            together = [lines_at_one_place(fit.frequencies, data.pulses).max() for fit in family.rotors.fits]
+            assert max(together) == 1  # of one comb
+            largest += [np.abs(fit.amplitudes).max() / np.median(np.abs(fit.amplitudes)) for fit in family.rotors.fits]
+    assert right >= 7
+    assert np.median(largest) < 5
