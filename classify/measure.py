@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
-from bladewing.features.measure import BODY, Measurements, beyond_radars, measure
+from bladewing.features.measure import BODY, EACH_ROTOR, Measurements, beyond_radars, measure
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 from bladewing.features.steady_comb import OVER_BODY
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
@@ -148,8 +148,7 @@ class Measured:
                 **{name: _number(getattr(self.values, name)[n], whole=name in WHOLE) for name in VALUES},
                 "acceleration_mps2": _number(self.acceleration_mps2[n]),
                 "acceleration_mps2_std": _number(self.acceleration_mps2_std[n]),
-                "rotor_rates_hz": self.values.rotor_rates_hz[n][seen].tolist(),
-                "rotor_rates_hz_std": self.values.rotor_rates_hz_std[n][seen].tolist(),
+                **{name: [_number(value) for value in getattr(self.values, name)[n][seen]] for name in EACH_ROTOR},
                 "rotors_resolved": bool(self.values.rotors_resolved[n]),
                 "length_is_lower_bound": self.values.length_is_lower_bound,
                 "alternatives": [

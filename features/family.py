@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .changing import ChangingSeparation
+from .changing_fit import ChangingFit
 from .comb import LEAST_REACH_MPS, Comb, find_comb
 from .drift import Straightened, ahead_left, straightened
 from .family_edge import edge_of_lines, span_of
@@ -43,8 +44,8 @@ class Family:
     gear_reason : str
         Why there is no second comb; empty where there is one.
     ahead : (ndarray, ndarray) or None
-        How far ahead of an even rotor a single one is, by the polynomials of `DEGREES`, and standard deviations
-        [samples]; None where there are several.
+        How far ahead of an even rotor each is, by the polynomials of `DEGREES`, and standard deviations, shape
+        (rotors, degrees) [samples]; None where they are not told apart.
     change_std : float
         Relative standard deviation that this adds to the rates.
     """
@@ -66,12 +67,11 @@ class Family:
         return self.gear is not None or self.rotors.resolved
 
     @property
-    def drift(self) -> tuple[float, float] | None:
-        """Even relative change of a single rotor's rate and its standard deviation [1 / sample]; None for several."""
+    def drifts(self) -> NDArray[np.float64]:
+        """Even relative change of each rotor's rate, and standard deviations, shape (2, rotors) [1 / sample]."""
         if self.ahead is None:
-            return None
-        change, std = (bend(values, self.data.pulses) for values in self.ahead)
-        return change, std
+            return np.full((2, len(self.rotors.rates)), np.nan)
+        return np.array([[bend(own, self.data.pulses) for own in values] for values in self.ahead])
 
     def with_change(self, std: NDArray[np.float64] | float, rate: NDArray[np.float64] | float) -> NDArray[np.float64]:
         """Standard deviations of rates, with what the change that was taken out adds, in the unit of both."""
@@ -125,7 +125,7 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
         return _changing(data, family, edge), ""
     # several that are told apart are believed, but for a single one that changed
     if family.is_told_apart and len(other.rotors.rates) > 1:
-        return family, ""
+        return _changing(data, family, edge), ""
     return other, ""
 
 
@@ -134,13 +134,16 @@ def _changing(data: Periodogram, family: Family, edge: float) -> Family:
     known = family.rotors
     if family.gear is not None or (known.resolved and len(known.rates) == 1):
         return family
-    if known.resolved and not any(map(is_sure, *ahead_left(data, known.fits, known.rest))):
+    if known.resolved:
+        left = ahead_left(data, known.fits, known.rest)
+        if not is_sure(*left):
+            return replace(family, ahead=left)
+    rotors = judged(separate_rotors(data, family.comb, edge, ChangingSeparation), data, family.comb, edge)
+    fits = [fit for fit in rotors.fits if isinstance(fit, ChangingFit)]
+    if not rotors.resolved or len(fits) < 2 or (known.resolved and len(fits) != len(known.rates)):
         return family
-    apart = separate_rotors(data, family.comb, edge, ChangingSeparation)
-    rotors = judged(apart, data, family.comb, edge)
-    if not rotors.resolved or len(rotors.rates) < 2 or (known.resolved and len(rotors.rates) != len(known.rates)):
-        return family
-    return replace(family, rotors=rotors)
+    ahead = np.array([fit.ahead for fit in fits]), np.array([fit.ahead_std for fit in fits])
+    return replace(family, rotors=rotors, ahead=ahead)
 
 
 def _faster(comb: Comb, rotors: Rotors, factor: float) -> tuple[Comb, Rotors]:
@@ -165,13 +168,13 @@ def _as_it_is(data: Periodogram, blades: int | None, even: Straightened | None =
     single = len(rotors.rates) == 1 and (gear is not None or rotors.resolved)
     ahead, change_std = None, 0.0
     if single and even is not None:  # the mean rate is told from how it changes
-        ahead, fit = (even.fit.ahead, even.fit.ahead_std), even.fit
+        fit = even.fit
+        ahead = fit.ahead[None], fit.ahead_std[None]
         all_in, alone = fit.spacing_std / fit.spacing, comb.chopping_std / comb.chopping
         change_std = float(np.sqrt(max(all_in**2 - alone**2, 0.0)))
         if gear is None:
             lines = comb.chopping / fit.spacing
             comb, rotors = _faster(comb, rotors, max(round(lines), 1) / lines)
     elif single:
-        (left,), (std_left,) = ahead_left(data, [comb.fit], comb.rest)
-        ahead = left, std_left
+        ahead = ahead_left(data, [comb.fit], comb.rest)
     return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead, change_std), ""

@@ -41,6 +41,9 @@ WIDEST_INDEX = 0.04
 #: The fields of the body's velocity and its deviation.
 BODY = ("body_velocity_mps", "body_velocity_mps_std")
 
+#: The fields that have a value for each rotor.
+EACH_ROTOR = ("rotor_rates_hz", "rotor_rates_hz_std", "rotor_drifts_hz_per_s", "rotor_drifts_hz_per_s_std")
+
 #: Blade counts listed where none is given.
 BLADE_CHOICES = (1, 2, 3, 4, 5)
 
@@ -57,19 +60,21 @@ class Measurements:
         Chopping frequency, blades x rotation rate [Hz]; of several rotors, that of their mean rate. Where the rate
         changes within the dwell, that of the even turn that comes nearest.
     chopping_drift_hz_per_s, chopping_drift_hz_per_s_std : ndarray
-        Its even change within the dwell [Hz/s], of one rotor or a helicopter; NaN for several. Neither velocity nor an
-        even acceleration of the body passes for it.
+        Its even change within the dwell [Hz/s]; of several rotors that of their mean, NaN where they are not resolved.
+        Neither velocity nor an even acceleration of the body passes for it.
     comb_order : ndarray
         Outermost order of chopping lines that speaks for the comb [1].
     comb_snr_db : ndarray
         Power of the comb's lines over the noise, a sample [dB].
     rotor_rates_hz, rotor_rates_hz_std : ndarray, shape (..., MAX_ROTORS)
         Chopping frequency of each single rotor, rising [Hz], padded with NaN.
+    rotor_drifts_hz_per_s, rotor_drifts_hz_per_s_std : ndarray, shape (..., MAX_ROTORS)
+        Even change of each within the dwell [Hz/s], padded in the same way; NaN where they are not resolved.
     rotor_count : ndarray
         Rotors told apart; NaN without a comb.
     rotors_resolved : ndarray of bool
-        False where rates lie nearer than the dwell tells apart, or several changed within it, or one jerkily: of steady
-        ones the count is then a lower bound.
+        False where rates lie nearer than the dwell tells apart, or changed jerkily within it: of steady ones the count
+        is then a lower bound.
     rotor_spread_hz : ndarray
         Range of the rotors' chopping frequencies [Hz], also where they are not resolved; 0 where there is one rate.
     smearing_index : ndarray
@@ -113,6 +118,8 @@ class Measurements:
     comb_snr_db: NDArray[np.float64]
     rotor_rates_hz: NDArray[np.float64]
     rotor_rates_hz_std: NDArray[np.float64]
+    rotor_drifts_hz_per_s: NDArray[np.float64]
+    rotor_drifts_hz_per_s_std: NDArray[np.float64]
     rotor_count: NDArray[np.float64]
     rotors_resolved: NDArray[np.bool_]
     rotor_spread_hz: NDArray[np.float64]
@@ -198,9 +205,9 @@ def measure(
     Returns
     -------
     Measurements
-        Standard deviations hold for the model: rates that are steady within the dwell, or a single one that changes
-        smoothly, white noise about each line. A body that accelerates smears all lines; `bladewing measure` takes that
-        out first (`body_acceleration`, `without_acceleration`).
+        Standard deviations hold for the model: rates that are steady within the dwell or change smoothly, white noise
+        about each line. A body that accelerates smears all lines; `bladewing measure` takes that out first
+        (`body_acceleration`, `without_acceleration`).
 
     Raises
     ------
@@ -229,7 +236,7 @@ def measure(
     for field in fields(Measurements):
         if field.name != "length_is_lower_bound":
             values = np.array([row[field.name] for row in rows])[: math.prod(shape)]
-            extra = (MAX_ROTORS,) if field.name.startswith("rotor_rates") else ()
+            extra = (MAX_ROTORS,) if field.name in EACH_ROTOR else ()
             columns[field.name] = values.reshape((*shape, *extra))
     return Measurements(**columns, length_is_lower_bound=beta_rad is None)
 
@@ -247,7 +254,7 @@ def _record(spectrum: Spectrum, index: tuple[int, ...]) -> Spectrum:
 def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | None, beta_rad: float | None) -> dict:
     """The numbers of one record, by the names of `Measurements`."""
     out: dict = {field.name: np.nan for field in fields(Measurements)}
-    out["rotor_rates_hz"] = out["rotor_rates_hz_std"] = np.full(MAX_ROTORS, np.nan)
+    out |= dict.fromkeys(EACH_ROTOR, np.full(MAX_ROTORS, np.nan))
     out["rotors_resolved"] = False
     out["gear_reason"], out["band_reason"] = "no comb", ""
     if 0 < largest_part(iq) < LEAST_PART:
@@ -289,9 +296,9 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     else:
         velocity = body_velocity(data, spectrum, middle, steady=rotors.resolved, open_std=comb.body_std)
     out |= dict(zip(BODY, velocity, strict=True))
-    if family.drift is not None:
-        drift, drift_std = (value * comb.chopping * prf_hz**2 for value in family.drift)
-        out["chopping_drift_hz_per_s"], out["chopping_drift_hz_per_s_std"] = drift, drift_std
+    drifts, drift_stds = family.drifts * (rotors.rates if count > 1 else comb.chopping) * prf_hz**2
+    out["chopping_drift_hz_per_s"] = float(drifts.mean())
+    out["chopping_drift_hz_per_s_std"] = float(np.sqrt((drift_stds**2).sum())) / count
     if count > 1:
         # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
         out["chopping_hz"] = float(rotors.rates.mean()) * prf_hz
@@ -306,10 +313,9 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     if slow := slower_than_rotors(data, edge, edge_std):
         return without_rotor(slow)
     stds = family.with_change(rotors.stds, rotors.rates)
-    for name, values in (("rotor_rates_hz", rotors.rates), ("rotor_rates_hz_std", stds)):
-        padded = np.full(MAX_ROTORS, np.nan)
-        padded[:count] = values * prf_hz
-        out[name] = padded
+    each = (rotors.rates * prf_hz, stds * prf_hz, drifts, drift_stds)
+    for name, values in zip(EACH_ROTOR, each, strict=True):
+        out[name] = np.pad(values, (0, MAX_ROTORS - count), constant_values=np.nan)
     out["rotor_count"], out["rotors_resolved"] = float(count), rotors.resolved
     out["rotor_spread_hz"] = rotors.spread * prf_hz
     # unequal blades tell their number; between the lines of several rotors the weak ones may be something else

@@ -99,8 +99,8 @@ def resampled(samples: NDArray[np.complex128], centre: float, late: NDArray[np.f
 
 
 def is_sure(ahead: NDArray[np.float64], std: NDArray[np.float64], deviations: float = SURE_DEVIATIONS) -> bool:
-    """True where a rate changes evenly for sure, by polynomials of `DEGREES` and their deviations [samples]."""
-    return bool(abs(ahead[1]) > deviations * std[1])
+    """True where the rate of any rotor changes evenly for sure, by polynomials of `DEGREES` and their deviations."""
+    return bool(np.any(np.abs(ahead[..., 1]) > deviations * std[..., 1]))
 
 
 def inverse_of(information: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,12 +8,11 @@ import pytest
 from bladewing.features import measure
 from bladewing.features.changing_fit import ChangingFit, Start, fit_changing, turning_lines
 from bladewing.features.comb_fit import lines_at_one_place
-from bladewing.features.drift import ahead_left
 from bladewing.features.family import find_family
 from bladewing.features.periodogram import prepared
 from bladewing.features.slow_lines import remove_bands, without_bands
 from bladewing.features.spectrum import doppler_spectrum
-from bladewing.features.turning import DEGREES, even_change, is_sure, polynomials
+from bladewing.features.turning import DEGREES, even_change, polynomials
 
 from ..benchmarks import records
 from .signals import white
@@ -93,38 +92,46 @@ def test_rotors_that_each_change_are_told_apart(count, change):
     """Fitted as steady ones none of these was: strong lines show that they are not straight."""
     told = 0
     for seed in range(5):
-        iq, chopping_hz, _ = several(seed, count, change, snr_db=20.0)
+        iq, chopping_hz, changes = several(seed, count, change, snr_db=20.0)
         found = measure(iq, **records.RADAR)
         if found.rotors_resolved and found.rotor_count == count:
             told += 1
             np.testing.assert_allclose(found.rotor_rates_hz[:count], chopping_hz, rtol=5e-4)
-            assert np.isnan(found.chopping_drift_hz_per_s)
+            drifts, stds = found.rotor_drifts_hz_per_s[:count], found.rotor_drifts_hz_per_s_std[:count]
+            exact = chopping_hz * changes * records.PRF_HZ / PULSES
+            assert np.all(np.abs(drifts - exact) < 6 * stds)
+            assert stds.max() < 0.1 * np.abs(exact).max()
+            assert np.isnan(found.rotor_drifts_hz_per_s[count:]).all()
+            assert found.chopping_drift_hz_per_s == pytest.approx(drifts.mean())
     assert told >= 4
 
 
-def test_their_deviations_are_true_and_so_are_their_changes():
-    off, changed = [], []
+def test_deviations_of_their_rates_and_changes_are_true():
+    off, drift_off = [], []
     for seed in range(40):
         iq, chopping_hz, changes = several(seed, 2, 0.01, snr_db=12.0)
         _, family = family_of(iq)
         fits = family.rotors.fits
         if len(fits) == 2 and isinstance(fits[0], ChangingFit):
             off += list((family.rotors.rates * records.PRF_HZ - chopping_hz) / (family.rotors.stds * records.PRF_HZ))
-            changed += [fit.ahead[1] * 12 / PULSES - change for fit, change in zip(fits, changes, strict=True)]
+            drifts, stds = family.drifts * PULSES
+            drift_off += list((drifts - changes) / stds)
     assert len(off) >= 60
-    # the variance of so many normal errors is off by a root of 2 in so many
-    assert np.mean(np.square(off)) == pytest.approx(1.0, abs=4 * np.sqrt(2 / len(off)))
-    assert np.abs(changed).max() < 1e-3
+    # the mean square of so many normal errors is off by a root of 2 in so many
+    for errors in (off, drift_off):
+        assert np.mean(np.square(errors)) == pytest.approx(1.0, abs=4 * np.sqrt(2 / len(errors)))
 
 
 @pytest.mark.parametrize(("count", "snr_db"), [(2, 0.0), (4, 20.0), (6, 10.0)])
 def test_steady_rotors_are_not_taken_to_change(count, snr_db):
     for seed in range(4):
         iq, _, _ = several(seed, count, 0.0, snr_db=snr_db, high_hz=59.4)
-        data, family = family_of(iq)
+        _, family = family_of(iq)
         assert len(family.rotors.rates) == count
         assert not any(isinstance(fit, ChangingFit) for fit in family.rotors.fits)
-        assert not any(map(is_sure, *ahead_left(data, family.rotors.fits, family.rotors.rest)))
+        drifts, stds = family.drifts
+        assert drifts.shape == (count,)
+        assert np.all(np.abs(drifts) < 5 * stds)
 
 
 def test_rotors_told_apart_as_steady_ones_are_fitted_anew_where_they_change():

@@ -127,13 +127,18 @@ def test_several_steady_rotors_are_not_taken_for_one_that_changes(count, apart_h
         assert found.rotors_resolved == plain.rotors_resolved
 
 
-def test_several_rotors_have_no_common_drift():
+def test_the_drift_of_several_steady_rotors_is_none_and_of_rotors_not_told_apart_unknown():
     rng = np.random.default_rng(2)
     iq = records.record(rng, np.array([56.6, 57.2, 57.7, 58.3]), snr_db=10, body_db=20, velocity_mps=7.0)
     found = measure(iq, **records.RADAR)
     assert found.rotor_count == 4
-    assert np.isnan(found.chopping_drift_hz_per_s)
-    assert np.isnan(found.chopping_drift_hz_per_s_std)
+    assert abs(found.chopping_drift_hz_per_s) < 4 * found.chopping_drift_hz_per_s_std
+    assert found.chopping_drift_hz_per_s_std < 1.0
+    iq = records.record(rng, np.array([56.6, 56.65]), snr_db=20, body_db=20, velocity_mps=7.0)
+    found = measure(iq, **records.RADAR)
+    assert not found.rotors_resolved
+    assert np.isnan([found.chopping_drift_hz_per_s, found.chopping_drift_hz_per_s_std]).all()
+    assert np.isnan(found.rotor_drifts_hz_per_s).all()
 
 
 def test_a_small_change_that_is_left_comes_with_its_sign_and_size(monkeypatch):
