@@ -4,13 +4,14 @@ What `drift` does for one rotor, to read the record at the times at which it tur
 alone. So each is sought among rates and changes at once, and all are fitted to the record as it is.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .changing_fit import ChangingFit, Start, fit_changing
+from .changing_fit import ChangingFit, Start, fit_changing, most_lines
+from .comb import Comb
 from .comb_fit import CombFit
 from .periodogram import Periodogram
 from .rotors import Separation, Sought
@@ -18,28 +19,48 @@ from .slow_lines import remove_bands
 from .turning import DEGREES, FIRST_DEGREES, even_change, late_by, margin_of, resampled
 
 #: Rotors are sought that change by up to this over the dwell, relative, in steps that put the outermost lines at its
-#: ends out by half of so many radians; so many steps to each side at most.
-FURTHEST_CHANGE, STEP_RAD, MOST_STEPS = 0.03, 1.6, 12
+#: ends out by half of so many radians; so many steps to each side at most, and none where these come to too little.
+FURTHEST_CHANGE, STEP_RAD, MOST_STEPS, LEAST_CHANGE = 0.03, 1.6, 12, 0.01
 
 #: Gauss-Newton steps at most as a rotor comes in, of even changes alone, and once all are found.
-ADDING_STEPS, LAST_STEPS = 3, 8
+COMING_STEPS, ALL_STEPS = 3, 8
 
-#: Samples of all lines together, at most: memory grows with them, and time with their product with the lines.
-MOST_SAMPLES = 6_000_000
+#: Lines are looked for so many times further than those of steady rotors: smeared ones hide how far they reach.
+FURTHER = 1.5
+
+
+def may_be_sought(data: Periodogram, nominal: float, reach: int) -> bool:
+    """True where changing rotors about a rate [cycles a sample] and of that reach are not too much to seek and fit."""
+    return 4 * reach <= most_lines(data.pulses) and MOST_STEPS * _step(data, nominal, reach) > LEAST_CHANGE
+
+
+def _step(data: Periodogram, nominal: float, reach: int) -> float:
+    """From change to change, over the dwell, relative: an even one puts the ends out by an eighth of its turns."""
+    return STEP_RAD * 8 / (2 * np.pi * nominal * reach * data.pulses)
 
 
 class ChangingSeparation(Separation):
-    """Rotors found so far, each of a rate that changes."""
+    """Rotors found so far, each of a rate that changes.
 
-    _read: dict[float, Periodogram] | None = None
+    All are like the comb found: what the fit of another leaves may be one of a far rate and some change as well.
+    """
+
+    def __init__(self, data: Periodogram, comb: Comb, centre: float, reach: int) -> None:
+        super().__init__(data, comb, centre, reach)
+        self.seeks_apart = False
+        self.furthest = min(FURTHER * self.furthest, 0.5)
+        self._read: dict[float, Periodogram] = {}  # what is left, by the change at which it was read
+
+    def in_turn(self, sought: list[Sought]) -> Iterator[Sought]:
+        """These."""
+        return iter(sought)
 
     def _strongest(self, rates: NDArray[np.float64], *, is_apart: bool = False) -> Sought:
         return max((self._by(change, rates, is_apart=is_apart) for change in self._changes()), key=lambda s: s.evidence)
 
     def _changes(self) -> NDArray[np.float64]:
         """Changes over the dwell that are tried, relative."""
-        turns = self.nominal * self.reach * self.data.pulses  # an even change puts the ends out by an eighth of it
-        step = STEP_RAD * 8 / (2 * np.pi * turns)
+        step = _step(self.data, self.nominal, self.reach)
         count = min(int(FURTHEST_CHANGE / step), MOST_STEPS)
         return np.asarray(step * np.arange(-count, count + 1), np.float64)
 
@@ -49,8 +70,6 @@ class ChangingSeparation(Separation):
         return replace(self._loudest_in(held, rates, is_apart=is_apart), change=float(change))
 
     def _read_at(self, change: float) -> Periodogram:
-        if self._read is None:
-            self._read = {}
         if change not in self._read:
             pulses, margin = self.data.pulses, margin_of(self.data.pulses)
             late = late_by(even_change(change, pulses), pulses)
@@ -60,17 +79,27 @@ class ChangingSeparation(Separation):
 
     def _take(self, fits: Sequence[CombFit], samples: NDArray[np.complex128]) -> None:
         super()._take(fits, samples)
-        self._read = None
+        outermost = max(reach * fit.spacing for reach, fit in zip(self.reaches, fits, strict=True))
+        self.furthest = min(max(self.furthest, FURTHER * outermost), 0.5)
+        self._read = {}
 
     def _is_the_comb(self, rate: float) -> bool:
         return False  # that was fitted as if it did not change
 
     def _may_fit(self, reaches: list[int]) -> bool:
-        return super()._may_fit(reaches) and 2 * sum(reaches) * self.data.pulses <= MOST_SAMPLES
+        return 2 * sum(reaches) <= most_lines(self.data.pulses)
+
+    def _further(self) -> list[int]:
+        """Outermost orders with some more, if those may be fitted: weak ones are held back."""
+        more = [
+            min(int(FURTHER * reach), int(0.45 / rate)) for reach, rate in zip(self.reaches, self.rates, strict=True)
+        ]
+        return more if self._may_fit(more) else self.reaches
 
     def _fitted(
         self, further: Sought | None, steps: int
     ) -> tuple[Sequence[ChangingFit], NDArray[np.complex128]] | None:
+        """As of `Separation`, but of its own numbers of steps."""
         self.level = self.level or self.data.level_of(self.rest.samples)
         starts = [
             Start(fit.spacing, reach, fit.ahead)
@@ -78,8 +107,9 @@ class ChangingSeparation(Separation):
             if isinstance(fit, ChangingFit)
         ]
         if further is None:
-            centre, degrees, most = self.fits[0].centre, len(DEGREES), LAST_STEPS
+            starts = [replace(one, reach=reach) for one, reach in zip(starts, self._further(), strict=True)]
+            centre, degrees, most = self.fits[0].centre, len(DEGREES), ALL_STEPS
         else:
             starts.append(Start(further.rate, further.reach, even_change(further.change, self.data.pulses)))
-            centre, degrees, most = self.centre, FIRST_DEGREES, ADDING_STEPS
+            centre, degrees, most = self.centre, FIRST_DEGREES, COMING_STEPS
         return fit_changing(self.data, starts, centre, degrees=degrees, steps=most, level_about=self.level)

@@ -16,6 +16,14 @@ from .periodogram import LEAST_LEVEL, Level, Periodogram
 from .slow_lines import band_basis, remove_bands, without_bands
 from .turning import inverse_of, other_rate, polynomials
 
+#: A step's products of lines take lines^2 x pulses multiplications, no more than these.
+MOST_PRODUCTS = 3_000_000_000
+
+
+def most_lines(pulses: int) -> int:
+    """How many lines are fitted together at most."""
+    return int(np.sqrt(MOST_PRODUCTS / pulses))
+
 
 @dataclass(frozen=True)
 class Start:
@@ -88,8 +96,26 @@ def _products(lines: NDArray[np.complex64], basis: NDArray[np.complex64]) -> NDA
 
     share = 1 / lines.shape[1]
     out = blas.cherk(share, lines.T, trans=2)
+    if not len(basis):
+        return np.asarray(out, np.complex128)
     held = lines @ basis.conj().T
     return np.asarray(blas.cherk(-share, held.T, beta=1.0, c=out, trans=2, overwrite_c=True), np.complex128)
+
+
+def _factored(
+    products: NDArray[np.complex128], held_back: NDArray[np.float64]
+) -> tuple[tuple[NDArray[np.complex128], bool], NDArray[np.float64]] | None:
+    """Cholesky factor of products with what holds amplitudes back added, and that, larger where it had to be."""
+    from scipy.linalg import LinAlgError, cho_factor
+
+    diagonal = products.diagonal().copy()
+    for more in (0.0, NOTCH_RIDGE):
+        products.flat[:: len(products) + 1] = diagonal + held_back + more
+        try:
+            return cho_factor(products, check_finite=False), held_back + more
+        except LinAlgError:
+            continue
+    return None
 
 
 def fit_changing(
@@ -124,9 +150,10 @@ def fit_changing(
     Returns
     -------
     (list of ChangingFit, ndarray of complex128 of shape (pulses,)) or None
-        A fit for each and the samples that they leave. None where a comb has fewer than three usable lines.
+        A fit for each and the samples that they leave. None where a comb has fewer than three usable lines, or lines
+        lie in one another too closely.
     """
-    from scipy.linalg import LinAlgError, cho_factor, cho_solve
+    from scipy.linalg import cho_solve  # here, because predicting needs no such import
 
     pulses, count = data.pulses, len(starts)
     time = middle_times(pulses)
@@ -152,15 +179,10 @@ def fit_changing(
         seen = (lines @ samples.conj()).conj() / pulses
         together = lines_at_one_place(frequency, pulses)
         snr = np.minimum(snr, np.maximum((smooth(squared(seen) * pulses / noise) - 1) / together, 1e-3))
-        held_back = ridges(snr, together)
-        diagonal = products.diagonal().copy()
-        products.flat[:: len(products) + 1] = diagonal + held_back
-        try:
-            factor = cho_factor(products, check_finite=False)
-        except LinAlgError:
-            held_back = held_back + NOTCH_RIDGE
-            products.flat[:: len(products) + 1] = diagonal + held_back
-            factor = cho_factor(products, check_finite=False)
+        factored = _factored(products, ridges(snr, together))
+        if factored is None:
+            return None
+        factor, held_back = factored
         amplitudes = cho_solve(factor, seen, check_finite=False)
         snr = np.maximum(smooth(squared(amplitudes * (1 + held_back)) * pulses / noise) - 1, 1e-3)
         rest = remove_bands(data.samples - amplitudes.astype(np.complex64) @ lines, data.bands)
@@ -172,16 +194,16 @@ def fit_changing(
             gained += list(2j * np.pi * rate * ((counted * order)[own].astype(np.complex64) @ lines[own]) * shapes)
         columns = without_bands(np.array(gained), data.bands)
         leaked = (lines @ columns.conj().T).conj() / pulses
-        mean_noise = float(np.average(noise, weights=squared(counted * order) + 1e-30))
+        counts = squared(counted * order) + 1e-30
+        mean_noise = float(np.average(noise, weights=counts))
         kept = leaked.conj().T @ cho_solve(factor, leaked, check_finite=False)
         fisher = 2 / mean_noise * (columns.conj() @ columns.T - pulses * kept).real
         covariance = inverse_of(fisher)
         step = covariance @ (2 / mean_noise * (columns.conj() @ rest).real)
         std = np.sqrt(covariance.diagonal())
-        steps_ahead, own_std = (values[2:].reshape(count, degrees) for values in (step, std))
         centre += float(np.clip(2 * step[0] / pulses, -0.5 / pulses, 0.5 / pulses))
         pull += float(np.clip(step[1], -0.5, 0.5))
-        ahead[:, :degrees] += np.clip(steps_ahead, -furthest[:, None], furthest[:, None])
+        ahead[:, :degrees] += np.clip(step[2:].reshape(count, degrees), -furthest[:, None], furthest[:, None])
         # its first polynomial is another rate
         faster = 1 + np.array([other_rate(first, pulses) for first in ahead[:, 0]])
         rates, ahead = rates * faster, ahead / faster[:, None]
@@ -189,6 +211,10 @@ def fit_changing(
         if number and np.all(np.abs(step) < ENOUGH * std):
             break
         level = data.level_of(rest)
+    # the noise is what the last step leaves, not what the one before it left
+    left = float(np.average(np.maximum(data.level_of(rest)(frequency), least), weights=counts))
+    std *= np.sqrt(left / mean_noise)
+    own_std = std[2:].reshape(count, degrees)
     out = []
     for rotor, rate in enumerate(rates):
         own = (comb == rotor) & used

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .changing_fit import ChangingFit, Start, fit_changing
+from .changing_fit import ChangingFit, Start, fit_changing, most_lines
 from .comb import Comb
 from .comb_fit import ENOUGH, LEAST_RIDGE, CombFit, lines_at_one_place
 from .lines import against_lines, middle_times, squared, sum_of_lines
@@ -46,9 +46,6 @@ LAST_STEPS, ROUGHLY_SURE = 6, 3.0
 #: Steps of the fit of all lines after that, at most, out to so many times the edge, which smeared lines hide.
 FITTED_STEPS, FURTHER = 8, 2.0
 
-#: Where that is more samples of lines than these, it reaches no further than they allow.
-MOST_SAMPLES = 12_000_000
-
 
 @dataclass(frozen=True)
 class Straightened:
@@ -58,11 +55,14 @@ class Straightened:
     ----------
     samples : ndarray of complex128, shape (pulses,)
         Its samples, those of `Periodogram` read at other times; the body's line is what it was.
+    record : Periodogram
+        The record as it is.
     fit : ChangingFit
-        The rotor's lines, every blade's.
+        The rotor's lines in that, every blade's.
     """
 
     samples: NDArray[np.complex128]
+    record: Periodogram
     fit: ChangingFit
 
 
@@ -78,7 +78,7 @@ def _continued(samples: NDArray[np.complex128], fit: ChangingFit) -> NDArray[np.
     return np.concatenate([lines[:margin] * fade[::-1], samples, lines[margin:] * fade])
 
 
-def straightened(data: Periodogram, comb: Comb, edge: float, *, narrow: bool, least_gain: float) -> Straightened | None:
+def straightened(data: Periodogram, comb: Comb, edge: float, *, least_gain: float) -> Straightened | None:
     """Take out of a record what its rotor's rate changed by.
 
     By Gauss-Newton steps on the phases of the comb's lines over the dwell: first of each line by itself, from the inner
@@ -92,8 +92,6 @@ def straightened(data: Periodogram, comb: Comb, edge: float, *, narrow: bool, le
         The comb found in it.
     edge : float
         Edge of the line family [cycles a sample from the body].
-    narrow : bool
-        True where the change leaves the lines narrow: all together will do.
     least_gain : float
         What each line by itself must at least tell of the rate once the change is taken out, over what it told before.
 
@@ -105,13 +103,11 @@ def straightened(data: Periodogram, comb: Comb, edge: float, *, narrow: bool, le
     pulses, rate, centre = data.pulses, comb.chopping, comb.fit.centre
     furthest = max(int(0.45 / rate), 1)
     reach = min(max(comb.last // comb.per_turn, round(edge / rate), LEAST_ORDERS), furthest)
-    ahead, gain = np.zeros(len(DEGREES)), 0.0
-    if not narrow:
-        rough, gain = _each_by_itself(data, rate, centre, reach)
-        ahead = rough if gain > 1 else ahead
+    rough, gain = _each_by_itself(data, rate, centre, reach)
     if gain < least_gain:
         return None
-    outermost = min(int(FURTHER * reach), furthest, MOST_SAMPLES // (2 * pulses * comb.per_turn)) * comb.per_turn
+    ahead = rough if gain > 1 else np.zeros(len(DEGREES))
+    outermost = min(int(FURTHER * reach) * comb.per_turn, furthest * comb.per_turn, most_lines(pulses) // 2)
     spacing = rate / comb.per_turn * (1 + other_rate(ahead[0], pulses))
     starts = [Start(spacing, outermost, changed(ahead))]
     fitted = fit_changing(data, starts, centre, degrees=len(DEGREES), steps=FITTED_STEPS, level_about=data.level_at)
@@ -121,7 +117,7 @@ def straightened(data: Periodogram, comb: Comb, edge: float, *, narrow: bool, le
     if not is_sure(fit.ahead, fit.ahead_std) or not change_of(fit.ahead, pulses) < MOST_CHANGE:
         return None
     late = late_by(fit.ahead, pulses)
-    return Straightened(resampled(_continued(data.samples, fit), fit.centre, late), fit)
+    return Straightened(resampled(_continued(data.samples, fit), fit.centre, late), data, fit)
 
 
 def _each_by_itself(data: Periodogram, rate: float, centre: float, reach: int) -> tuple[NDArray[np.float64], float]:

@@ -5,21 +5,34 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .changing import ChangingSeparation
-from .changing_fit import ChangingFit
+from .bandwidth import half_empty
+from .changing import ChangingSeparation, may_be_sought
+from .changing_fit import ChangingFit, Start, fit_changing
 from .comb import LEAST_REACH_MPS, Comb, find_comb
+from .comb_fit import CombFit
 from .drift import Straightened, ahead_left, straightened
-from .family_edge import edge_of_lines, span_of
+from .family_edge import edge_around, edge_of_lines, span_of
 from .helicopter import Gear, find_gear
-from .periodogram import Periodogram, prepared
-from .rotors import Rotors, separate_rotors
+from .lines import squared
+from .periodogram import Level, Periodogram, prepared
+from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
 from .spectrum import Spectrum
-from .turning import bend, is_sure
-from .unresolved import judged
+from .turning import DEGREES, bend, is_sure
+from .unresolved import judged, not_all
 
 #: What the lines tell of the rate grows by so much once its change is taken out, where several rotors were found that
 #: are one; and where these were told apart.
 SEVERAL_GAIN, BELIEVED_GAIN = 1.0, 1.5
+
+#: Gauss-Newton steps at most for both combs of a helicopter, whose change is known from one of them.
+GEARED_STEPS = 4
+
+#: Where the edge of the lines fitted and that of all about the orders differ by so many deviations, the fit of outer
+#: lines went astray.
+EDGE_DEVIATIONS = 4.0
+
+#: A comb whose spacing is off by more than this, relative, from any multiple of another's is no part of that.
+FAR_OFF = 0.003
 
 
 @dataclass(frozen=True)
@@ -46,8 +59,6 @@ class Family:
     ahead : (ndarray, ndarray) or None
         How far ahead of an even rotor each is, by the polynomials of `DEGREES`, and standard deviations, shape
         (rotors, degrees) [samples]; None where they are not told apart.
-    change_std : float
-        Relative standard deviation that this adds to the rates.
     """
 
     data: Periodogram
@@ -59,7 +70,6 @@ class Family:
     rotors: Rotors
     gear_reason: str
     ahead: tuple[NDArray[np.float64], NDArray[np.float64]] | None
-    change_std: float
 
     @property
     def is_told_apart(self) -> bool:
@@ -72,10 +82,6 @@ class Family:
         if self.ahead is None:
             return np.full((2, len(self.rotors.rates)), np.nan)
         return np.array([[bend(own, self.data.pulses) for own in values] for values in self.ahead])
-
-    def with_change(self, std: NDArray[np.float64] | float, rate: NDArray[np.float64] | float) -> NDArray[np.float64]:
-        """Standard deviations of rates, with what the change that was taken out adds, in the unit of both."""
-        return np.asarray(np.hypot(std, self.change_std * np.asarray(rate)), np.float64)
 
 
 def slower_than_rotors(data: Periodogram, edge: float, edge_std: float) -> str:
@@ -116,40 +122,61 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
     edge = min(family.edge, span_of(data))
     several_gain = BELIEVED_GAIN if family.is_told_apart else SEVERAL_GAIN
     least_gain = several_gain if len(family.rotors.rates) > 1 else 0.0
-    even = straightened(data, family.comb, edge, narrow=family.ahead is not None, least_gain=least_gain)
+    even = straightened(data, family.comb, edge, least_gain=least_gain)
+    one_sided = bool(half_empty(spectrum.relative_power))
     if even is None:
-        return _changing(data, family, edge), ""
+        return _changing(data, family, edge, one_sided=one_sided), ""
     again = prepared((even.samples * np.sqrt(spectrum.floor)).astype(np.complex64), spectrum)
     other = _as_it_is(again, blades, even)[0] if again is not None else None
-    if other is None or not other.is_told_apart:
-        return _changing(data, family, edge), ""
-    # several that are told apart are believed, but for a single one that changed
-    if family.is_told_apart and len(other.rotors.rates) > 1:
-        return _changing(data, family, edge), ""
+    if other is not None and other.gear is not None and other.comb.fit.spacing < (1 - FAR_OFF) * even.fit.spacing:
+        other = None  # two combs of another, slower one, than the rotor's that was straightened
+    if other is not None and other.is_told_apart and len(other.rotors.rates) == 1:
+        return other, ""
+    apart = _changing(data, family, edge, one_sided=one_sided)
+    # several that are so but for a change that they share are believed where nothing better is found
+    if family.is_told_apart or apart.is_told_apart or other is None or not other.is_told_apart:
+        return apart, ""
     return other, ""
 
 
-def _changing(data: Periodogram, family: Family, edge: float) -> Family:
-    """A family of several rotors whose rates change; the one given where none do, or that does not tell them apart."""
-    known = family.rotors
+def _changing(data: Periodogram, family: Family, edge: float, *, one_sided: bool) -> Family:
+    """A family of several rotors whose rates change; the one given where none do, or that does not tell them apart.
+
+    Rotors that were told apart as steady ones, and are not, must be told apart as such that change. Where one side of
+    the body lies in the other, lines cross and speak for anything.
+    """
+    known, comb = family.rotors, family.comb
     if family.gear is not None or (known.resolved and len(known.rates) == 1):
         return family
     if known.resolved:
         left = ahead_left(data, known.fits, known.rest)
         if not is_sure(*left):
             return replace(family, ahead=left)
-    rotors = judged(separate_rotors(data, family.comb, edge, ChangingSeparation), data, family.comb, edge)
-    fits = [fit for fit in rotors.fits if isinstance(fit, ChangingFit)]
-    if not rotors.resolved or len(fits) < 2 or (known.resolved and len(fits) != len(known.rates)):
-        return family
+    unsure = replace(family, rotors=not_all(known, data)) if known.resolved else family
+    if one_sided or not may_be_sought(data, comb.chopping, max(round(edge / comb.chopping), 1)):
+        return unsure
+    apart = separate_rotors(data, comb, edge, ChangingSeparation)
+    fits = [fit for fit in apart.fits if isinstance(fit, ChangingFit)]
+    if len(fits) < 2 or (known.resolved and len(fits) > len(known.rates)):
+        return unsure
+    powers = powers_of(fits)
+    own, around = edge_of_lines(data, apart.fits, apart.rest, 1, None), edge_around(data, comb, apart, None)
+    fitted_to = max(float(np.abs(fit.orders).max()) * fit.spacing for fit in fits)
+    rotors = judged(apart, data, comb, max(min(own[0], span_of(data)), edge), fitted_to=fitted_to)
+    led_astray = abs(own[0] - around[0]) > EDGE_DEVIATIONS * np.hypot(own[1], around[1])
+    if led_astray or not rotors.resolved or min(powers) < LEAST_POWER_SHARE * max(powers):
+        return unsure
     ahead = np.array([fit.ahead for fit in fits]), np.array([fit.ahead_std for fit in fits])
     return replace(family, rotors=rotors, ahead=ahead)
 
 
-def _faster(comb: Comb, rotors: Rotors, factor: float) -> tuple[Comb, Rotors]:
-    """A comb and its single rotor of another rate."""
-    fit = replace(comb.fit, spacing=factor * comb.fit.spacing)
-    return replace(comb, fit=fit), replace(rotors, rates=factor * rotors.rates, fits=[fit])
+def _known_as(fit: CombFit, changing: ChangingFit) -> CombFit:
+    """A comb of lines found in a record that was straightened, its rate that of the fit to the record as it is."""
+    lines = fit.spacing / changing.spacing
+    whole = round(lines) if lines > 1 else 1 / max(round(1 / lines), 1)  # it may be every so many-th line, or between
+    std = max(changing.spacing_std / changing.spacing, fit.spacing_std / fit.spacing) * fit.spacing
+    off = abs(whole / lines - 1) > FAR_OFF
+    return replace(fit, spacing=fit.spacing if off else whole * changing.spacing, spacing_std=std)
 
 
 def _as_it_is(data: Periodogram, blades: int | None, even: Straightened | None = None) -> tuple[Family | None, str]:
@@ -165,16 +192,40 @@ def _as_it_is(data: Periodogram, blades: int | None, even: Straightened | None =
     if gear is not None:
         data, comb = gear.alone, gear.first
         edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades, gear.second.spacing)
-    single = len(rotors.rates) == 1 and (gear is not None or rotors.resolved)
-    ahead, change_std = None, 0.0
-    if single and even is not None:  # the mean rate is told from how it changes
-        fit = even.fit
-        ahead = fit.ahead[None], fit.ahead_std[None]
-        all_in, alone = fit.spacing_std / fit.spacing, comb.chopping_std / comb.chopping
-        change_std = float(np.sqrt(max(all_in**2 - alone**2, 0.0)))
-        if gear is None:
-            lines = comb.chopping / fit.spacing
-            comb, rotors = _faster(comb, rotors, max(round(lines), 1) / lines)
-    elif single:
+    if len(rotors.rates) > 1 or not (gear or rotors.resolved):
+        return Family(data, comb, edge, std, fills_span, gear, rotors, reason, None), ""
+    if even is None:
         ahead = ahead_left(data, [comb.fit], comb.rest)
-    return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead, change_std), ""
+        return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead), ""
+    # the mean rate is told from how it changes
+    changing = even.fit
+    if gear is not None:
+        gear, changing = _geared(gear, even, data.level_of(comb.rest))
+    comb = replace(comb, fit=_known_as(comb.fit, changing))
+    rotors = replace(rotors, rates=np.array([comb.chopping]), stds=np.array([comb.chopping_std]), fits=[comb.fit])
+    ahead = changing.ahead[None], changing.ahead_std[None]
+    return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead), ""
+
+
+def _geared(gear: Gear, even: Straightened, level_about: Level) -> tuple[Gear, ChangingFit]:
+    """Two combs of a straightened record as they are in the record itself.
+
+    One turn drives both: where one was led astray, the other tells how far ahead they are.
+    """
+    combs = (gear.first.fit, gear.second)
+
+    def fitted(ahead: NDArray[np.float64]) -> tuple[float, list[ChangingFit]]:
+        starts = [Start(comb.spacing, int(np.abs(comb.orders).max()), ahead) for comb in combs]
+        found = fit_changing(
+            even.record, starts, even.fit.centre, degrees=len(DEGREES), steps=GEARED_STEPS, level_about=level_about
+        )
+        return (float(squared(found[1]).mean()), found[0]) if found else (np.inf, [])
+
+    best = fitted(even.fit.ahead)
+    if not best[1]:
+        return gear, even.fit
+    one, other = best[1]
+    if is_sure(one.ahead - other.ahead, np.hypot(one.ahead_std, other.ahead_std)):
+        best = min(best, *(fitted(fit.ahead) for fit in best[1]), key=lambda found: found[0])
+    first, second = (_known_as(comb, fit) for comb, fit in zip(combs, best[1], strict=True))
+    return replace(gear, first=replace(gear.first, fit=first), second=second), best[1][0]

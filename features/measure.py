@@ -280,13 +280,13 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
     edge, edge_std, span = family.edge, family.edge_std, span_of(data)
     out["reason"], out["gear_reason"] = "", family.gear_reason
     out["chopping_hz"] = comb.chopping * prf_hz
-    out["chopping_hz_std"] = float(family.with_change(comb.chopping_std, comb.chopping)) * prf_hz
+    out["chopping_hz_std"] = comb.chopping_std * prf_hz
     out["comb_order"] = float(comb.last // comb.per_turn)
     out["comb_snr_db"] = float(10 * np.log10(max(comb.fit.snr.sum() / data.pulses, 1e-9)))
     if gear is not None:
         for name, (rate, std) in zip(("main", "tail"), gear.rates, strict=True):
             out[f"{name}_chopping_hz"] = rate * prf_hz
-            out[f"{name}_chopping_hz_std"] = float(family.with_change(std, rate)) * prf_hz
+            out[f"{name}_chopping_hz_std"] = std * prf_hz
         out["gear_ratio"], out["gear_ratio_std"] = gear.ratio, gear.ratio_std
     count = len(rotors.rates)
     middle = rotors.fits[0] if count > 1 else comb.fit
@@ -312,8 +312,7 @@ def _measure_one(iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | No
         edge, edge_std = around if np.isinf(edge) else surer_edge((edge, edge_std), around)
     if slow := slower_than_rotors(data, edge, edge_std):
         return without_rotor(slow)
-    stds = family.with_change(rotors.stds, rotors.rates)
-    each = (rotors.rates * prf_hz, stds * prf_hz, drifts, drift_stds)
+    each = (rotors.rates * prf_hz, rotors.stds * prf_hz, drifts, drift_stds)
     for name, values in zip(EACH_ROTOR, each, strict=True):
         out[name] = np.pad(values, (0, MAX_ROTORS - count), constant_values=np.nan)
     out["rotor_count"], out["rotors_resolved"] = float(count), rotors.resolved

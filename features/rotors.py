@@ -117,7 +117,7 @@ def _holds_another(fit: CombFit, pulses: int) -> bool:
     return strong_multiple(fit.orders, 1 + pulses * np.abs(fit.amplitudes) ** 2, MOST_GEAR, GEAR_FACTOR) > 1
 
 
-def _powers(fits: Sequence[CombFit]) -> list[float]:
+def powers_of(fits: Sequence[CombFit]) -> list[float]:
     """Powers of combs' lines, over the orders that all of them reach.
 
     Not their means: where lines of two rotors lie in one another they may come out as large ones that cancel.
@@ -282,7 +282,7 @@ class Separation:
             return _NO_ROTOR
         if _meet(together, self.resolution):
             return self._unresolved(rate)
-        powers = _powers(together)
+        powers = powers_of(together)
         if powers[-1] < LEAST_POWER_SHARE * max(powers):  # beside several, nobody's rate
             return self._unresolved(rate) if len(self.fits) == 1 else _Verdict(unresolved=True)
         self.reaches = [*self.reaches, reach]

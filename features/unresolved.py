@@ -1,5 +1,6 @@
 """Whether the single rotors found in a record are all that there are."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -120,7 +121,7 @@ def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[float, 
     return share, most * within.sum() > held
 
 
-def _stands_past(about: _About, fit: CombFit, edge: float) -> bool:
+def _stands_past(about: _About, fits: Sequence[CombFit], edge: float) -> bool:
     """True where more than noise stands past the edge of a line family: near the noise its inner lines alone are seen.
 
     Rotors of unlike rates have their lines in one another at the inner orders, and apart at the outer ones.
@@ -133,12 +134,13 @@ def _stands_past(about: _About, fit: CombFit, edge: float) -> bool:
         return False
     noise = float(power[far].mean())
     over = float(power[past].mean()) - noise
-    lines = float((np.abs(fit.amplitudes) ** 2).sum()) * len(power)
+    lines = sum(float((np.abs(fit.amplitudes) ** 2).sum()) for fit in fits) * len(power)
     deviation = noise * float(np.sqrt(1 / past.sum() + 1 / far.sum()))
-    return over > PAST_DEVIATIONS * deviation and over * past.sum() > PAST_SHARE * lines
+    least = PAST_SHARE if len(fits) == 1 else LEFT_SHARE
+    return over > PAST_DEVIATIONS * deviation and over * past.sum() > least * lines
 
 
-def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float) -> Rotors:
+def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float, *, fitted_to: float | None = None) -> Rotors:
     """Rotors, called unresolved where their flashes, or what they leave, speak of more than were found.
 
     Parameters
@@ -147,6 +149,8 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float) -> Rotors
         From `separate_rotors`.
     data, comb, edge
         As there.
+    fitted_to : float, optional
+        How far out lines were fitted [cycles a sample from the body], where that may not be as far as they reach.
     """
     if not rotors.resolved:
         return rotors
@@ -156,11 +160,15 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float) -> Rotors
     twice = any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
     about = _power_about(data, rotors.rest, rotors.fits[0].centre)
     share, hidden = _left_over(about, rotors.fits, edge)
-    past = not several and _stands_past(about, rotors.fits[0], edge)
+    past = (not several or fitted_to is not None) and _stands_past(about, rotors.fits, fitted_to or edge)
     if not (twice or hidden or past or share > (LEFT_SHARE if several else LEFT_ALONE)):
         return rotors
+    apart = abs(rotors.next_rate - float(rotors.rates[0])) if hidden and not several else 0.0
+    return not_all(rotors, data, apart)
+
+
+def not_all(rotors: Rotors, data: Periodogram, apart: float = 0.0) -> Rotors:
+    """Rotors, called unresolved, spread by what the dwell tells apart at least, or by so much [cycles a sample]."""
     reach = max(int(np.abs(rotors.fits[0].orders).max()), 1)
-    spread = max(rotors.spread, RESOLVED_BINS / (reach * data.pulses))
-    if hidden and not several:
-        spread = max(spread, abs(rotors.next_rate - float(rotors.rates[0])))
-    return replace(rotors, resolved=False, spread=spread)
+    least = RESOLVED_BINS / (reach * data.pulses)
+    return replace(rotors, resolved=False, spread=max(rotors.spread, least, apart))
