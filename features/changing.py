@@ -19,8 +19,11 @@ from .slow_lines import remove_bands
 from .turning import DEGREES, FIRST_DEGREES, even_change, late_by, margin_of, resampled
 
 #: Rotors are sought that change by up to this over the dwell, relative, in steps that put the outermost lines at its
-#: ends out by half of so many radians; so many steps to each side at most, and none where these come to too little.
-FURTHEST_CHANGE, STEP_RAD, MOST_STEPS, LEAST_CHANGE = 0.03, 1.6, 12, 0.01
+#: ends out by half of so many radians; so many steps to each side at most.
+FURTHEST_CHANGE, STEP_RAD, MOST_STEPS = 0.03, 1.6, 12
+
+#: And over so many periods of the chopping frequency at most: rates change in more ways in more of them.
+MOST_PERIODS = 100.0
 
 #: Gauss-Newton steps at most as a rotor comes in, of even changes alone, and once all are found.
 COMING_STEPS, ALL_STEPS = 3, 8
@@ -31,12 +34,7 @@ FURTHER = 1.5
 
 def may_be_sought(data: Periodogram, nominal: float, reach: int) -> bool:
     """True where changing rotors about a rate [cycles a sample] and of that reach are not too much to seek and fit."""
-    return 4 * reach <= most_lines(data.pulses) and MOST_STEPS * _step(data, nominal, reach) > LEAST_CHANGE
-
-
-def _step(data: Periodogram, nominal: float, reach: int) -> float:
-    """From change to change, over the dwell, relative: an even one puts the ends out by an eighth of its turns."""
-    return STEP_RAD * 8 / (2 * np.pi * nominal * reach * data.pulses)
+    return 4 * reach <= most_lines(data.pulses) and nominal * data.pulses < MOST_PERIODS
 
 
 class ChangingSeparation(Separation):
@@ -60,7 +58,8 @@ class ChangingSeparation(Separation):
 
     def _changes(self) -> NDArray[np.float64]:
         """Changes over the dwell that are tried, relative."""
-        step = _step(self.data, self.nominal, self.reach)
+        turns = self.nominal * self.reach * self.data.pulses  # an even change puts the ends out by an eighth of these
+        step = STEP_RAD * 8 / (2 * np.pi * turns)
         count = min(int(FURTHEST_CHANGE / step), MOST_STEPS)
         return np.asarray(step * np.arange(-count, count + 1), np.float64)
 
@@ -87,7 +86,7 @@ class ChangingSeparation(Separation):
         return False  # that was fitted as if it did not change
 
     def _may_fit(self, reaches: list[int]) -> bool:
-        return 2 * sum(reaches) <= most_lines(self.data.pulses)
+        return super()._may_fit(reaches) and 2 * sum(reaches) <= most_lines(self.data.pulses)
 
     def _further(self) -> list[int]:
         """Outermost orders with some more, if those may be fitted: weak ones are held back."""

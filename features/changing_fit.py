@@ -6,6 +6,7 @@ them, for ten times what one of `fit_combs` takes.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +17,13 @@ from .periodogram import LEAST_LEVEL, Level, Periodogram
 from .slow_lines import band_basis, remove_bands, without_bands
 from .turning import inverse_of, other_rate, polynomials
 
-#: A step's products of lines take lines^2 x pulses multiplications, no more than these.
-MOST_PRODUCTS = 3_000_000_000
+#: A step takes lines^2 x pulses multiplications and holds several times lines x pulses samples, no more than these.
+MOST_PRODUCTS, MOST_SAMPLES = 3_000_000_000, 8_000_000
 
 
 def most_lines(pulses: int) -> int:
     """How many lines are fitted together at most."""
-    return int(np.sqrt(MOST_PRODUCTS / pulses))
+    return min(int(np.sqrt(MOST_PRODUCTS / pulses)), MOST_SAMPLES // pulses)
 
 
 @dataclass(frozen=True)
@@ -161,6 +162,7 @@ def fit_changing(
     rates, ahead, pull = np.array([one.rate for one in starts]), np.array([one.ahead for one in starts]), 0.0
     orders = [orders_within(data, centre, one.rate, (-one.reach, one.reach)) for one in starts]
     order, comb = np.concatenate(orders), np.repeat(np.arange(count), [len(own) for own in orders])
+    ends = np.searchsorted(comb, np.arange(count + 1))
     used = data.usable(centre + rates[comb] * order)
     if min(np.bincount(comb[used], minlength=count)) < 3:
         return None
@@ -189,9 +191,9 @@ def fit_changing(
         # what the record gains by another velocity or an acceleration of the body, and by each polynomial of each rotor
         counted = np.where(used, amplitudes, 0).astype(np.complex64)
         gained = list(2j * np.pi * (counted @ lines) * shapes[:2])
-        for rotor, rate in enumerate(rates):
-            own = comb == rotor
-            gained += list(2j * np.pi * rate * ((counted * order)[own].astype(np.complex64) @ lines[own]) * shapes)
+        leads = (counted * order).astype(np.complex64)
+        for rate, (first, last) in zip(rates, pairwise(ends), strict=True):
+            gained += list(2j * np.pi * rate * (leads[first:last] @ lines[first:last]) * shapes)
         columns = without_bands(np.array(gained), data.bands)
         leaked = (lines @ columns.conj().T).conj() / pulses
         counts = squared(counted * order) + 1e-30

@@ -95,8 +95,8 @@ def slower_than_rotors(data: Periodogram, edge: float, edge_std: float) -> str:
 def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None) -> tuple[Family | None, str]:
     """Find the line family of a record.
 
-    Where its rotors are not told apart, their rates may have changed instead: if the record as it would be of rotors
-    that turn evenly is explained, it is that.
+    Rates are taken to be steady first. Where one changes for sure, or rotors are not told apart, the record may be one
+    of a rotor that turns evenly, read at other times; if not that, of several that change, each in its own way.
 
     Parameters
     ----------
