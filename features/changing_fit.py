@@ -119,6 +119,73 @@ def _factored(
     return None
 
 
+class _Turning:
+    """Rotors about a body, as their fit goes on: rates, how far ahead they are, and the lines that turn with them."""
+
+    def __init__(self, data: Periodogram, starts: Sequence[Start], centre: float, degrees: int) -> None:
+        self.pulses, self.count, self.degrees = data.pulses, len(starts), degrees
+        self.time = middle_times(data.pulses)
+        self.shapes = polynomials(self.time, data.pulses)[:degrees]
+        self.centre, self.pull = centre, 0.0
+        self.rates, self.ahead = np.array([one.rate for one in starts]), np.array([one.ahead for one in starts])
+        self.orders = [orders_within(data, centre, one.rate, (-one.reach, one.reach)) for one in starts]
+        self.order = np.concatenate(self.orders)
+        self.comb = np.repeat(np.arange(self.count), [len(own) for own in self.orders])
+        self.used = data.usable(self.frequency)
+        # no step turns an outermost line by more than half a turn
+        self._furthest = 0.5 / np.array([max(1, np.abs(own).max(initial=0)) for own in self.orders]) / self.rates
+
+    @property
+    def frequency(self) -> NDArray[np.float64]:
+        """Of each line on average [cycles a sample]."""
+        return np.asarray(self.centre + self.rates[self.comb] * self.order, np.float64)
+
+    def lines(self) -> NDArray[np.complex64]:
+        """All of them, shape (lines, pulses)."""
+        body = self.centre * self.time + self.pull * self.shapes[1]
+        each = zip(self.rates, self.ahead, self.orders, strict=True)
+        return np.concatenate([turning_lines(body, *rotor, self.pulses) for rotor in each])
+
+    def gained(self, lines: NDArray[np.complex64], counted: NDArray[np.complex64]) -> NDArray[np.complex128]:
+        """What a record gains by another velocity or an acceleration of the body and by each polynomial of each rotor.
+
+        Shape (2 + rotors x degrees, pulses), where lines have such amplitudes.
+        """
+        out = list(2j * np.pi * (counted @ lines) * self.shapes[:2])
+        leads = (counted * self.order).astype(np.complex64)
+        ends = np.searchsorted(self.comb, np.arange(self.count + 1))
+        for rate, (first, last) in zip(self.rates, pairwise(ends), strict=True):
+            out += list(2j * np.pi * rate * (leads[first:last] @ lines[first:last]) * self.shapes)
+        return np.array(out)
+
+    def take(self, step: NDArray[np.float64]) -> None:
+        """Go on by a step in what `gained` names."""
+        self.centre += float(np.clip(2 * step[0] / self.pulses, -0.5 / self.pulses, 0.5 / self.pulses))
+        self.pull += float(np.clip(step[1], -0.5, 0.5))
+        limit = self._furthest[:, None]
+        self.ahead[:, : self.degrees] += np.clip(step[2:].reshape(self.count, self.degrees), -limit, limit)
+        # its first polynomial is another rate
+        faster = 1 + np.array([other_rate(first, self.pulses) for first in self.ahead[:, 0]])
+        self.rates, self.ahead = self.rates * faster, self.ahead / faster[:, None]
+        self.ahead[:, 0] = 0
+
+    def fits(
+        self, std: NDArray[np.float64], amplitudes: NDArray[np.complex128], snr: NDArray[np.float64]
+    ) -> list[ChangingFit]:
+        """Each rotor's comb, with standard deviations in the order of `gained`."""
+        out = []
+        own_std = np.full(self.ahead.shape, np.inf)
+        own_std[:, : self.degrees] = std[2:].reshape(self.count, self.degrees)
+        centre_std = other_rate(std[0], self.pulses)
+        for rotor, rate in enumerate(self.rates):
+            own = (self.comb == rotor) & self.used
+            rate_std = other_rate(own_std[rotor, 0], self.pulses) * rate
+            known = (float(rate), self.centre, rate_std, centre_std)
+            lines = (self.order[own], amplitudes[own], snr[own])
+            out.append(ChangingFit(*known, *lines, self.ahead[rotor], own_std[rotor]))
+        return out
+
+
 def fit_changing(
     data: Periodogram,
     starts: Sequence[Start],
@@ -156,72 +223,40 @@ def fit_changing(
     """
     from scipy.linalg import cho_solve  # here, because predicting needs no such import
 
-    pulses, count = data.pulses, len(starts)
-    time = middle_times(pulses)
-    shapes = polynomials(time, pulses)[:degrees]
-    rates, ahead, pull = np.array([one.rate for one in starts]), np.array([one.ahead for one in starts]), 0.0
-    orders = [orders_within(data, centre, one.rate, (-one.reach, one.reach)) for one in starts]
-    order, comb = np.concatenate(orders), np.repeat(np.arange(count), [len(own) for own in orders])
-    ends = np.searchsorted(comb, np.arange(count + 1))
-    used = data.usable(centre + rates[comb] * order)
-    if min(np.bincount(comb[used], minlength=count)) < 3:
+    pulses, turning = data.pulses, _Turning(data, starts, centre, degrees)
+    if min(np.bincount(turning.comb[turning.used], minlength=turning.count)) < 3:
         return None
-    smooth, basis = over_orders(comb, order), band_basis(pulses, data.bands).astype(np.complex64)
-    least = LEAST_LEVEL if count == 1 else 1.0
-    furthest = 0.5 / np.array([max(1, np.abs(own).max()) for own in orders]) / rates
-    samples, snr, level = data.samples.astype(np.complex64), np.full(len(order), np.inf), level_about
+    smooth = over_orders(turning.comb, turning.order)
+    basis = band_basis(pulses, data.bands).astype(np.complex64)
+    least = LEAST_LEVEL if turning.count == 1 else 1.0
+    samples, level = data.samples.astype(np.complex64), level_about
+    snr = np.full(len(turning.order), np.inf)
     for number in range(steps):
-        frequency = np.asarray(centre + rates[comb] * order, np.float64)
-        body = centre * time + pull * shapes[1]
-        lines = np.concatenate(
-            [turning_lines(body, *rotor, pulses) for rotor in zip(rates, ahead, orders, strict=True)]
-        )
+        frequency, lines = turning.frequency, turning.lines()
         noise = np.maximum(level(frequency), least)
-        products = _products(lines, basis)
         seen = (lines @ samples.conj()).conj() / pulses
         together = lines_at_one_place(frequency, pulses)
         snr = np.minimum(snr, np.maximum((smooth(squared(seen) * pulses / noise) - 1) / together, 1e-3))
-        factored = _factored(products, ridges(snr, together))
+        factored = _factored(_products(lines, basis), ridges(snr, together))
         if factored is None:
             return None
         factor, held_back = factored
         amplitudes = cho_solve(factor, seen, check_finite=False)
         snr = np.maximum(smooth(squared(amplitudes * (1 + held_back)) * pulses / noise) - 1, 1e-3)
         rest = remove_bands(data.samples - amplitudes.astype(np.complex64) @ lines, data.bands)
-        # what the record gains by another velocity or an acceleration of the body, and by each polynomial of each rotor
-        counted = np.where(used, amplitudes, 0).astype(np.complex64)
-        gained = list(2j * np.pi * (counted @ lines) * shapes[:2])
-        leads = (counted * order).astype(np.complex64)
-        for rate, (first, last) in zip(rates, pairwise(ends), strict=True):
-            gained += list(2j * np.pi * rate * (leads[first:last] @ lines[first:last]) * shapes)
-        columns = without_bands(np.array(gained), data.bands)
+        counted = np.where(turning.used, amplitudes, 0).astype(np.complex64)
+        columns = without_bands(turning.gained(lines, counted), data.bands)
         leaked = (lines @ columns.conj().T).conj() / pulses
-        counts = squared(counted * order) + 1e-30
-        mean_noise = float(np.average(noise, weights=counts))
         kept = leaked.conj().T @ cho_solve(factor, leaked, check_finite=False)
-        fisher = 2 / mean_noise * (columns.conj() @ columns.T - pulses * kept).real
-        covariance = inverse_of(fisher)
+        counts = squared(counted * turning.order) + 1e-30
+        mean_noise = float(np.average(noise, weights=counts))
+        covariance = inverse_of(2 / mean_noise * (columns.conj() @ columns.T - pulses * kept).real)
         step = covariance @ (2 / mean_noise * (columns.conj() @ rest).real)
         std = np.sqrt(covariance.diagonal())
-        centre += float(np.clip(2 * step[0] / pulses, -0.5 / pulses, 0.5 / pulses))
-        pull += float(np.clip(step[1], -0.5, 0.5))
-        ahead[:, :degrees] += np.clip(step[2:].reshape(count, degrees), -furthest[:, None], furthest[:, None])
-        # its first polynomial is another rate
-        faster = 1 + np.array([other_rate(first, pulses) for first in ahead[:, 0]])
-        rates, ahead = rates * faster, ahead / faster[:, None]
-        ahead[:, 0] = 0
+        turning.take(step)
         if number and np.all(np.abs(step) < ENOUGH * std):
             break
         level = data.level_of(rest)
     # the noise is what the last step leaves, not what the one before it left
     left = float(np.average(np.maximum(data.level_of(rest)(frequency), least), weights=counts))
-    std *= np.sqrt(left / mean_noise)
-    own_std = std[2:].reshape(count, degrees)
-    out = []
-    for rotor, rate in enumerate(rates):
-        own = (comb == rotor) & used
-        known = (float(rate), centre, other_rate(own_std[rotor, 0], pulses) * rate, 2 * float(std[0]) / pulses)
-        ahead_std = np.full(ahead.shape[1], np.inf)
-        ahead_std[:degrees] = own_std[rotor]
-        out.append(ChangingFit(*known, order[own], amplitudes[own], snr[own], ahead[rotor], ahead_std))
-    return out, rest
+    return turning.fits(std * np.sqrt(left / mean_noise), amplitudes, snr), rest
