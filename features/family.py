@@ -128,12 +128,12 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
         return _changing(data, family, edge, one_sided=one_sided), ""
     again = prepared((even.samples * np.sqrt(spectrum.floor)).astype(np.complex64), spectrum)
     other = _as_it_is(again, blades, even)[0] if again is not None else None
-    if other is not None and other.gear is not None and other.comb.fit.spacing < (1 - FAR_OFF) * even.fit.spacing:
-        other = None  # two combs of another, slower one, than the rotor's that was straightened
-    if other is not None and other.is_told_apart and len(other.rotors.rates) == 1:
+    # what was straightened may be the tail's comb; but several rotors may pass for that one and a slower one as well
+    slower = other is not None and other.gear is not None and other.comb.fit.spacing < (1 - FAR_OFF) * even.fit.spacing
+    if other is not None and other.is_told_apart and len(other.rotors.rates) == 1 and not slower:
         return other, ""
     apart = _changing(data, family, edge, one_sided=one_sided)
-    # several that are so but for a change that they share are believed where nothing better is found
+    # and several that are so but for a change that they share are believed where nothing better is found
     if family.is_told_apart or apart.is_told_apart or other is None or not other.is_told_apart:
         return apart, ""
     return other, ""

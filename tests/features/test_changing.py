@@ -188,6 +188,19 @@ def test_main_and_tail_rotor_that_change_with_one_gear_have_true_deviations():
     assert np.median(np.abs(told), axis=0).max() < 1.5
 
 
+def test_a_helicopter_whose_tail_is_louder_is_one_as_it_changes():
+    """The change is told from the tail's comb; the main rotor's is then the slower one."""
+    found = []
+    for seed in range(6):
+        rng = np.random.default_rng(600 + seed)
+        main_hz, change = rng.uniform(35, 45), 0.03 * rng.choice([-1, 1])
+        main = records.rotors(rng, np.array([main_hz]), length_m=0.4, change=change)
+        tail = records.rotors(rng, np.array([4.37 * main_hz]), length_m=0.09, change=change)
+        iq = 10 * (0.6 * main + tail + 3) * np.exp(-8j * np.pi * 3 * records.TIMES_S / records.WAVELENGTH_M)
+        found.append(measure((iq + white(rng, PULSES)).astype(np.complex64), **records.RADAR).gear_ratio)
+    assert np.sum(np.abs(np.array(found) / 4.37 - 1) < 0.01) >= 5
+
+
 @pytest.mark.parametrize("seed", [4, 5])
 def test_backwards_a_change_is_as_sure(seed):
     """The noise that a deviation is stated at was what the step before the last one left."""
