@@ -99,16 +99,16 @@ class ChangingSeparation(Separation):
         self, further: Sought | None, steps: int
     ) -> tuple[Sequence[ChangingFit], NDArray[np.complex128]] | None:
         """As of `Separation`, but of its own numbers of steps."""
-        self.level = self.level or self.data.level_of(self.rest.samples)
+        reaches = self.reaches if further else self._further()
         starts = [
             Start(fit.spacing, reach, fit.ahead)
-            for fit, reach in zip(self.fits, self.reaches, strict=True)
+            for fit, reach in zip(self.fits, reaches, strict=True)
             if isinstance(fit, ChangingFit)
         ]
         if further is None:
-            starts = [replace(one, reach=reach) for one, reach in zip(starts, self._further(), strict=True)]
             centre, degrees, most = self.fits[0].centre, len(DEGREES), ALL_STEPS
         else:
             starts.append(Start(further.rate, further.reach, even_change(further.change, self.data.pulses)))
             centre, degrees, most = self.centre, FIRST_DEGREES, COMING_STEPS
-        return fit_changing(self.data, starts, centre, degrees=degrees, steps=most, level_about=self.level)
+        level = self._level_about()
+        return fit_changing(self.data, starts, centre, degrees=degrees, steps=most, level_about=level)

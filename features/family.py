@@ -123,23 +123,22 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
     several_gain = BELIEVED_GAIN if family.is_told_apart else SEVERAL_GAIN
     least_gain = several_gain if len(family.rotors.rates) > 1 else 0.0
     even = straightened(data, family.comb, edge, least_gain=least_gain)
-    one_sided = bool(half_empty(spectrum.relative_power))
     if even is None:
-        return _changing(data, family, edge, one_sided=one_sided), ""
+        return _changing(data, spectrum, family, edge), ""
     again = prepared((even.samples * np.sqrt(spectrum.floor)).astype(np.complex64), spectrum)
     other = _as_it_is(again, blades, even)[0] if again is not None else None
     # what was straightened may be the tail's comb; but several rotors may pass for that one and a slower one as well
     slower = other is not None and other.gear is not None and other.comb.fit.spacing < (1 - FAR_OFF) * even.fit.spacing
     if other is not None and other.is_told_apart and len(other.rotors.rates) == 1 and not slower:
         return other, ""
-    apart = _changing(data, family, edge, one_sided=one_sided)
+    apart = _changing(data, spectrum, family, edge)
     # and several that are so but for a change that they share are believed where nothing better is found
     if family.is_told_apart or apart.is_told_apart or other is None or not other.is_told_apart:
         return apart, ""
     return other, ""
 
 
-def _changing(data: Periodogram, family: Family, edge: float, *, one_sided: bool) -> Family:
+def _changing(data: Periodogram, spectrum: Spectrum, family: Family, edge: float) -> Family:
     """A family of several rotors whose rates change; the one given where none do, or that does not tell them apart.
 
     Rotors that were told apart as steady ones, and are not, must be told apart as such that change. Where one side of
@@ -153,7 +152,8 @@ def _changing(data: Periodogram, family: Family, edge: float, *, one_sided: bool
         if not is_sure(*left):
             return replace(family, ahead=left)
     unsure = replace(family, rotors=not_all(known, data)) if known.resolved else family
-    if one_sided or not may_be_sought(data, comb.chopping, max(round(edge / comb.chopping), 1)):
+    reach = max(round(edge / comb.chopping), 1)
+    if not may_be_sought(data, comb.chopping, reach) or half_empty(spectrum.relative_power):
         return unsure
     apart = separate_rotors(data, comb, edge, ChangingSeparation)
     fits = [fit for fit in apart.fits if isinstance(fit, ChangingFit)]

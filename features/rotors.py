@@ -317,14 +317,18 @@ class Separation:
         """True where combs of these outermost orders are not too many lines to be fitted together."""
         return 2 * sum(reaches) <= MOST_LINES
 
+    def _level_about(self) -> Level:
+        """Local level without what is known of the combs already."""
+        self.level = self.level or self.data.level_of(self.rest.samples)
+        return self.level
+
     def _fitted(self, further: Sought | None, steps: int) -> tuple[Sequence[CombFit], NDArray[np.complex128]] | None:
         """Fit those found together, with a further one if there is one: as from `fit_combs`."""
-        self.level = self.level or self.data.level_of(self.rest.samples)
         centre = self.centre if further else self.fits[0].centre
         rates = [*self.rates, further.rate] if further else self.rates
         reaches = [*self.reaches, further.reach] if further else self.reaches
         outermost = [(-reach, reach) for reach in reaches]
-        return fit_combs(self.data, centre, rates, outermost, steps, level_about=self.level)
+        return fit_combs(self.data, centre, rates, outermost, steps, level_about=self._level_about())
 
 
 def separate_rotors(data: Periodogram, comb: Comb, edge: float, how: type[Separation] = Separation) -> Rotors:

@@ -1,6 +1,9 @@
 """Signals of known spectra for the tests of this folder."""
 
 import numpy as np
+from bladewing.features.family import Family, find_family
+from bladewing.features.periodogram import Periodogram, prepared
+from bladewing.features.spectrum import doppler_spectrum
 from bladewing.simulate import RotorMotion, rotor_echo
 
 CARRIER_HZ, PRF_HZ, PULSES = 9.85e9, 35e3, 3000
@@ -43,3 +46,10 @@ def rotors_by_chance(
         one = rotor_echo(angle_rad, wavelength_m=wavelength_m, blade_length_m=length_m, points=points)
         echo += one * np.exp(2j * np.pi * rng.uniform())
     return echo / np.sqrt(np.mean(np.abs(echo) ** 2))
+
+
+def family_of(iq: np.ndarray) -> tuple[Periodogram, Family]:
+    """A record of the paper's radar made ready, and its line family."""
+    spectrum = doppler_spectrum(iq, carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
+    data = prepared(iq, spectrum)
+    return data, find_family(data, spectrum)[0]

@@ -9,17 +9,17 @@ import pytest
 from bladewing.features import measure
 from bladewing.features.changing_fit import ChangingFit, Start, fit_changing, turning_lines
 from bladewing.features.comb_fit import ridges
-from bladewing.features.family import find_family
+from bladewing.features.lines import middle_times
 from bladewing.features.periodogram import prepared
 from bladewing.features.slow_lines import remove_bands, without_bands
 from bladewing.features.spectrum import doppler_spectrum
 from bladewing.features.turning import DEGREES, even_change, polynomials
 
 from ..benchmarks import records
-from .signals import white
+from .signals import family_of, white
 
 PULSES = records.PULSES
-TIME = np.arange(PULSES) - (PULSES - 1) / 2
+TIME = middle_times(PULSES)
 
 
 def several(
@@ -33,21 +33,22 @@ def several(
     return records.record(rng, rates_hz, change=changes, **options), 2 * rates_hz, changes
 
 
-def family_of(iq: np.ndarray):
-    """The record made ready, and its line family."""
-    spectrum = doppler_spectrum(iq, **records.RADAR)
-    data = prepared(iq, spectrum)
-    return data, find_family(data, spectrum)[0]
+def helicopter(
+    seed: int, gear: float, change: float, *, main: float = 1.0, tail: float = 1.0, tail_m: float
+) -> tuple[np.ndarray, float, float]:
+    """A record of both rotors, 20 dB at an amplitude of 1, the main one's rate [Hz], and the change of both."""
+    rng = np.random.default_rng(seed)
+    main_hz, signed = rng.uniform(35, 45), change * rng.choice([-1, 1])
+    blades = main * records.rotors(rng, np.array([main_hz]), length_m=0.4, change=signed)
+    blades = blades + tail * records.rotors(rng, np.array([gear * main_hz]), length_m=tail_m, change=signed)
+    iq = 10 * (blades + 3) * np.exp(-8j * np.pi * 3 * records.TIMES_S / records.WAVELENGTH_M)
+    return (iq + white(rng, PULSES)).astype(np.complex64), main_hz, signed
 
 
 def test_lines_that_turn_with_a_rotor_are_the_closed_form():
     rng = np.random.default_rng(2)
-    ahead, orders, rate, body = (
-        rng.normal(0, 2, len(DEGREES)),
-        np.arange(-70, 71),
-        1 / 300,
-        0.07 * TIME + 1e-6 * TIME**2,
-    )
+    ahead, orders, rate = rng.normal(0, 2, len(DEGREES)), np.arange(-70, 71), 1 / 300
+    body = 0.07 * TIME + 1e-6 * TIME**2
     turned = rate * (TIME + ahead @ polynomials(TIME, PULSES))
     exact = np.exp(2j * np.pi * (orders[:, None] * turned + body))
     np.testing.assert_allclose(turning_lines(body, rate, ahead, orders, PULSES), exact, atol=3e-5)
@@ -168,12 +169,8 @@ def test_main_and_tail_rotor_that_change_with_one_gear_have_true_deviations():
     """Fitted without the tail's lines, the main rotor's rate was off by 4 to 70 deviations, its drift by 3."""
     off = []
     for seed in range(8):
-        rng = np.random.default_rng(500 + seed)
-        main_hz, change = rng.uniform(35, 45), 0.01 * rng.choice([-1, 1])
-        main = records.rotors(rng, np.array([main_hz]), length_m=0.4, change=change)
-        tail = records.rotors(rng, np.array([4.73 * main_hz]), length_m=0.08, change=change)
-        iq = 10 * (main + 0.7 * tail + 3) * np.exp(-8j * np.pi * 3 * records.TIMES_S / records.WAVELENGTH_M)
-        found = measure((iq + white(rng, PULSES)).astype(np.complex64), **records.RADAR)
+        iq, main_hz, change = helicopter(500 + seed, 4.73, 0.01, tail=0.7, tail_m=0.08)
+        found = measure(iq, **records.RADAR)
         drift_hz_per_s = 2 * main_hz * change * records.PRF_HZ / PULSES
         off.append(
             [
@@ -192,12 +189,8 @@ def test_a_helicopter_whose_tail_is_louder_is_one_as_it_changes():
     """The change is told from the tail's comb; the main rotor's is then the slower one."""
     found = []
     for seed in range(6):
-        rng = np.random.default_rng(600 + seed)
-        main_hz, change = rng.uniform(35, 45), 0.03 * rng.choice([-1, 1])
-        main = records.rotors(rng, np.array([main_hz]), length_m=0.4, change=change)
-        tail = records.rotors(rng, np.array([4.37 * main_hz]), length_m=0.09, change=change)
-        iq = 10 * (0.6 * main + tail + 3) * np.exp(-8j * np.pi * 3 * records.TIMES_S / records.WAVELENGTH_M)
-        found.append(measure((iq + white(rng, PULSES)).astype(np.complex64), **records.RADAR).gear_ratio)
+        iq, _, _ = helicopter(600 + seed, 4.37, 0.03, main=0.6, tail_m=0.09)
+        found.append(measure(iq, **records.RADAR).gear_ratio)
     assert np.sum(np.abs(np.array(found) / 4.37 - 1) < 0.01) >= 5
 
 

@@ -11,6 +11,7 @@ from bladewing.features.spectrum import doppler_spectrum
 from bladewing.features.turning import bend, is_sure, resampled
 
 from ..benchmarks import records
+from .signals import family_of
 
 DWELL_S = records.PULSES / records.PRF_HZ
 
@@ -21,13 +22,6 @@ def one_rotor(seed: int, change: float, *, snr_db: float = 10.0) -> tuple[np.nda
     rate_hz = rng.uniform(45, 105)
     options = {"snr_db": snr_db, "body_db": 20, "velocity_mps": rng.uniform(-25, 25), "change": change}
     return records.record(rng, np.array([rate_hz]), **options), 2 * rate_hz
-
-
-def family_of(iq: np.ndarray):
-    """The record made ready, and its line family."""
-    spectrum = doppler_spectrum(iq, **records.RADAR)
-    data = prepared(iq, spectrum)
-    return data, find_family(data, spectrum)[0]
 
 
 @pytest.mark.parametrize(("margin", "pulses"), [(0, 512), (40, 501), (64, 3000)])
@@ -91,7 +85,6 @@ def test_a_steady_rotor_is_left_as_it_is():
         assert family.data is data
         assert family.ahead is not None
         assert not is_sure(*family.ahead)
-        assert family.data is data
 
 
 def test_turned_round_in_time_a_rate_that_rises_falls():
