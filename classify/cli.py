@@ -130,7 +130,7 @@ def predict(
     if budget_us is not None:  # it follows from a timing of this moment
         _complain(f"the budget of {budget_us:g} us buys the model {classifier.name}", kind="note")
     if classifier.operating_point is not None:
-        _complain(work.terms(classifier.operating_point), kind="note")
+        _complain(work.terms(classifier.operating_point, by_sets=coverage is not None), kind="note")
     said: Counter[str] = Counter()
     unreadable = 0
     for result in work.answers(

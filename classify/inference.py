@@ -85,9 +85,10 @@ class Classifier:
         Largest share of birds and clutter that may be named UAV; sets the threshold on "uav", above or below the
         model's own.
     coverage
-        Instead of that: name a record only where its prediction set holds one class alone. For each class, at least
-        this share of its records have a set that holds it (on records like those of the calibration). One of the
-        coverages that the model stores, 0.9 say.
+        Name a record only where its prediction set holds one class alone. For each class, at least this share of its
+        records have a set that holds it (on records like those of the calibration). One of the coverages that the model
+        stores, 0.9 say. Of false alarms it promises nothing: with `max_false_alarm` besides, "uav" is named only where
+        that rate allows it too.
 
     Attributes
     ----------
@@ -98,12 +99,13 @@ class Classifier:
     envelope
         The radars it answers for.
     accept
-        Least probability at which each class is named; without effect under a `coverage`.
+        Least probability at which each class is named; under a `coverage` without effect, but for that of "uav" where
+        `max_false_alarm` set it.
     inputs
         Names of the inputs it reads, keys of `bladewing.features.schema.INPUT_SHAPES`.
     operating_point
         The threshold that `max_false_alarm` chose and the detection probability that remains, of its calibration
-        records; None without one.
+        records (under a `coverage` at most that); None without one.
     coverage
         As it was asked for, or None.
 
@@ -220,7 +222,8 @@ class Classifier:
             Shape (records, 3), as `predict` gives them.
         """
         if self.coverage is not None:
-            return decide_by_sets(probabilities, self._sets_hold, self.coverage)
+            least_uav = self.operating_point.threshold if self.operating_point else None
+            return decide_by_sets(probabilities, self._sets_hold, self.coverage, least_uav)
         return decide(probabilities, self.accept)
 
     def predict(self, iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Prediction:
@@ -352,9 +355,6 @@ class Classifier:
 
 
 def _rule(max_false_alarm: object, coverage: object) -> tuple[float | None, float | None]:
-    """Check the two numbers by which "unknown" may be ruled, of which one at most is given."""
+    """Check the two numbers by which "unknown" may be ruled."""
     rate = None if max_false_alarm is None else positive(max_false_alarm, "max_false_alarm")
-    share = None if coverage is None else positive(coverage, "coverage")
-    if rate is not None and share is not None:
-        raise BadInput(f"a false-alarm rate of {rate:g} and a coverage of {share:g}: give one of them")
-    return rate, share
+    return rate, None if coverage is None else positive(coverage, "coverage")

@@ -37,7 +37,7 @@ def decide(probabilities: NDArray[np.floating], accept: Sequence[float]) -> tupl
 
 
 def decide_by_sets(
-    probabilities: NDArray[np.floating], limits: Sequence[float], coverage: float
+    probabilities: NDArray[np.floating], limits: Sequence[float], coverage: float, least_uav: float | None = None
 ) -> tuple[NDArray[np.str_], list[str]]:
     """Name the class that a prediction set holds alone, or say "unknown" where it holds several or none.
 
@@ -49,24 +49,25 @@ def decide_by_sets(
         Least probability at which the set holds each class, order `CLASSES`.
     coverage
         What the sets promise; the reasons quote it.
+    least_uav
+        Where given, a UAV is named only where it is the most probable class too, and at least so probable.
 
     Returns
     -------
     labels, reasons
-        As `decide`; the reason names the set.
+        As `decide`; the reason names the set, or the probability that was not reached.
     """
-    held = np.asarray(probabilities, dtype=np.float64) >= np.asarray(limits, dtype=np.float64)
-    labels = np.where(held.sum(axis=-1) == 1, np.asarray(CLASSES)[np.argmax(held, axis=-1)], UNKNOWN)
-    reasons = [
-        "" if label != UNKNOWN else f"not sure: {_listed(row)} at coverage {coverage:g}"
-        for label, row in zip(labels, held, strict=True)
-    ]
-    return labels, reasons
-
-
-def _listed(held: NDArray[np.bool_]) -> str:
-    names = [name for name, inside in zip(CLASSES, held, strict=True) if inside]
-    return " or ".join(names) if names else "no class is likely"
+    labels, reasons = [], []
+    for row in np.asarray(probabilities, dtype=np.float64).tolist():
+        held = [name for name, p, limit in zip(CLASSES, row, limits, strict=True) if p >= limit]
+        reason = ""
+        if len(held) != 1:
+            reason = f"not sure: {' or '.join(held) or 'no class is likely'} at coverage {coverage:g}"
+        elif held == ["uav"] and least_uav is not None and row[0] < (least := max(least_uav, *row)):
+            reason = f"not sure: uav {_below(row[0], least)}"
+        labels.append(UNKNOWN if reason else held[0])
+        reasons.append(reason)
+    return np.array(labels, _LABEL), reasons
 
 
 def _below(value: float, limit: float) -> str:

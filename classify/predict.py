@@ -43,11 +43,12 @@ _WHOSE = {"uav": "a UAV", "bird": "a bird", "clutter": "clutter"}
 _COLOURS = {"uav": "bold red", "bird": "green", "clutter": "cyan", UNKNOWN: "yellow"}
 
 
-def terms(point: "OperatingPoint") -> str:
-    """Say what a chosen false-alarm rate costs."""
+def terms(point: "OperatingPoint", *, by_sets: bool = False) -> str:
+    """Say what a chosen false-alarm rate costs; by prediction sets besides, more."""
     return (
         f"uav from {point.threshold:.4f} on: at most {point.false_alarm:.4g} of birds and clutter are named uav, and "
-        f"{point.detection:.3f} of UAVs (synthetic calibration records of the whole envelope)"
+        f"{'at most ' if by_sets else ''}{point.detection:.3f} of UAVs (synthetic calibration records of the whole "
+        "envelope)"
     )
 
 

@@ -1,4 +1,4 @@
-"""Tables of the classifier's promises. Run: python tests/benchmarks/classification_tables.py [TABLE ...].
+"""Tables of the classifier's promises. Run: python -m tests.benchmarks.classification_tables [TABLE ...].
 
 Records are drawn for purpose "bench": neither training nor calibration, nor the test of a training, has seen them.
 """
@@ -26,6 +26,9 @@ from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.dataset import KIND_CLASS, KINDS, _powered, _target, draw_radar
 from bladewing.simulate.laws import LAWS, WIDTH, Draws
 from bladewing.simulate.uav import ROTORS
+
+from .independent_scenes import KINDS as SCENES
+from .independent_table import received_scenes
 
 SURE_LIMITS = [(one, one) for one in (0.0, 0.6, 0.7, 0.8, 0.9, 0.95, 1.01)] + [(0.95, 0.85), (0.97, 0.85), (0.99, 0.9)]
 """Probabilities of "uav" and of the others from which on the first model of a cascade is sure."""
@@ -159,6 +162,44 @@ def recordings(classifier: Classifier, _: int) -> None:
         print(f"{path.stem[:48]:48s} {dict(labels)!s:46s} track {given.track.label}")
     for group, counts in totals.items():
         print(f"{group:10s} " + ", ".join(f"{name} {n} ({n / counts.total():.1%})" for name, n in counts.items()))
+
+
+#: Ways to say "unknown": the model's own thresholds, or prediction sets of a coverage, named UAV at a false-alarm rate.
+RULES = ({}, {"coverage": 0.9, "max_false_alarm": 0.01}, {"coverage": 0.8, "max_false_alarm": 0.01})
+
+
+def rules(classifier: Classifier, count: int) -> None:
+    """What each way to say "unknown" makes of measured recordings and of scenes of a simulator that is not ours."""
+    scenes = max(count // 600, 1)
+    truth: list[str] = []
+    given: dict[str, list[np.ndarray]] = {}
+    for (kind, radar, _, _), iq, _ in received_scenes(list(SCENES), scenes, 1, ("total",)):
+        p = classifier.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz).probabilities
+        given.setdefault("scenes", []).append(p)
+        truth += [SCENES[kind][0]] * len(iq)
+    for path in sorted(RECORDINGS.glob("*.sigmf-meta")):
+        recording = load_recording(path)
+        if classifier.envelope.reason(recording.carrier_hz, recording.prf_hz, round(DWELL_S * recording.prf_hz)):
+            continue
+        p = answer(recording, classifier, dwell_s=DWELL_S).dwells.probabilities
+        given.setdefault("drone" if path.name.startswith("drone") else "others", []).append(p)
+    true = np.array(truth)
+    print(f"\nscenes of an independent simulator ({len(true)}), measured recordings of a drone and of others")
+    print(f"{'':28s} |         scenes             UAVs           others | drone     | others")
+    print(f"{'rule':28s} |   right   wrong unknown     uav   wrong     uav |       uav |        uav  unknown")
+    name = classifier.metadata["name"]
+    for options in RULES:
+        decide_by = Classifier.load(name, **options).decide
+        said = {place: decide_by(np.concatenate(parts))[0] for place, parts in given.items()}
+        own, unknown = said["scenes"], said["scenes"] == "unknown"
+        wrong, uavs = (own != true) & ~unknown, true == "uav"
+        shares = (own == true, wrong, unknown, (own == true)[uavs], wrong[uavs], (own == "uav")[~uavs])
+        cells = " ".join(f"{share.mean():7.3f}" for share in shares)
+        rule = ", ".join(f"{key.split('_')[-1]} {value:g}" for key, value in options.items()) or "model's thresholds"
+        print(
+            f"{rule:28s} | {cells} | {np.mean(said['drone'] == 'uav'):9.3f} | "
+            f"{np.mean(said['others'] == 'uav'):10.3f} {np.mean(said['others'] == 'unknown'):8.3f}"
+        )
 
 
 TRACK_S, DWELL_S, OF_RADAR = 2.5, 0.08, 24
@@ -309,6 +350,7 @@ TABLES: dict[str, Callable[[Classifier, int], None]] = {
     "tracks": tracks,
     "coverage": coverage,
     "cascade": cascade,
+    "rules": rules,
     "recordings": recordings,
 }
 

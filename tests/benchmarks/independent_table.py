@@ -5,6 +5,8 @@ Run: python -m tests.benchmarks.independent_table [--scenes N] [--seed S] [--mod
 
 import argparse
 from collections import Counter
+from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 from bladewing.classify import Classifier
@@ -28,25 +30,32 @@ ANSWERS = ("uav", "bird", "clutter", "unknown")
 Counts = dict[tuple[str, str, str, str, float], Counter[str]]
 
 
+def received_scenes(
+    kinds: list[str], scenes: int, seed: int, noises: tuple[str, ...] = ("total", "micro")
+) -> Iterator[tuple[tuple[str, Radar, str, float], np.ndarray, np.ndarray]]:
+    """Records by (kind, radar, what the SNR is of, SNR), shape (scenes, pulses), and what of each a spectrum shows."""
+    for kind in kinds:
+        make = KINDS[kind][1]
+        for place, radar in enumerate(RADARS):
+            rng = np.random.default_rng([seed, list(KINDS).index(kind), place])
+            drawn = [make(rng, radar) for _ in range(scenes)]
+            for of, snr_db in product(noises, SNRS_DB):
+                powers = [noise_power(scene, snr_db, of) for scene in drawn]
+                iq = np.stack([received(scene, power, rng) for scene, power in zip(drawn, powers, strict=True)])
+                seen = np.array([visible(scene, power) for scene, power in zip(drawn, powers, strict=True)])
+                yield (kind, radar, of, snr_db), iq, seen
+
+
 def counted(models: list[str], kinds: list[str], scenes: int, seed: int) -> Counts:
     """Answers by (model, kind, radar, what the SNR is of, SNR); "seen" and "seen right" count what a spectrum shows."""
     classifiers = {name: Classifier.load(name) for name in models}
     counts: Counts = {}
-    for kind in kinds:
-        truth, make = KINDS[kind]
-        for place, radar in enumerate(RADARS):
-            rng = np.random.default_rng([seed, list(KINDS).index(kind), place])
-            drawn = [make(rng, radar) for _ in range(scenes)]
-            for of in ("total", "micro"):
-                for snr_db in SNRS_DB:
-                    powers = [noise_power(scene, snr_db, of) for scene in drawn]
-                    iq = np.stack([received(scene, power, rng) for scene, power in zip(drawn, powers, strict=True)])
-                    seen = np.array([visible(scene, power) for scene, power in zip(drawn, powers, strict=True)])
-                    for name, classifier in classifiers.items():
-                        said = classifier.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz).labels
-                        count = Counter(said.tolist())
-                        count["seen"], count["seen right"] = int(seen.sum()), int((seen & (said == truth)).sum())
-                        counts[name, kind, radar.name, of, snr_db] = count
+    for (kind, radar, of, snr_db), iq, seen in received_scenes(kinds, scenes, seed):
+        for name, classifier in classifiers.items():
+            said = classifier.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz).labels
+            count = Counter(said.tolist())
+            count["seen"], count["seen right"] = int(seen.sum()), int((seen & (said == KINDS[kind][0])).sum())
+            counts[name, kind, radar.name, of, snr_db] = count
     return counts
 
 
