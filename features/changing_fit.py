@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .comb_fit import ENOUGH, NOTCH_RIDGE, CombFit, lines_at_one_place, orders_within, over_orders, ridges
 from .lines import middle_times, squared
 from .periodogram import LEAST_LEVEL, Level, Periodogram
-from .slow_lines import band_basis, remove_bands, without_bands
+from .slow_lines import band_basis, remove_bands
 from .turning import inverse_of, other_rate, polynomials
 
 #: A step takes lines^2 x pulses multiplications and holds several times lines x pulses samples, no more than these.
@@ -245,7 +245,7 @@ def fit_changing(
         snr = np.maximum(smooth(squared(amplitudes * (1 + held_back)) * pulses / noise) - 1, 1e-3)
         rest = remove_bands(data.samples - amplitudes.astype(np.complex64) @ lines, data.bands)
         counted = np.where(turning.used, amplitudes, 0).astype(np.complex64)
-        columns = without_bands(turning.gained(lines, counted), data.bands)
+        columns = remove_bands(turning.gained(lines, counted), data.bands)
         leaked = (lines @ columns.conj().T).conj() / pulses
         kept = leaked.conj().T @ cho_solve(factor, leaked, check_finite=False)
         counts = squared(counted * turning.order) + 1e-30

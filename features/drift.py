@@ -16,7 +16,7 @@ from .comb import Comb
 from .comb_fit import ENOUGH, LEAST_RIDGE, CombFit, lines_at_one_place
 from .lines import against_lines, middle_times, squared, sum_of_lines
 from .periodogram import Periodogram
-from .slow_lines import notched_products, parts, whole, without_bands
+from .slow_lines import notched_products, parts, remove_bands, whole
 from .turning import (
     DEGREES,
     FIRST_DEGREES,
@@ -213,7 +213,7 @@ def ahead_left(
     ]
     still = sum_of_lines(pulses, frequency, 2j * np.pi * amplitudes)
     # what the record gains by each polynomial of each rotor, and by another velocity or an acceleration of the body
-    gained = without_bands(np.concatenate([*(shapes * one for one in turned), shapes[:2] * still]), data.bands)
+    gained = remove_bands(np.concatenate([*(shapes * one for one in turned), shapes[:2] * still]), data.bands)
     # what other amplitudes would make of it does not count
     seen = against_lines(np.concatenate([gained, rest[None]]), frequency).T
     products = notched_products(frequency, pulses, data.bands).plain

@@ -81,34 +81,34 @@ def slepian(pulses: int, half_bins: float) -> NDArray[np.float64]:
 
 
 def remove_bands(samples: NDArray[np.complex128], bands: Iterable[tuple[float, float]]) -> NDArray[np.complex128]:
-    """Take narrow bands out of one record.
+    """Take narrow bands out of records.
 
     Parameters
     ----------
-    samples : ndarray of complex128, shape (pulses,)
-        One record.
+    samples : ndarray of complex128, shape (..., pulses)
+        One record or several.
     bands : iterable of (float, float)
         Centre [cycles a sample] and half width [bins] of each band.
 
     Returns
     -------
-    ndarray of complex128, shape (pulses,)
+    ndarray of complex128, same shape
         What is left; a line more than a few bins off the bands is unchanged.
     """
     bands = tuple(bands)
-    pulses = len(samples)
-    turns = [_turn(pulses, centre) for centre, _ in bands]
+    pulses = samples.shape[-1]
+    out = samples.reshape(-1, pulses).T
+    turns = [_turn(pulses, centre)[:, None] for centre, _ in bands]
     bases = [slepian(pulses, float(half)) for _, half in bands]
-    seen = [times(basis, samples * turn.conj()) for basis, turn in zip(bases, turns, strict=True)]
+    seen = [times(basis, out * turn.conj()) for basis, turn in zip(bases, turns, strict=True)]
     if len(bands) > 1:
         # jointly: taken out one after the other, each band would keep what the first took of the second's strong line
-        factor = np.concatenate([np.where(_odd(basis), 1j, 1) for basis in bases])
-        together = factor * (_gram_inverse(pulses, bands) @ (factor.conj() * np.concatenate(seen)))
+        factor = np.concatenate([np.where(_odd(basis), 1j, 1) for basis in bases])[:, None]
+        together = factor * times(_gram_inverse(pulses, bands), factor.conj() * np.concatenate(seen))
         seen = np.split(together, np.cumsum([len(basis) for basis in bases])[:-1])
-    out = samples
     for amplitudes, basis, turn in zip(seen, bases, turns, strict=True):
         out = out - turn * times(basis.T, amplitudes)
-    return np.asarray(out, np.complex128)
+    return np.asarray(out.T.reshape(samples.shape), np.complex128)
 
 
 @lru_cache(maxsize=4)
@@ -122,12 +122,6 @@ def band_basis(pulses: int, bands: tuple[tuple[float, float], ...]) -> NDArray[n
         out = (vector[:, kept].conj().T / np.sqrt(value[kept])[:, None]) @ out
     out.setflags(write=False)
     return out
-
-
-def without_bands(rows: NDArray[np.complex128], bands: tuple[tuple[float, float], ...]) -> NDArray[np.complex128]:
-    """What `remove_bands` leaves of many records, shape (records, pulses)."""
-    basis = band_basis(rows.shape[1], bands)
-    return np.asarray(rows - (rows @ basis.conj().T) @ basis, np.complex128)
 
 
 @lru_cache(maxsize=4)
