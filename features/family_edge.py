@@ -13,16 +13,18 @@ from .rotors import Rotors
 #: Rates nearer than this at an order [bins] have one line there.
 MERGED_BINS = 1.0
 
-#: The edge of several rotors' fitted lines holds if that of all about them agrees within so many of its deviations.
-AGREED_DEVIATIONS = 2.0
+#: The edge of several rotors' fitted lines holds if that of all about them agrees within so many of its deviations. It
+#: may be chance that both agree: the first is known no better than this share of what they differ by, or of the
+#: deviation.
+AGREED_DEVIATIONS, APART_SHARE, CHANCE_SHARE = 2.0, 0.7, 0.25
 
 #: Share of the power of several rotors' family that does not count past its edge: what their inner lines leave between
 #: them lifts the level that the outer ones are read against.
 SEVERAL_LEAK = 0.005
 
-#: Of the sums of all about an order: variance over the square where the rotors' lines lie in one another (four of equal
-#: power, both sides), and what an edge is off by at least [lines].
-AROUND_SCATTER, AROUND_LINES = 0.4, 0.035
+#: Of the sums of all about an order: variance over the square, beyond what the fit finds by itself, where the rotors'
+#: lines lie in one another, and what an edge is off by at least [lines].
+AROUND_SCATTER, AROUND_LINES = 0.2, 0.035
 
 #: The orders mix at the edge where the tips of the fastest and of the slowest rotor lie more than twice so far apart
 #: [lines].
@@ -223,7 +225,7 @@ def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple
     if not np.isfinite(lines[0] + around[0]):
         return np.inf, np.inf
     apart = abs(around[0] - lines[0])
-    std = float(np.hypot(lines[1], max(apart, around[1] / 2)))  # that both agree may be chance
+    std = float(np.hypot(lines[1], max(APART_SHARE * apart, CHANCE_SHARE * around[1])))
     return (lines[0], std) if apart < AGREED_DEVIATIONS * around[1] and std < around[1] else around
 
 
@@ -330,7 +332,7 @@ def edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | Non
         edge, std = fitted(_noise_about(order[seen] * relative, (level * own).sum(axis=0)[seen] / count, flat))
     fastest = float(max(nominal, rotors.rates.max()))
     # where the orders mix at the edge, the tips of the fastest and of the slowest are all that is told apart
-    mixed = edge * relative / 2
+    mixed = edge * relative / np.sqrt(12)
     # and the fastest of rotors that were not found turns by so much faster than any that was
     hidden = edge * max(spread - float(np.ptp(rotors.rates)), 0.0) / nominal / 2
     return edge * fastest, float(np.hypot(std, mixed if mixed > MIXED_LINES else max(hidden, AROUND_LINES))) * fastest

@@ -12,19 +12,29 @@ from scipy import fft
 #: Blades that a fit to an unknown number of them tries, and how likely they are beforehand.
 BLADES = {1: 0.1, 2: 0.65, 3: 0.25}
 
-#: Likewise blades that reflect evenly, and points at their tips: a model of the literature rather than a blade. The
-#: lines of a drone measured with a tag on one blade speak for even blades against such that fade towards the tip.
-PROFILES = (0.95, 0.05)
+#: Likewise blades that reflect evenly, points at their tips, a model of the literature rather than a blade, and blades
+#: whose tips stand out: so much more than an even one's end does, in amplitude, whatever its phase.
+PROFILES, STANDS_OUT = (0.8, 0.05, 0.15), 2.5
+
+#: No blade reflects quite evenly: where a line is strong, at so large a share of the tip's order, tells how that place
+#: on the blade reflects. The logarithm of the powers follows these powers of the distance from the tip, each by a
+#: factor of this standard deviation. (Chords that taper to half at the tip, off by 2 % with none of it, are then off by
+#: less than 1 %.)
+BENDS, BEND_STD = (0.5, 1.0, 2.0), 1.5
 
 #: Lines so far below the family's level do not count: a share of its power, added to noise and lines alike. There is
 #: what strong lines leak, and what blades unlike the ideal ones put past the tip.
 LEAK_SHARE = 0.002
 
-#: As likely they leak no more than this share of it; which, shows where it is more than so large a share of the noise.
-LEAST_LEAK, LEAK_SEEN = 0.01, 0.1
+#: As likely they leak no more than this share of it, or of that once more; which, shows where it is more than so large
+#: a share of the noise.
+LEAST_LEAK, LEAK_SEEN, MOST_LEAKS = 0.01, 0.1, 3
 
 #: How unlike the model the powers of the lines may be: variances over the mean's square. The lines decide.
 SHARES = tuple(1e-6 * 4.0**step for step in range(11))
+
+#: The first search tries every so many-th of these, the others those about what is left.
+FIRST_SHARES = 5
 
 #: Each of these is so likely beforehand beside the one before it.
 SHARE_FALL = 0.6
@@ -32,8 +42,8 @@ SHARE_FALL = 0.6
 #: Widths of the roll-off, Gamma^(1/3) orders, past the tip that lines are followed.
 REACH = 3.0
 
-#: Gauss-Newton steps of the level.
-LEVEL_STEPS = 2
+#: Gauss-Newton steps of the level and its bends, none of them larger than this [nepers of power].
+LEVEL_STEPS, LONGEST_STEP = 2, 3.0
 
 #: Lines this weak beside a blade at rest, 60 dB under any that counts, are none: single precision leaves a third of it,
 #: and beyond so large a phase deviation [rad] more with its root.
@@ -64,7 +74,7 @@ COARSE_LEAK_SHARE = 0.03
 
 
 def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[np.float64]:
-    """Powers of the lines of rotors whose blades reflect evenly, and at the tip alone.
+    """Powers of the lines of rotors whose blades reflect as `PROFILES` says.
 
     Parameters
     ----------
@@ -77,7 +87,7 @@ def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[
 
     Returns
     -------
-    ndarray of float64, shape (2, tips, count)
+    ndarray of float64, shape (profiles, tips, count)
         Relative to a blade at rest.
     """
     widest = float(gamma.max())
@@ -94,14 +104,15 @@ def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[
     parts = [np.stack([sine / z, cosine])]
     if fold == 1:
         parts.append(np.stack([(1 - cosine) / z, sine]))
-    powers = np.empty((2, len(gamma), count))
+    amplitudes = np.empty((2, len(gamma), count))
     for odd, part in enumerate(parts):
         own = orders % 2 == odd if fold == 1 else slice(None)
-        powers[..., own] = fft.dct(part, 1)[..., orders[own]]
-    powers /= 2 * steps
+        amplitudes[..., own] = fft.dct(part, 1)[..., orders[own]]
+    amplitudes /= 2 * steps
     # or rounding would be lines of a family that ends far below them
-    powers *= np.abs(powers) > LEAST_AMPLITUDE * np.sqrt(np.maximum(gamma / EXACT_TO, 1.0))[:, None]
-    return powers**2
+    amplitudes *= np.abs(amplitudes) > LEAST_AMPLITUDE * np.sqrt(np.maximum(gamma / EXACT_TO, 1.0))[:, None]
+    even, tip = amplitudes**2
+    return np.stack([even, tip, even + STANDS_OUT**2 * gamma[:, None] ** (-4 / 3) * tip])
 
 
 def _spread_powers(gamma: NDArray[np.float64], blades: int, count: int, spread: float) -> NDArray[np.float64]:
@@ -125,53 +136,98 @@ def _spread_powers(gamma: NDArray[np.float64], blades: int, count: int, spread: 
     return powers
 
 
+def _solved(
+    matrix: dict[tuple[int, int], NDArray[np.float64]], vector: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Solutions of many small positive definite systems, and the logarithms of their determinants, by Cholesky.
+
+    The entries of the lower triangles stand by (row, column), those of each over the systems; likewise the vectors.
+    """
+    size = len(vector)
+    root: dict[tuple[int, int], NDArray[np.float64]] = {}
+    out = vector.copy()
+    for row in range(size):
+        for column in range(row + 1):
+            left = matrix[row, column] - sum(root[row, k] * root[column, k] for k in range(column))
+            root[row, column] = np.sqrt(left) if row == column else left / root[column, column]
+        for k in range(row):
+            out[row] -= root[row, k] * out[k]
+        out[row] /= root[row, row]
+    for row in reversed(range(size)):
+        for k in range(row + 1, size):
+            out[row] -= root[k, row] * out[k]
+        out[row] /= root[row, row]
+    return out, 2 * sum(np.log(root[row, row]) for row in range(size))
+
+
 def _log_likelihood(
     shape: NDArray[np.float64],
     power: NDArray[np.float64],
     noise: NDArray[np.float64],
     bins: NDArray[np.float64],
+    bends: NDArray[np.float64],
+    start: NDArray[np.float64],
     shares: NDArray[np.float64],
     leak: float,
-) -> NDArray[np.float64]:
-    """Log likelihood of line powers in noise, the family's level the likeliest, shape (shares, families).
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Log likelihood of line powers in noise, the family's level and bends the likeliest, shape (shares, families).
 
     A mean of |line + noise|^2 as a gamma law of the same mean and variance: exact for noise alone. The families of
-    `shape`, (lines, families), lie side by side in memory, as what is done to each line is the same for all.
+    `shape`, (lines, families), lie side by side in memory, as what is done to each line is the same for all; `bends`,
+    (lines, functions), begins with ones. The likeliest of all bends, from `start`, are given too.
     """
-    excess = power - noise
+    lines, families = shape.shape
+    each = (lines, len(shares.T), families)
+    excess = (power - noise)[:, None, None]
     beat, own = ((2 * noise / bins)[:, None, None], ((noise + leak) ** 2 / bins)[:, None, None])
-    by_line, shape = shares.T[:, :, None], shape[:, None]
+    by_line, shape = shares[:, :, None], shape[:, None]
     # past the edge of a narrow family there may be no line at all: its level is then anyone's guess
-    level = np.tensordot(excess, shape, 1) / np.maximum((shape**2).sum(axis=0), LEAST_SUM)
-    level = np.maximum(level, 1e-6)
-
-    def variance(line: NDArray[np.float64]) -> NDArray[np.float64]:
-        out = by_line * line
-        out += beat
-        out *= line
-        out += own
-        return out
-
+    like = shape * np.exp(bends[:, 1:] @ start)[:, None, None]
+    level = np.maximum((excess * like).sum(axis=0) / np.maximum((like**2).sum(axis=0), LEAST_SUM), 1e-6)
+    bent = np.empty((bends.shape[1], each[1] * families))
+    bent[0] = np.broadcast_to(np.log(level), each[1:]).ravel()
+    bent[1:] = start[:, None]
+    places = [(row, column) for row in range(len(bent)) for column in range(row + 1)]
+    pairs = np.stack([bends[:, row] * bends[:, column] for row, column in places])
+    # a level of any size is as likely, what is left of its logarithm counts as if it were known to one
+    known = np.array([1.0, *[BEND_STD**-2] * (len(bent) - 1)])
+    held = known * (np.arange(len(bent)) > 0)
     for _ in range(LEVEL_STEPS):
-        pull = variance(level * shape)
-        np.divide(shape, pull, out=pull)
-        newest = np.tensordot(excess, pull, 1)
-        fisher = np.multiply(pull, shape, out=pull).sum(axis=0)
-        level = np.maximum(newest / np.maximum(fisher, LEAST_SUM), 0.05 * level)
-    line = level * shape
+        line = np.exp(bends @ bent).reshape(each)
+        line *= shape
+        pull = line / _variance(line, by_line, beat, own)
+        score = bends.T @ ((excess - line) * pull).reshape(lines, -1) - held[:, None] * bent
+        information = dict(zip(places, pairs @ (line * pull).reshape(lines, -1), strict=True))
+        for row, information_before in enumerate(known):
+            information[row, row] += information_before
+        step, left = _solved(information, score)
+        bent += np.clip(step, -LONGEST_STEP, LONGEST_STEP)
+    line = np.exp(bends @ bent).reshape(each)
+    line *= shape
     mean = line + (noise + leak)[:, None, None]
     number = mean**2
-    number /= variance(line)
+    number /= _variance(line, by_line, beat, own)
     ratio = np.divide((power + leak)[:, None, None], mean, out=mean)
-    each = np.log(ratio)
-    each -= ratio
-    each += 1
-    each *= number
+    nats = np.log(ratio)
+    nats -= ratio
+    nats += 1
+    nats *= number
     # Stirling's series for the gamma function
-    each += np.multiply(0.5, np.log(number, out=ratio), out=ratio)
-    each -= np.divide(1 / 12, number, out=number)
-    # a level of any size is as likely: what the data leave of its logarithm
-    return np.asarray(each.sum(axis=0) - 0.5 * np.log(level**2 * fisher + 1), np.float64)
+    nats += np.multiply(0.5, np.log(number, out=ratio), out=ratio)
+    nats -= np.divide(1 / 12, number, out=number)
+    total = nats.sum(axis=0) - 0.5 * ((held[:, None] * bent**2).sum(axis=0) + left).reshape(each[1:])
+    return np.asarray(total, np.float64), bent[1:, int(total.argmax())]
+
+
+def _variance(
+    line: NDArray[np.float64], share: NDArray[np.float64], beat: NDArray[np.float64], own: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Variance of the mean power of a line: (share x line + beat) x line + own."""
+    out = share * line
+    out += beat
+    out *= line
+    out += own
+    return out
 
 
 def fit_edge(
@@ -202,7 +258,7 @@ def fit_edge(
     scatter : ndarray, shape (lines,), or float
         What is known beforehand of how unlike the model the lines' powers are: variance over the mean's square.
     leak : float
-        Share of the family's power that lines may leak past its edge: that much or `LEAST_LEAK` of it.
+        Share of the family's power that lines may leak past its edge: that much, or less by `LEAST_LEAK`.
     spread : float
         Range of several rotors' rates over their mean, in whose multiples the orders are counted: what lies about a
         high order is then of its neighbours too.
@@ -224,8 +280,11 @@ def fit_edge(
     scatter = np.broadcast_to(scatter, power.shape)
     prior = SHARE_FALL ** np.arange(len(SHARES))
     prior = np.append(prior[: len(SHARES) - len(every) + 1].sum(), prior[len(SHARES) - len(every) + 1 :])
-    few = np.arange(len(every))[::-3]
-    leaks = (leak, LEAST_LEAK * leak) if leak * loud > LEAK_SEEN * float(noise.mean()) else (leak,)
+    few = np.arange(len(every))[::-FIRST_SHARES]
+    bent, edge = np.zeros(len(BENDS)), high
+    leaks = [leak]
+    while len(leaks) < MOST_LEAKS and leaks[-1] * loud > LEAK_SEEN * float(noise.mean()):
+        leaks.append(LEAST_LEAK * leaks[-1])
     for search in range(SEARCHES):
         edges = np.arange(max(low, LEAST_EDGE), high + step, step)
         # the first that is seen may lie past where the edge is sought: that nothing is there speaks too
@@ -233,10 +292,14 @@ def fit_edge(
         count = int(order[near][-1])
         shapes = [_spread_powers(number * edges, number, count, spread)[..., order[near] - 1] for number in choices]
         families = np.ascontiguousarray(np.stack(shapes).reshape(-1, int(near.sum())).T)
-        data = (families, power[near], noise[near], bins[near], every[few, None] + scatter[near])
+        # how far from the tip each line speaks of
+        away = np.clip(1 - order[near] / edge, 0, 1)
+        bends = np.stack([away**exponent for exponent in (0.0, *BENDS)], axis=1)
+        data = (families, power[near], noise[near], bins[near], bends, bent, (every[few, None] + scatter[near]).T)
         # the first search asks the one of less sharp an edge alone: it only says about which lines to look
-        nats = np.stack([_log_likelihood(*data, share * loud) for share in leaks[: 1 + search]])
-        weight = np.moveaxis(nats.reshape(*nats.shape[:2], len(choices), 2, len(edges)), (0, 1), (4, 3))
+        said = [_log_likelihood(*data, share * loud) for share in (leaks if search else leaks[:1])]
+        nats, bent = np.stack([one for one, _ in said]), max(said, key=lambda one: float(one[0].max()))[1]
+        weight = np.moveaxis(nats.reshape(*nats.shape[:2], len(choices), len(PROFILES), len(edges)), (0, 1), (4, 3))
         weight += np.log(np.outer([BLADES.get(number, 1.0) for number in choices], PROFILES))[..., None, None, None]
         weight += np.log(prior[few] / edges[:, None])[..., None]
         weight = np.exp(weight - weight.max())
