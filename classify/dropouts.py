@@ -1,4 +1,4 @@
-"""Whether pulses were lost: samples that are exactly 0 where hardly any is nearly 0."""
+"""Whether pulses were lost: samples that are exactly 0 where hardly any is nearly 0; and what they would have held."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +11,20 @@ NEAR_STEPS, NEAR_SHARE, LEAST_LOST = 2.1, 0.5, 3
 #: More zeros in a row are silence, which is no comb, and too long to be filled in.
 MOST_IN_A_ROW = 32
 
+#: A pulse is told from so many before and after it at most, by laws fitted to so many at a time and those beside them,
+#: each to as many stretches without a lost one as this for every pulse it tells from. With a law of fewer than two
+#: nothing is filled in.
+MOST_ORDERS, BLOCK, STRETCHES = 32, 8192, 6
+
+#: Share of the mean power that holds a law's coefficients back: next to nothing beside any noise.
+RIDGE = 1e-10
+
 #: Fewer sizes that differ are a converter's that hardly steps at all: it gives 0 most of the time.
 LEAST_DISTINCT = 8
 
 
-def lost_pulses(iq: NDArray[np.complex64]) -> int:
-    """Count the pulses that hold nothing at all, not even noise.
+def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
+    """Find the pulses that hold nothing at all, not even noise.
 
     Each spoils every line of the spectrum as an impulse would; a few of them, of whatever spacing, look like a rotor's
     flashes.
@@ -28,20 +36,107 @@ def lost_pulses(iq: NDArray[np.complex64]) -> int:
 
     Returns
     -------
-    int
-        0 where nothing speaks of lost ones: no zeros, no more than a converter of coarse steps gives of noise, or
-        nothing else. Zeros of longer silences are not counted.
+    ndarray of bool, same shape
+        False everywhere where nothing speaks of lost ones: no zeros, no more than a converter of coarse steps gives of
+        noise, or nothing else. Zeros of longer silences are no lost pulses.
     """
+    none = np.zeros(len(iq), bool)
     size = np.maximum(np.abs(iq.real), np.abs(iq.imag))
     there = size > 0
-    runs = np.diff(np.flatnonzero(np.concatenate([[True], there, [True]]))) - 1  # of zeros between those that are there
-    zeros = int(runs[runs <= MOST_IN_A_ROW].sum())
+    # runs of zeros between those that are there
+    runs = np.diff(np.flatnonzero(np.concatenate([[True], there, [True]]))) - 1
+    lost = none.copy()
+    lost[~there] = np.repeat(runs, runs) <= MOST_IN_A_ROW
+    zeros = int(lost.sum())
     if zeros < LEAST_LOST or not there.any():
-        return 0
+        return none
     held = np.sort(size[there])
     steps = np.diff(held)
     steps = steps[steps > 0]
     if len(steps) + 1 < LEAST_DISTINCT:
-        return 0
+        return none
     near = np.searchsorted(held, np.float32(NEAR_STEPS) * np.median(steps), side="right")
-    return zeros if zeros > NEAR_SHARE * near else 0
+    return lost if zeros > NEAR_SHARE * near else none
+
+
+def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.complex64]:
+    """Fill in lost pulses from those before and after them.
+
+    By the law by which each pulse of a block follows from those beside it (an autoregressive one, fitted forwards and
+    backwards), those that are missing are what leaves the least of it unexplained: exact for a few lines, and of noise
+    next to nothing, so that they draw no line of their own.
+
+    Parameters
+    ----------
+    iq
+        Samples of one recording, shape (pulses,), finite.
+    lost
+        From `lost_pulses`, same shape.
+
+    Returns
+    -------
+    ndarray of complex64, same shape
+        Where too many are lost for any law, as they were.
+
+    References
+    ----------
+    Janssen, Veldhuis and Vries, "Adaptive interpolation of discrete-time signals that can be modeled as autoregressive
+    processes", IEEE Trans. ASSP 34 (1986).
+    """
+    out = iq.copy()
+    for block in np.array_split(np.arange(len(iq)), max(len(iq) // BLOCK, 1)):
+        own = lost[block]
+        if own.any():
+            start = max(block[0] - 2 * MOST_ORDERS, 0)
+            part = slice(start, block[-1] + 1 + 2 * MOST_ORDERS)
+            out[block[own]] = _filled_block(iq[part].astype(np.complex128), lost[part])[block[own] - start]
+    return out
+
+
+def _filled_block(iq: NDArray[np.complex128], lost: NDArray[np.bool_]) -> NDArray[np.complex128]:
+    """`filled` of a block that one law holds for."""
+    from scipy.linalg import solveh_banded  # here, because whole recordings need no such import
+
+    orders = min(MOST_ORDERS, len(iq) // 2)
+    while orders > 1:
+        clear = (
+            ~np.lib.stride_tricks.sliding_window_view(lost, orders + 1).any(axis=1) if len(iq) > orders else lost[:0]
+        )
+        if clear.sum() >= STRETCHES * orders:
+            break
+        orders //= 2
+    else:
+        return iq
+    stretches = np.lib.stride_tricks.sliding_window_view(iq, orders + 1)[clear]
+    # the last pulse of each from those before it, and the first, conjugated, from those after it
+    both = np.concatenate([stretches[:, ::-1], stretches.conj()])
+    products = both.conj().T @ both
+    products.flat[:: orders + 2] += RIDGE * products.trace().real / (orders + 1)
+    law = np.concatenate([[1.0], -np.linalg.solve(products[1:, 1:], products[1:, 0])])
+    # what the law leaves unexplained of all pulses that have as many before them, or after them, squared and summed: of
+    # pulses so far apart their products, but for the ends, where one of both counts
+    apart = np.correlate(law, law, "full")[orders:]
+    places, steps = np.flatnonzero(lost), np.arange(orders)
+    known = np.where(lost, 0, iq)
+    pull = np.convolve(known, np.concatenate([apart[:0:-1].conj(), apart]))[orders : orders + len(iq)]
+    row, column = np.indices((orders, orders))
+    first = np.where(row >= column, law[np.maximum(row - column, 0)], 0)
+    last = np.where(row <= column, law[orders - np.maximum(column - row, 0)], 0)
+    first, last = first.conj().T @ first, last.conj().T @ last
+    first, last = (first + last[::-1, ::-1].conj()) / 2, (last + first[::-1, ::-1].conj()) / 2
+    ends = [(0, first), (len(iq) - orders, last)]
+    for start, excess in ends:
+        pull[start + steps] -= excess @ known[start + steps]
+    # of pulses further apart than the law reaches none, and the lower triangle by its diagonals
+    bands = np.zeros((min(orders + 1, len(places)), len(places)), np.complex128)
+    for below in range(len(bands)):
+        one, other = places[below:], places[: len(places) - below]
+        step = one - other
+        bands[below, : len(step)] = np.where(step <= orders, apart[np.minimum(step, orders)], 0)
+        for start, excess in ends:
+            both_there = np.flatnonzero((other >= start) & (one < start + orders))
+            bands[below, both_there] -= excess[one[both_there] - start, other[both_there] - start]
+    out = iq.copy()
+    bands[0] *= 1 + RIDGE  # or rounding might undo what holds them
+    out[places] = -solveh_banded(bands, pull[places], lower=True)
+    return out

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .arrays import ARRAY_SUFFIXES, read_array
 from .clipping import clipped_values
-from .dropouts import lost_pulses
+from .dropouts import filled, lost_pulses
 from .errors import BadInput
 from .samples import complex_samples, positive
 from .sigmf_file import find_sigmf, read_sigmf
@@ -31,6 +31,8 @@ class Recording:
         Carrier and pulse repetition frequency [Hz].
     start_s
         Time of the first sample [s]; above 0 where a SigMF file says that it goes on from an earlier one.
+    filled_in
+        How many pulses were lost, and are filled in from those beside them.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Recording:
     carrier_hz: float
     prf_hz: float
     start_s: float = 0.0
+    filled_in: int = 0
 
     def dwells(self, dwell_s: float, least: int = 1) -> NDArray[np.complex64]:
         """Cut the recording into dwells that follow one another; a rest shorter than a dwell is left out.
@@ -92,9 +95,14 @@ class Recording:
         if clipped := clipped_values(self.iq):
             said.append(
                 f"clipped: {clipped} values of I and Q stand at the converter's largest, which makes lines that are no "
-                "target's: lower the gain"
+                "target's, so that no comb that stays is counted: lower the gain"
             )
-        if lost := lost_pulses(self.iq):
+        if self.filled_in:
+            said.append(
+                f"lost: {self.filled_in} of {len(self.iq)} pulses were exactly 0, which would draw lines that are no "
+                "target's: they are filled in from those beside them"
+            )
+        if lost := int(lost_pulses(self.iq).sum()):
             said.append(
                 f"lost: {lost} of {len(self.iq)} pulses are exactly 0, which draws lines that are no target's beside "
                 "every line: interpolate them from their neighbours"
@@ -154,7 +162,9 @@ def load_recording(
         raise BadInput(f"{name}: the file says no carrier (SigMF core:frequency): give --carrier-hz [Hz]")
     if prf is None:
         raise BadInput(f"{name}: the file says no PRF (SigMF core:sample_rate): give --prf-hz [Hz]")
-    return Recording(name, iq, carrier, prf, first / prf)
+    lost = lost_pulses(iq)
+    whole = filled(iq, lost) if lost.any() else iq
+    return Recording(name, whole, carrier, prf, first / prf, int(lost.sum() - lost_pulses(whole).sum()))
 
 
 def find_recording(path: str | os.PathLike[str]) -> Path:

@@ -6,6 +6,7 @@ import re
 import tarfile
 import warnings
 from contextlib import suppress
+from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -25,6 +26,12 @@ _META, _DATA = ".sigmf-meta", ".sigmf-data"
 
 #: Where a capture begins in what the receiver gave, whole.
 _INDEX = "core:global_index"
+
+#: When it began. Of two captures the times differ by what lies between them but for what a computer's clock is off by,
+#: where they have fractions of a second, and else for their rounding [s]; and by this share of it.
+_TIME = "core:datetime"
+_CLOCK_S, _ROUNDED_S, _DRIFT = 0.1, 1.5, 1e-3
+
 _MOST_COUNT = 1 << 63  # JSON's whole numbers have no end, and what is reckoned with them would leave every type
 _ARCHIVES = (".sigmf", ".sigmf.gz", ".sigmf.xz", ".sigmf.zip")
 _DATATYPE = re.compile(r"([cr])(?!f8|f16)([fiu])(8|16|32|64)(_le|_be)?")
@@ -203,8 +210,9 @@ def _check_structure(metadata: Any, path: Path) -> None:
             entry["core:sample_start"] = _count(entry, "core:sample_start", f"{path}: {section}[{index}]")
             if "core:sample_count" in entry:
                 _count(entry, "core:sample_count", f"{path}: {section}[{index}]")
-    _check_captures(metadata["captures"], path)
     general = metadata["global"]
+    _check_captures(metadata["captures"], path)
+    _check_times(metadata["captures"], general.get("core:sample_rate"), path)
     datatype = general.get("core:datatype")
     match = _DATATYPE.fullmatch(datatype) if isinstance(datatype, str) else None
     if match is None:
@@ -243,6 +251,33 @@ def _check_captures(captures: list[dict[str, Any]], path: Path) -> None:
                 f"{path}: {missing} samples are missing between captures[{before}] and captures[{after}] "
                 f"({_INDEX}): store each run in a recording of its own"
             )
+
+
+def _check_times(captures: list[dict[str, Any]], prf_hz: object, path: Path) -> None:
+    """Nor may time have gone by between captures that follow one another without a hole in their samples."""
+    if isinstance(prf_hz, bool) or not isinstance(prf_hz, int | float) or not prf_hz > 0:
+        return  # it is missing or wrong: that is told elsewhere
+    for (before, one), (after, two) in pairwise(enumerate(captures)):
+        begun = [_time(entry.get(_TIME)) for entry in (one, two)]
+        if begun[0] is None or begun[1] is None:
+            continue
+        lasted_s = (two["core:sample_start"] - one["core:sample_start"]) / prf_hz
+        apart_s = (begun[1][0] - begun[0][0]).total_seconds()
+        within_s = _CLOCK_S if begun[0][1] and begun[1][1] else _ROUNDED_S
+        if apart_s > lasted_s + within_s + _DRIFT * lasted_s:
+            raise BadInput(
+                f"{path}: captures[{after}] begins {apart_s:.6g} s after captures[{before}] ({_TIME}), whose samples "
+                f"last {lasted_s:.6g} s: store each run in a recording of its own"
+            )
+
+
+def _time(text: object) -> tuple[datetime, bool] | None:
+    """The time that a field says, and whether it has fractions of a second; None where it says none."""
+    with suppress(ValueError):
+        if isinstance(text, str):
+            given = datetime.fromisoformat(text)
+            return given if given.tzinfo else given.replace(tzinfo=UTC), "." in text
+    return None
 
 
 def _count(entry: dict[str, Any], field: str, where: str, absent: int = 0) -> int:

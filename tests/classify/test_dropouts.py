@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from bladewing.classify.dropouts import lost_pulses
+from bladewing.classify import Classifier, answer, load_recording
+from bladewing.classify.dropouts import filled, lost_pulses
 from bladewing.classify.recording import Recording
 
 
@@ -17,8 +18,8 @@ def test_zeros_among_samples_without_steps_are_lost_pulses(lost: int, line: floa
     rng = np.random.default_rng(lost)
     iq = noise(rng) + np.complex64(line)
     iq[rng.choice(len(iq), lost, replace=False)] = 0
-    assert lost_pulses(iq) == lost
-    assert lost_pulses(iq * np.complex64(1e-30j)) == lost  # of any gain and phase
+    assert lost_pulses(iq).sum() == lost
+    assert lost_pulses(iq * np.complex64(1e-30j)).sum() == lost  # of any gain and phase
 
 
 @pytest.mark.parametrize("steps", [0.5, 1.0, 2.0, 3.0, 5.0])
@@ -27,28 +28,28 @@ def test_zeros_that_a_converter_gives_of_weak_noise_are_none(steps: float, chann
     given = noise(np.random.default_rng(1)) * np.float32(steps)
     iq = np.round(given.real) + 1j * np.round(given.imag) * (channels == 2)
     assert np.any(iq == 0)
-    assert lost_pulses(iq.astype(np.complex64)) == 0
+    assert not lost_pulses(iq.astype(np.complex64)).any()
 
 
 def test_zeros_among_the_steps_of_a_strong_line_are_lost_pulses() -> None:
     rng = np.random.default_rng(2)
     iq = np.round(100 * np.exp(0.3j * np.arange(4000)) + 3 * noise(rng)).real.astype(np.complex64) + 40j
     iq[::97] = 0
-    assert lost_pulses(iq.astype(np.complex64)) == len(iq[::97])
+    assert np.flatnonzero(lost_pulses(iq.astype(np.complex64))).tolist() == list(range(0, len(iq), 97))
 
 
 def test_nothing_at_all_and_nothing_lost_are_no_dropouts() -> None:
-    assert lost_pulses(np.zeros(100, np.complex64)) == 0
-    assert lost_pulses(noise(np.random.default_rng(3))) == 0
-    assert lost_pulses(np.zeros(0, np.complex64)) == 0
+    assert not lost_pulses(np.zeros(100, np.complex64)).any()
+    assert not lost_pulses(noise(np.random.default_rng(3))).any()
+    assert not lost_pulses(np.zeros(0, np.complex64)).any()
 
 
 def test_a_silence_is_no_lost_pulses() -> None:
     iq = noise(np.random.default_rng(5))
     iq[1000:2000] = 0
-    assert lost_pulses(iq) == 0
+    assert not lost_pulses(iq).any()
     iq[10:20] = 0
-    assert lost_pulses(iq) == 10
+    assert np.flatnonzero(lost_pulses(iq)).tolist() == list(range(10, 20))
 
 
 def test_a_recording_tells_of_a_channel_that_is_missing() -> None:
@@ -66,3 +67,67 @@ def test_a_recording_tells_of_them_and_how_many() -> None:
     recording = Recording("walk", iq, 24e9, 1e4)
     (said,) = recording.remarks(0.1, recording.dwells(0.1))
     assert said.startswith("lost: 10 of 2000 pulses are exactly 0")
+
+
+PULSES = np.arange(20000)
+PATTERNS = {
+    "each 97th": PULSES % 97 == 0,
+    "each 7th": PULSES % 7 == 0,
+    "a fifth at random": np.random.default_rng(7).random(len(PULSES)) < 0.2,
+    "ten in a row": PULSES % 400 < 10,
+    "at the ends": (PULSES < 20) | (len(PULSES) - 20 <= PULSES),
+}
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+@pytest.mark.parametrize("lines", [{0.003: 100.0}, {0.31: 1000.0}, {0.01: 100.0, -0.22: 30j}, {}])
+def test_lost_pulses_are_filled_in_by_what_they_held(pattern: str, lines: dict[float, complex]) -> None:
+    lost = PATTERNS[pattern]
+    clear = sum((amplitude * np.exp(2j * np.pi * f * PULSES) for f, amplitude in lines.items()), np.zeros(len(PULSES)))
+    whole = (clear + noise(np.random.default_rng(8), len(PULSES))).astype(np.complex64)
+    given = np.where(lost, 0, whole)
+    found = filled(given, lost_pulses(given))
+    np.testing.assert_array_equal(found[~lost], whole[~lost])
+    # of lines of up to 60 dB less is wrong than there is noise, and none of the noise is made up
+    assert np.mean(np.abs(found - clear)[lost] ** 2) < 0.5
+
+
+def test_too_many_lost_pulses_are_left_as_they_were() -> None:
+    iq = np.where(PULSES % 2, noise(np.random.default_rng(9), len(PULSES)), 0)
+    np.testing.assert_array_equal(filled(iq, lost_pulses(iq)), iq)
+    few = np.array([1, 2j, 0, 0, 0, 3], np.complex64)
+    np.testing.assert_array_equal(filled(few, few == 0), few)
+
+
+def test_a_short_recording_and_one_without_noise_are_filled_in_too() -> None:
+    for pulses in (64, 700):
+        whole = np.exp(0.3j * np.arange(pulses)).astype(np.complex64)
+        lost = np.arange(pulses) % 20 == 11
+        found = filled(np.where(lost, 0, whole), lost)
+        assert np.isfinite(found).all()
+        np.testing.assert_allclose(found, whole, atol=0.02)
+
+
+def test_lost_pulses_of_a_recording_draw_no_rotor(tmp_path) -> None:
+    """Of each 97th pulse that was lost, ground was once a UAV, surely, with a comb of 258 Hz."""
+    whole = (100 + noise(np.random.default_rng(10), len(PULSES))).astype(np.complex64)
+    whole[::97] = 0
+    np.save(tmp_path / "ground.npy", whole)
+    recording = load_recording(tmp_path / "ground.npy", carrier_hz=9.85e9, prf_hz=25e3)
+    given = answer(recording, Classifier.load())
+    assert given.track.label != "uav"
+    assert not set(given.dwells.labels) & {"uav"}
+    assert given.shown == {}
+    (said,) = given.remarks
+    assert said.startswith("lost: 207 of 20000 pulses were exactly 0")
+    assert said.endswith("filled in from those beside them")
+
+
+def test_of_a_recording_that_clips_no_comb_that_stays_is_counted(tmp_path) -> None:
+    line = 100 * np.exp(2j * np.pi * 20 / 25e3 * PULSES) + noise(np.random.default_rng(11), len(PULSES))
+    clipped = np.clip(line.real, -70, 70) + 1j * np.clip(line.imag, -70, 70)
+    np.save(tmp_path / "clipped.npy", clipped.astype(np.complex64))
+    given = answer(load_recording(tmp_path / "clipped.npy", carrier_hz=9.85e9, prf_hz=25e3), Classifier.load())
+    assert "comb" not in given.shown  # of 80 Hz, four times the line's own
+    assert set(given.dwells.labels) == {"unknown"}
+    assert "no comb that stays is counted" in given.remarks[0]

@@ -306,3 +306,27 @@ def test_a_hole_between_captures_is_refused_and_the_first_index_is_the_start(sig
         load_recording(sigmf_pair(captures=[capture(3), capture(0)]))
     with pytest.raises(BadInput, match="must be a whole number"):
         load_recording(sigmf_pair(captures=[capture(0, **{index: "1"})]))
+
+
+@pytest.mark.parametrize(
+    ("times", "hole"),
+    [
+        (("2026-01-01T00:00:00.000Z", "2026-01-01T00:00:00.003Z"), False),
+        (("2026-01-01T00:00:00.000Z", "2026-01-01T00:00:10.000Z"), True),
+        (("2026-01-01T00:00:00.00Z", "2026-01-01T00:00:00.5Z"), True),
+        (("2026-01-01T00:00:00Z", "2026-01-01T00:00:01Z"), False),  # of whole seconds they may be one apart
+        (("2026-01-01T00:00:00", "2026-01-01T00:00:10Z"), True),
+        (("yesterday", "2026-01-01T00:00:10Z"), False),
+        ((None, "2026-01-01T00:00:10Z"), False),
+    ],
+)
+def test_captures_between_which_time_went_by_are_refused(sigmf_pair, times, hole):
+    captures = [
+        capture(start, **({"core:datetime": time} if time else {})) for start, time in zip((0, 3), times, strict=True)
+    ]
+    path = sigmf_pair(captures=captures)
+    if not hole:
+        load_recording(path)
+        return
+    with pytest.raises(BadInput, match=r"captures\[1\] begins .* s after captures\[0\] .*: store each run in a rec"):
+        load_recording(path)
