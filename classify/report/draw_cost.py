@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, PercentFormatter
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from .series import looks
 from .svg import INK, MUTED, PAPER, SERIES, Panel, drawing, panel
+from .ticks import log_ticks, percent_ticks
 from .words import batch_words, count, micros, number, percent, size, spoken
 
 _BLUE = SERIES[2]
@@ -19,15 +19,8 @@ _BLUE = SERIES[2]
 
 def _log_times(axes: Axes, label: str) -> None:
     axes.set_xscale("log")
-    _numbered(axes.xaxis, axes.get_xlim())
+    log_ticks(axes.xaxis, axes.get_xlim())
     axes.set_xlabel(label)
-
-
-def _numbered(axis: Axis, ends: tuple[float, float]) -> None:
-    """Numbers on a logarithmic axis: every decade alone would leave a short one without any."""
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5) if ends[1] < 100 * ends[0] else (1,)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def front(report: Mapping[str, Any]) -> list[Panel]:
@@ -60,8 +53,7 @@ def front(report: Mapping[str, Any]) -> list[Panel]:
                 )
             axes.margins(x=0.12, y=0.12)
             _log_times(axes, "whole chain, IQ to probabilities [µs a record]")
-            axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
-            axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+            percent_ticks(axes.yaxis)
             axes.set_ylabel("balanced accuracy")
             title = batch_words(part["batch"])
             words = [
@@ -159,7 +151,7 @@ def time_law(report: Mapping[str, Any]) -> list[Panel]:
             axes.set_yscale("log")
             axes.set_xlabel("operations, 5 N log₂ N a transform")
             axes.set_ylabel("time [µs]")
-            _numbered(axes.yaxis, axes.get_ylim())
+            log_ticks(axes.yaxis, axes.get_ylim())
             axes.xaxis.set_minor_formatter(NullFormatter())
             said = f"{micros(law['call_us'])} and {number(law['ns_each'])} ns an operation"
             alt = f"{title}: {said}; the farthest point lies {number(law['worst_factor'])} times off this law."

@@ -46,9 +46,10 @@ def examples(report: Mapping[str, Any]) -> list[Panel]:
             title = f"{one['class']}: {spoken(one['kind'])}, {snr}"
             top = max(spectrum["level_db"])
             at = spectrum["velocity_mps"][spectrum["level_db"].index(top)]
-            seen = found["reason"] or (
-                f"a comb every {number(found['chopping_hz'])} Hz, band {number(found['band_hz'] or 0.0)} Hz"
-            )
+            seen = found["reason"]
+            if found["chopping_hz"] is not None:
+                band = "no band" if found["band_hz"] is None else f"band {number(found['band_hz'])} Hz"
+                seen = f"a comb every {number(found['chopping_hz'])} Hz, {band}"
             alt = (
                 f"STFT picture and spectrum of a {title}, dwell {number(1e3 * one['dwell_s'])} ms; the strongest line "
                 f"stands {number(top)} dB over the noise at {number(at)} m/s. Measured: {seen}."

@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator, PercentFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from .draw_scores import LEAST_RECORDS
 from .series import choice_looks
 from .svg import INK, MUTED, PAPER, SERIES, Panel, banded, drawing, panel
-from .words import batch_words, micros, millis, number, percent, size
+from .ticks import log_ticks, percent_ticks, share_axis
+from .words import batch_words, micros, millis, percent, size
 
 #: Letters of the points that nothing beats, in the order of their cost.
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
@@ -68,11 +69,9 @@ def time_front(report: Mapping[str, Any]) -> list[Panel]:
                     markersize=6,
                 )
             _label(axes, x, y, [letter for letter, _, _ in best])
-            axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if _decades(axes) < 2 else (1,)))
-            axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
-            axes.xaxis.set_minor_formatter(NullFormatter())
+            log_ticks(axes.xaxis, axes.get_xlim())
             axes.set_xlabel("IQ to probabilities [µs a record]")
-            axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+            percent_ticks(axes.yaxis)
             axes.set_ylabel("balanced accuracy")
             title = batch_words(first["batch"]).capitalize()
             words = "; ".join(
@@ -83,12 +82,6 @@ def time_front(report: Mapping[str, Any]) -> list[Panel]:
             alt = f"Balanced accuracy against time, {title.lower()}. Not beaten: {words}."
             panels.append(panel(figure, name=f"choices-{first['batch']}", title=title, alt=alt))
     return panels
-
-
-def _decades(axes: Axes) -> float:
-    low, high = axes.get_xlim()
-    found: float = len(str(round(high / low))) - 1
-    return found
 
 
 def _label(axes: Axes, x: Sequence[float], y: Sequence[float], texts: Sequence[str]) -> None:
@@ -132,7 +125,7 @@ def by_dwell(report: Mapping[str, Any]) -> list[Panel]:
                 axes.set_xticks(x, [f"{value:g}" for value in x])
                 axes.xaxis.set_minor_locator(NullLocator())
                 axes.set_xlabel("dwell [ms]")
-                _share(axes, label)
+                share_axis(axes, label)
                 said = label[0].upper() + label[1:]
                 alt = f"{said} against the dwell, {title}, shortest to longest. {' '.join(words)}"
                 panels.append(panel(figure, name=f"dwells-{slug}-{key}", title=f"{title}: {label}", alt=alt))
@@ -140,10 +133,12 @@ def by_dwell(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def by_snr(report: Mapping[str, Any]) -> list[Panel]:
-    """UAVs found against the SNR at one dwell, with what no detector in white noise can exceed."""
+    """UAVs found against the SNR at one dwell, with what no detector in white noise can exceed; where any are known."""
     panels = []
     front = report["front"]
     for slug, title, rows in _groups(report):
+        if not any(one["found"]["count"] >= LEAST_RECORDS for row, _ in rows for one in row["uav_by_snr"]):
+            continue
         with drawing(height_in=3.0) as (figure, axes):
             for curve, style in zip(front["bounds"], ((0, ()), (0, (5, 2)), (0, (1, 1.5))), strict=True):
                 axes.plot(curve["snr_db"], curve["found"], color=INK, linewidth=1.0, linestyle=style)
@@ -158,7 +153,7 @@ def by_snr(report: Mapping[str, Any]) -> list[Panel]:
                 words.append(f"{_name(row)}: {percent(rates[-1]['value'])} at the highest SNR.")
             axes.set_xlim(left=-35)
             axes.set_xlabel("SNR of the rotors, a sample [dB]")
-            _share(axes, "UAVs found")
+            share_axis(axes, "UAVs found")
             alt = f"UAVs found against SNR, {title}, beside the bound of detection. {' '.join(words)}"
             panels.append(panel(figure, name=f"bound-{slug}", title=title, alt=alt))
     return panels
@@ -193,7 +188,7 @@ def stored(report: Mapping[str, Any]) -> list[Panel]:
         axes.xaxis.set_minor_locator(NullLocator())
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: size(value)))
         axes.set_xlabel("a record; MB for a million records")
-        axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+        percent_ticks(axes.yaxis)
         axes.set_ylabel("balanced accuracy")
         alt = f"Balanced accuracy against stored bytes. {' '.join(words)}"
         return [panel(figure, name="stored", title="64 to 1024 bins, left to right; ringed: not beaten", alt=alt)]
@@ -211,9 +206,3 @@ def _groups(report: Mapping[str, Any]) -> list[tuple[str, str, list[tuple[Mappin
 
 def _name(row: Mapping[str, Any]) -> str:
     return str(row["name"] if row["kind"] == "model" else row["words"])
-
-
-def _share(axes: Axes, label: str) -> None:
-    axes.set_ylim(0, 1.02)
-    axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
-    axes.set_ylabel(label)

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, PercentFormatter
+from matplotlib.ticker import FuncFormatter
 
 from .series import looks
 from .svg import MUTED, NARROW_IN, SERIES, Panel, banded, drawing, panel
+from .ticks import percent_ticks, share_axis
 from .words import percent, spoken
 
 GROUPS = ("all", "uav", "bird", "clutter")
@@ -25,7 +26,7 @@ def accuracy_by_snr(report: Mapping[str, Any]) -> list[Panel]:
         with drawing(height_in=2.5, width_in=NARROW_IN) as (figure, axes):
             alt = _lines(axes, report, "by_snr", group, centre=lambda low, high: (low + high) / 2)
             axes.set_xlabel("SNR, a sample [dB]")
-            _share_axis(axes, "answered right")
+            share_axis(axes, "answered right")
             alt = f"Accuracy against SNR, {_TITLES[group].lower()}. {alt}"
             panels.append(panel(figure, name=f"snr-{group}", title=_TITLES[group], alt=alt))
     return panels
@@ -41,7 +42,7 @@ def accuracy_by_dwell(report: Mapping[str, Any]) -> list[Panel]:
             axes.set_xlabel("dwell [ms]")
             axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
             axes.xaxis.set_minor_formatter(FuncFormatter(lambda *_: ""))
-            _share_axis(axes, "answered right")
+            share_axis(axes, "answered right")
             alt = f"Accuracy against dwell, {_TITLES[group].lower()}. {alt}"
             panels.append(panel(figure, name=f"dwell-{group}", title=_TITLES[group], alt=alt))
     return panels
@@ -65,12 +66,6 @@ def _lines(axes: Axes, report: Mapping[str, Any], by: str, group: str, *, centre
     return " ".join(words)
 
 
-def _share_axis(axes: Axes, label: str) -> None:
-    axes.set_ylim(0, 1.02)
-    axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
-    axes.set_ylabel(label)
-
-
 def accuracy_by_beta(report: Mapping[str, Any]) -> list[Panel]:
     """UAVs answered right and found, against the angle their rotors are seen at."""
     panels = []
@@ -89,7 +84,7 @@ def accuracy_by_beta(report: Mapping[str, Any]) -> list[Panel]:
             axes.set_xlim(0, 90)
             axes.set_xticks(range(0, 91, 15))
             axes.set_xlabel("β, line of sight to rotor plane [°]")
-            _share_axis(axes, "share of UAVs")
+            share_axis(axes, "share of UAVs")
             alt = f"{title} against the angle beta. {' '.join(words)}"
             panels.append(panel(figure, name=f"beta-{key}", title=title, alt=alt))
     return panels
@@ -114,9 +109,9 @@ def reliability(report: Mapping[str, Any]) -> list[Panel]:
             above = [one["accuracy"]["high"] - one["accuracy"]["value"] for one in found["bins"]]
             axes.errorbar(x, y, yerr=[below, above], color=look.colour, marker=look.marker, elinewidth=0.9)
             axes.set_xlim(0, 1.02)
-            axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+            percent_ticks(axes.xaxis)
             axes.set_xlabel("probability given to the answer")
-            _share_axis(axes, "answered right")
+            share_axis(axes, "answered right")
             ece = f"expected calibration error {percent(found['ece'])}"
             title = f"{name}, error {percent(found['ece'])}"
             alt = f"Reliability of {name}: {ece} over {total} records; {_worst_bin(found['bins'])}"
@@ -201,7 +196,7 @@ def _named_rows(axes: Axes, names: Sequence[str]) -> None:
     axes.set_ylim(max(len(names), 1) - 0.5, -0.5)
     axes.set_yticks(range(len(names)), names)
     axes.tick_params(axis="y", length=0)
-    axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+    percent_ticks(axes.xaxis)
 
 
 def _slug(name: str) -> str:

@@ -40,11 +40,11 @@ def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, 
     -------
     list of dict
         One a class present: ``class``, ``kind``, ``snr_db`` (or None), ``dwell_s``, ``spectrum`` (``velocity_mps``,
-        ``level_db`` above the noise floor), ``measured`` (``reason`` why there is no comb, else ""; ``body_mps``,
-        ``chopping_hz``, ``chopping_mps``, ``orders``, ``band_hz``, ``band_mps`` [slowest, fastest], ``tip_mps``; None
-        where there is no value; ``notches_mps``: pairs) and ``picture`` (``velocity_mps`` [first, last], ``time_s``
-        [first, last], ``level_db`` rows of whole numbers, one a velocity, above the median over all velocities).
-        Velocities are cut where nothing is left to see.
+        ``level_db`` above the noise floor), ``measured`` (``reason`` why there is no comb or no band, else "";
+        ``body_mps``, ``chopping_hz``, ``chopping_mps``, ``orders``, ``band_hz``, ``band_mps`` [slowest, fastest],
+        ``tip_mps``; None where there is no value; ``notches_mps``: pairs) and ``picture`` (``velocity_mps`` [first,
+        last], ``time_s`` [first, last], ``level_db`` rows of whole numbers, one a velocity, above the median over all
+        velocities). Velocities are cut where nothing is left to see.
     """
     radar, shown = records.radar, []
     for name in classes:
@@ -115,7 +115,7 @@ def _measured(radar: Radar, iq: NDArray[np.complex64]) -> dict[str, Any]:
     body, band = known(found.body_velocity_mps), known(found.bandwidth_hz, half)
     middles = [0.0] if body is None else [0.0, body]
     return {
-        "reason": str(found.reason),
+        "reason": str(found.reason) or str(found.band_reason),
         "body_mps": body,
         "chopping_hz": known(found.chopping_hz),
         "chopping_mps": known(found.chopping_hz, half),
