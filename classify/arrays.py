@@ -166,6 +166,9 @@ def _read_mat(path: Path, variable: str | None) -> dict[str, NDArray[np.generic]
             numeric = [name for name, kind in kinds.items() if kind.startswith(("double", "single", "int", "uint"))]
             if variable in kinds and variable not in numeric:
                 raise BadInput(f"{path}: variable {variable!r} is a {kinds[variable]}: store complex numbers")
+            if kinds and not numeric:
+                held = ", ".join(f"{name}, a {kind}" for name, kind in sorted(kinds.items()))
+                raise BadInput(f"{path}: it holds {held}: store the complex samples as an array of their own")
             read = scipy.io.loadmat(path, appendmat=False, variable_names=numeric) if numeric else {}
             return {name: read[name] for name in numeric}
     except (BadInput, OSError):
@@ -191,7 +194,11 @@ def _choose(arrays: Mapping[str, NDArray[np.generic]], variable: str | None, pat
         return arrays[candidates[0]]
     if candidates:
         raise BadInput(f"{path}: {len(candidates)} complex arrays, {_listed(arrays)}: say which with --variable NAME")
-    raise BadInput(f"{path}: no complex array, it holds {_listed(arrays)}: IQ must be complex, I + jQ (complex64)")
+    cure = "IQ must be complex, I + jQ (complex64)"
+    real = sorted(name for name, array in arrays.items() if array.dtype.kind in "fiu" and array.size > 1)
+    if len(real) == 2 and arrays[real[0]].shape == arrays[real[1]].shape:
+        cure += f": store {real[0]} + 1j * {real[1]}"
+    raise BadInput(f"{path}: no complex array, it holds {_listed(arrays)}: {cure}")
 
 
 def _listed(arrays: Mapping[str, NDArray[np.generic]]) -> str:

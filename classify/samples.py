@@ -37,8 +37,8 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
         raise BadInput(f"{name}: an array of Python objects: store complex samples (complex64)")
     if given.dtype.kind in "fiub":
         raise BadInput(
-            f"{name}: real samples ({given.dtype}): IQ must be complex, I + jQ (complex64): "
-            "of one channel scipy.signal.hilbert makes it"
+            f"{name}: real samples ({given.dtype}): IQ must be complex, I + jQ (complex64): of I and Q by turns "
+            "x[0::2] + 1j * x[1::2] makes it, of one channel scipy.signal.hilbert(x)"
         )
     if given.dtype.kind != "c":
         raise BadInput(f"{name}: samples of type {given.dtype}: IQ must be complex, I + jQ (complex64)")

@@ -12,15 +12,16 @@ from scipy import fft
 #: Blades that a fit to an unknown number of them tries, and how likely they are beforehand.
 BLADES = {1: 0.1, 2: 0.65, 3: 0.25}
 
-#: Likewise blades that reflect evenly, points at their tips, a model of the literature rather than a blade, and blades
-#: whose tips stand out: so much more than an even one's end does, in amplitude, whatever its phase.
-PROFILES, STANDS_OUT = (0.8, 0.05, 0.15), 2.5
+#: Likewise blades that reflect evenly, points at their tips, a model of the literature rather than a blade, blades that
+#: begin at so large a share of their length, and such whose tips stand out: so much more than an even one's end does,
+#: in amplitude, whatever its phase.
+PROFILES, ROOT, STANDS_OUT = (0.4, 0.05, 0.4, 0.15), 0.2, 2.5
 
 #: No blade reflects quite evenly: where a line is strong, at so large a share of the tip's order, tells how that place
 #: on the blade reflects. The logarithm of the powers follows these powers of the distance from the tip, each by a
 #: factor of this standard deviation. (Chords that taper to half at the tip, off by 2 % with none of it, are then off by
 #: less than 1 %.)
-BENDS, BEND_STD = (0.5, 1.0, 2.0), 1.5
+BENDS, BEND_STD = (0.5, 1.0, 2.0), 1.0
 
 #: Lines so far below the family's level do not count: a share of its power, added to noise and lines alike. There is
 #: what strong lines leak, and what blades unlike the ideal ones put past the tip.
@@ -61,7 +62,7 @@ STEP = 0.2
 HALF_RANGE, HALF_WIDTHS, COARSE_NATS, MOST_STEPS, LEAST_EDGE = 2.5, 1.5, 6.0, 100, 0.7
 
 #: Searches, each about what is left of the one before in so many steps, until the deviation is so many of these.
-SEARCHES, FINE, FINE_ENOUGH = 5, 30, 1.5
+SEARCHES, FINE, FINE_ENOUGH = 6, 30, 1.5
 
 #: Hypotheses less likely than this are left out.
 NEGLIGIBLE = 1e-3
@@ -101,18 +102,19 @@ def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[
     z = (gamma[:, None] * np.cos(np.pi / fold * np.arange(steps + 1) / steps)).astype(np.float32)
     z[np.abs(z) < NEAR_ZERO] = NEAR_ZERO
     sine, cosine = np.sin(z), np.cos(z)
-    parts = [np.stack([sine / z, cosine])]
+    root_sine, root_cosine = np.sin(ROOT * z), np.cos(ROOT * z)
+    parts = [np.stack([sine / z, cosine, (sine - root_sine) / z])]
     if fold == 1:
-        parts.append(np.stack([(1 - cosine) / z, sine]))
-    amplitudes = np.empty((2, len(gamma), count))
+        parts.append(np.stack([(1 - cosine) / z, sine, (root_cosine - cosine) / z]))
+    amplitudes = np.empty((3, len(gamma), count))
     for odd, part in enumerate(parts):
         own = orders % 2 == odd if fold == 1 else slice(None)
         amplitudes[..., own] = fft.dct(part, 1)[..., orders[own]]
     amplitudes /= 2 * steps
     # or rounding would be lines of a family that ends far below them
     amplitudes *= np.abs(amplitudes) > LEAST_AMPLITUDE * np.sqrt(np.maximum(gamma / EXACT_TO, 1.0))[:, None]
-    even, tip = amplitudes**2
-    return np.stack([even, tip, even + STANDS_OUT**2 * gamma[:, None] ** (-4 / 3) * tip])
+    even, tip, rooted = amplitudes**2
+    return np.stack([even, tip, rooted, rooted + STANDS_OUT**2 * gamma[:, None] ** (-4 / 3) * tip])
 
 
 def _spread_powers(gamma: NDArray[np.float64], blades: int, count: int, spread: float) -> NDArray[np.float64]:
@@ -280,18 +282,18 @@ def fit_edge(
     scatter = np.broadcast_to(scatter, power.shape)
     prior = SHARE_FALL ** np.arange(len(SHARES))
     prior = np.append(prior[: len(SHARES) - len(every) + 1].sum(), prior[len(SHARES) - len(every) + 1 :])
-    few = np.arange(len(every))[::-FIRST_SHARES]
+    few, profiles = np.arange(len(every))[::-FIRST_SHARES], np.arange(len(PROFILES))
     bent, edge = np.zeros(len(BENDS)), high
     leaks = [leak]
     while len(leaks) < MOST_LEAKS and leaks[-1] * loud > LEAK_SEEN * float(noise.mean()):
         leaks.append(LEAST_LEAK * leaks[-1])
     for search in range(SEARCHES):
-        edges = np.arange(max(low, LEAST_EDGE), high + step, step)
+        apart, edges = step, np.arange(max(low, LEAST_EDGE), high + step, step)
         # the first that is seen may lie past where the edge is sought: that nothing is there speaks too
         near = order <= max(high + REACH * high ** (1 / 3) / min(choices) ** (2 / 3), order[0])
         count = int(order[near][-1])
-        shapes = [_spread_powers(number * edges, number, count, spread)[..., order[near] - 1] for number in choices]
-        families = np.ascontiguousarray(np.stack(shapes).reshape(-1, int(near.sum())).T)
+        shapes = [_spread_powers(number * edges, number, count, spread)[profiles] for number in choices]
+        families = np.ascontiguousarray(np.stack(shapes)[..., order[near] - 1].reshape(-1, int(near.sum())).T)
         # how far from the tip each line speaks of
         away = np.clip(1 - order[near] / edge, 0, 1)
         bends = np.stack([away**exponent for exponent in (0.0, *BENDS)], axis=1)
@@ -299,8 +301,9 @@ def fit_edge(
         # the first search asks the one of less sharp an edge alone: it only says about which lines to look
         said = [_log_likelihood(*data, share * loud) for share in (leaks if search else leaks[:1])]
         nats, bent = np.stack([one for one, _ in said]), max(said, key=lambda one: float(one[0].max()))[1]
-        weight = np.moveaxis(nats.reshape(*nats.shape[:2], len(choices), len(PROFILES), len(edges)), (0, 1), (4, 3))
-        weight += np.log(np.outer([BLADES.get(number, 1.0) for number in choices], PROFILES))[..., None, None, None]
+        weight = np.moveaxis(nats.reshape(*nats.shape[:2], len(choices), len(profiles), len(edges)), (0, 1), (4, 3))
+        likely = np.outer([BLADES.get(number, 1.0) for number in choices], np.array(PROFILES)[profiles])
+        weight += np.log(likely)[..., None, None, None]
         weight += np.log(prior[few] / edges[:, None])[..., None]
         weight = np.exp(weight - weight.max())
         weight /= weight.sum()
@@ -309,15 +312,19 @@ def fit_edge(
         std = float(np.sqrt((along * (edges - edge) ** 2).sum()))
         held = np.flatnonzero(along > NEGLIGIBLE)
         low, high = edges[held[0]] - step, edges[held[-1]] + step
-        wider = HALF_RANGE * np.array([held[0] == 0 and low > LEAST_EDGE, held[-1] == len(edges) - 1])
+        further = high - low if search else HALF_RANGE
+        wider = further * np.array([held[0] == 0 and low > LEAST_EDGE, held[-1] == len(edges) - 1])
         if search and not wider.any() and std > FINE_ENOUGH * step:
             break
         low, high = low - wider[0], high + wider[1]
         step = (high - low) / FINE
         choices = [number for number, own in zip(choices, weight, strict=True) if own.sum() > NEGLIGIBLE]
+        profiles = profiles[weight.sum(axis=(0, 2, 3, 4)) > NEGLIGIBLE]
+        if search:
+            leaks = [one for one, own in zip(leaks, weight.sum(axis=(0, 1, 2, 3)), strict=True) if own > NEGLIGIBLE]
         live = few[weight.sum(axis=(0, 1, 2, 4)) > NEGLIGIBLE]
         few = np.arange(max(live.min() - 2, 0), min(live.max() + 3, len(every)))
-    return edge, std
+    return edge, float(np.hypot(std, apart / np.sqrt(12)))  # nor is it known better than to a step
 
 
 def _half_range(order: int, blades: int) -> float:

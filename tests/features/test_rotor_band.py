@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
-from bladewing.features.rotor_band import STANDS_OUT, _solved, _spread_powers, fit_edge, line_powers
+from bladewing.features.rotor_band import ROOT, STANDS_OUT, _solved, _spread_powers, fit_edge, line_powers
 from bladewing.simulate import RotorMotion, rotor_echo
 from hypothesis import given
 from hypothesis import strategies as st
@@ -43,8 +43,11 @@ def test_line_powers_are_those_of_bessel_functions(blades, gamma):
     # the integral of J_n from 0 to gamma is 2 (J_(n+1) + J_(n+3) + ...)
     series = jv(order[:, None] + 1 + 2 * np.arange(int(gamma) + 20), gamma).sum(axis=1)
     np.testing.assert_allclose(even, np.abs(2 * series / gamma), **SINGLE)
+    # a blade that begins further out lacks what a shorter one has
+    series -= jv(order[:, None] + 1 + 2 * np.arange(int(gamma) + 20), ROOT * gamma).sum(axis=1)
+    np.testing.assert_allclose(np.sqrt(powers[2]), np.abs(2 * series / gamma), **SINGLE)
     # at its end an even blade's amplitude falls with the order's cube root twice as it does at a point there
-    np.testing.assert_allclose(powers[2], even**2 + STANDS_OUT**2 * gamma ** (-4 / 3) * tip**2)
+    np.testing.assert_allclose(powers[3], powers[2] + STANDS_OUT**2 * gamma ** (-4 / 3) * tip**2)
 
 
 @pytest.mark.parametrize("gamma", [0.9, 31.0, 290.0, 2000.0, 4000.0])
@@ -57,7 +60,7 @@ def test_past_the_edge_there_is_no_line_of_rounding(gamma):
 
 
 # points at the tip have lines far under the strongest: what may leak covers them at 1e5, unless it is seen not to
-@pytest.mark.parametrize("profile", [0, 1, 2])
+@pytest.mark.parametrize("profile", [0, 1, 2, 3])
 @pytest.mark.parametrize("level", [5.0, 30.0, 1e3, 1e5])
 def test_errors_are_as_large_as_stated(profile, level):
     rng = np.random.default_rng(4)
@@ -67,8 +70,8 @@ def test_errors_are_as_large_as_stated(profile, level):
         edge, std = fit_edge(ORDER, lines(rng, gamma, level, profile=profile), np.ones(144), SIDES, 2)
         errors.append((edge - gamma / 2) / std)
         relative.append(abs(2 * edge / gamma - 1))
-    # chi-squared of 40 degrees of freedom over 40 lies within 0.42..1.9 in 99.9 %
-    assert 0.42 < np.mean(np.square(errors)) < 1.9
+    # chi-squared of 40 degrees of freedom over 40 lies within 0.42..1.9 in 99.9 %; less is it where bends may be or not
+    assert (0.3 if profile > 1 else 0.42) < np.mean(np.square(errors)) < 1.9
     assert np.median(relative) < 0.015 / np.sqrt(level / 5)
 
 
@@ -127,7 +130,7 @@ def test_scattered_lines_are_known_by_their_scatter():
         edge, std = fit_edge(ORDER, lines(rng, 62.0, 1e4, scatter=0.3), np.ones(144), SIDES, 2)
         errors.append((edge - 31) / std)
         stds.append(std)
-    assert 0.42 < np.mean(np.square(errors)) < 1.9
+    assert 0.3 < np.mean(np.square(errors)) < 1.9  # less than chance: they might be bends as well
     # a hundred times what the same lines leave unscattered
     assert np.median(stds) > 0.1
 
@@ -204,7 +207,7 @@ def test_the_band_of_a_dwell_is_that_of_eq_26_at_any_level(rates_rpm, snr_db, wi
 )
 @pytest.mark.parametrize("snr_db", [0, 30])
 def test_blades_unlike_the_ideal_one_stay_within_what_is_stated(blade, snr_db):
-    rng = np.random.default_rng(8)
+    rng, relative = np.random.default_rng(8), []
     for _ in range(6):
         rate_hz = rng.uniform(52, 58)  # off the mains
         angle_rad = RotorMotion(rate_hz, rng.uniform(0, 6)).angle_rad(np.arange(PULSES) / PRF_HZ)
@@ -213,7 +216,8 @@ def test_blades_unlike_the_ideal_one_stay_within_what_is_stated(blade, snr_db):
         found = measure(echo + 10 ** (snr_db / 20 + 0.5) + white(rng, PULSES), **RADAR, blades=2)
         error_hz = found.bandwidth_hz - 8 * np.pi * rate_hz * 0.15 / WAVELENGTH_M
         assert abs(error_hz) < 4 * found.bandwidth_hz_std
-        assert abs(error_hz) < 0.02 * found.bandwidth_hz
+        relative.append(abs(error_hz) / found.bandwidth_hz)
+    assert np.median(relative) < 0.008
 
 
 @pytest.mark.parametrize("gamma", [150.0, 470.0])
