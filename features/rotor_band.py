@@ -12,10 +12,9 @@ from scipy import fft
 #: Blades that a fit to an unknown number of them tries, and how likely they are beforehand.
 BLADES = {1: 0.1, 2: 0.65, 3: 0.25}
 
-#: Likewise blades that reflect evenly, points at their tips, a model of the literature rather than a blade, blades that
-#: begin at so large a share of their length, and such whose tips stand out: so much more than an even one's end does,
-#: in amplitude, whatever its phase.
-PROFILES, ROOT, STANDS_OUT = (0.4, 0.05, 0.4, 0.15), 0.2, 2.5
+#: Likewise blades that reflect evenly, points at their tips, a model of the literature rather than a blade, and blades
+#: that begin at so large a share of their length.
+PROFILES, ROOT = (0.55, 0.05, 0.4), 0.2
 
 #: No blade reflects quite evenly: where a line is strong, at so large a share of the tip's order, tells how that place
 #: on the blade reflects. The logarithm of the powers follows these powers of the distance from the tip, each by a
@@ -113,8 +112,7 @@ def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[
     amplitudes /= 2 * steps
     # or rounding would be lines of a family that ends far below them
     amplitudes *= np.abs(amplitudes) > LEAST_AMPLITUDE * np.sqrt(np.maximum(gamma / EXACT_TO, 1.0))[:, None]
-    even, tip, rooted = amplitudes**2
-    return np.stack([even, tip, rooted, rooted + STANDS_OUT**2 * gamma[:, None] ** (-4 / 3) * tip])
+    return amplitudes**2
 
 
 def _spread_powers(gamma: NDArray[np.float64], blades: int, count: int, spread: float) -> NDArray[np.float64]:
@@ -169,6 +167,7 @@ def _log_likelihood(
     bins: NDArray[np.float64],
     bends: NDArray[np.float64],
     start: NDArray[np.float64],
+    bend_std: float,
     shares: NDArray[np.float64],
     leak: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -192,7 +191,7 @@ def _log_likelihood(
     places = [(row, column) for row in range(len(bent)) for column in range(row + 1)]
     pairs = np.stack([bends[:, row] * bends[:, column] for row, column in places])
     # a level of any size is as likely, what is left of its logarithm counts as if it were known to one
-    known = np.array([1.0, *[BEND_STD**-2] * (len(bent) - 1)])
+    known = np.array([1.0, *[bend_std**-2] * (len(bent) - 1)])
     held = known * (np.arange(len(bent)) > 0)
     for _ in range(LEVEL_STEPS):
         line = np.exp(bends @ bent).reshape(each)
@@ -241,6 +240,7 @@ def fit_edge(
     *,
     scatter: NDArray[np.float64] | float = 0.0,
     leak: float = LEAK_SHARE,
+    bend_std: float = BEND_STD,
     spread: float = 0.0,
 ) -> tuple[float, float]:
     """Fit the edge of a line family.
@@ -261,6 +261,8 @@ def fit_edge(
         What is known beforehand of how unlike the model the lines' powers are: variance over the mean's square.
     leak : float
         Share of the family's power that lines may leak past its edge: that much, or less by `LEAST_LEAK`.
+    bend_std : float
+        By how much the blades may reflect unevenly: standard deviation of what each of `BENDS` brings.
     spread : float
         Range of several rotors' rates over their mean, in whose multiples the orders are counted: what lies about a
         high order is then of its neighbours too.
@@ -297,7 +299,16 @@ def fit_edge(
         # how far from the tip each line speaks of
         away = np.clip(1 - order[near] / edge, 0, 1)
         bends = np.stack([away**exponent for exponent in (0.0, *BENDS)], axis=1)
-        data = (families, power[near], noise[near], bins[near], bends, bent, (every[few, None] + scatter[near]).T)
+        data = (
+            families,
+            power[near],
+            noise[near],
+            bins[near],
+            bends,
+            bent,
+            bend_std,
+            (every[few, None] + scatter[near]).T,
+        )
         # the first search asks the one of less sharp an edge alone: it only says about which lines to look
         said = [_log_likelihood(*data, share * loud) for share in (leaks if search else leaks[:1])]
         nats, bent = np.stack([one for one, _ in said]), max(said, key=lambda one: float(one[0].max()))[1]
@@ -312,7 +323,7 @@ def fit_edge(
         std = float(np.sqrt((along * (edges - edge) ** 2).sum()))
         held = np.flatnonzero(along > NEGLIGIBLE)
         low, high = edges[held[0]] - step, edges[held[-1]] + step
-        further = high - low if search else HALF_RANGE
+        further = min(high - low, HALF_RANGE) if search else HALF_RANGE
         wider = further * np.array([held[0] == 0 and low > LEAST_EDGE, held[-1] == len(edges) - 1])
         if search and not wider.any() and std > FINE_ENOUGH * step:
             break
