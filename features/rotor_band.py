@@ -157,7 +157,7 @@ def _solved(
         for k in range(row + 1, size):
             out[row] -= root[k, row] * out[k]
         out[row] /= root[row, row]
-    return out, 2 * sum(np.log(root[row, row]) for row in range(size))
+    return out, 2 * np.sum([np.log(root[row, row]) for row in range(size)], axis=0)
 
 
 def _log_likelihood(
