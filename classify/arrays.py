@@ -41,6 +41,9 @@ _NPY_ERRORS = (
 _HEADERS = {(1, 0): (np.lib.format.read_array_header_1_0, 2), (2, 0): (np.lib.format.read_array_header_2_0, 4)}
 _MOST_HEADER_BYTES = 10_000
 
+# What the two parts of complex samples are called.
+_PARTS = (("i", "q"), ("re", "im"), ("real", "imag"), ("inphase", "quadrature"))
+
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
@@ -195,9 +198,11 @@ def _choose(arrays: Mapping[str, NDArray[np.generic]], variable: str | None, pat
     if candidates:
         raise BadInput(f"{path}: {len(candidates)} complex arrays, {_listed(arrays)}: say which with --variable NAME")
     cure = "IQ must be complex, I + jQ (complex64)"
-    real = sorted(name for name, array in arrays.items() if array.dtype.kind in "fiu" and array.size > 1)
-    if len(real) == 2 and arrays[real[0]].shape == arrays[real[1]].shape:
-        cure += f": store {real[0]} + 1j * {real[1]}"
+    named = {name.lower(): name for name in arrays}
+    for real, imaginary in _PARTS:
+        if real in named and imaginary in named:
+            cure += f": store {named[real]} + 1j * {named[imaginary]}"
+            break
     raise BadInput(f"{path}: no complex array, it holds {_listed(arrays)}: {cure}")
 
 

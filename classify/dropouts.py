@@ -55,7 +55,12 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     steps = steps[steps > 0]
     if len(steps) + 1 < LEAST_DISTINCT:
         return none
-    near = np.searchsorted(held, np.float32(NEAR_STEPS) * np.median(steps), side="right")
+    nearly = np.float32(NEAR_STEPS) * np.median(steps)
+    # a lost pulse stands among others; zeros of what hardly reaches the converter's first step stand among such
+    beside = there & (np.convolve(lost, [1, 0, 1], "same") > 0)
+    if np.median(size[beside]) <= nearly:
+        return none
+    near = np.searchsorted(held, nearly, side="right")
     return lost if zeros > NEAR_SHARE * near else none
 
 
@@ -64,7 +69,8 @@ def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.com
 
     By the law by which each pulse of a block follows from those beside it (an autoregressive one, fitted forwards and
     backwards), those that are missing are what leaves the least of it unexplained: exact for a few lines, and of noise
-    next to nothing, so that they draw no line of their own.
+    next to nothing, so that they draw no line of their own. Nor is I or Q beyond what it is elsewhere: a converter that
+    clipped does so there too.
 
     Parameters
     ----------
@@ -90,6 +96,8 @@ def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.com
             start = max(block[0] - 2 * MOST_ORDERS, 0)
             part = slice(start, block[-1] + 1 + 2 * MOST_ORDERS)
             out[block[own]] = _filled_block(iq[part].astype(np.complex128), lost[part])[block[own] - start]
+    for found, given in ((out.real, iq.real), (out.imag, iq.imag)):
+        found[lost] = np.clip(found[lost], given.min(), given.max())
     return out
 
 

@@ -255,19 +255,20 @@ def _check_captures(captures: list[dict[str, Any]], path: Path) -> None:
 
 def _check_times(captures: list[dict[str, Any]], prf_hz: object, path: Path) -> None:
     """Nor may time have gone by between captures that follow one another without a hole in their samples."""
-    if isinstance(prf_hz, bool) or not isinstance(prf_hz, int | float) or not prf_hz > 0:
+    if isinstance(prf_hz, bool) or not isinstance(prf_hz, int | float) or not 0 < prf_hz < np.inf:
         return  # it is missing or wrong: that is told elsewhere
-    for (before, one), (after, two) in pairwise(enumerate(captures)):
-        begun = [_time(entry.get(_TIME)) for entry in (one, two)]
-        if begun[0] is None or begun[1] is None:
-            continue
-        lasted_s = (two["core:sample_start"] - one["core:sample_start"]) / prf_hz
-        apart_s = (begun[1][0] - begun[0][0]).total_seconds()
-        within_s = _CLOCK_S if begun[0][1] and begun[1][1] else _ROUNDED_S
-        if apart_s > lasted_s + within_s + _DRIFT * lasted_s:
+    dated = [
+        (number, entry["core:sample_start"], *time)
+        for number, entry in enumerate(captures)
+        if (time := _time(entry.get(_TIME))) is not None
+    ]
+    for (before, start, begun, fine), (after, following, later, fine_too) in pairwise(dated):
+        lasted_s = (following - start) / prf_hz
+        apart_s = (later - begun).total_seconds()
+        if apart_s > lasted_s * (1 + _DRIFT) + (_CLOCK_S if fine and fine_too else _ROUNDED_S):
             raise BadInput(
-                f"{path}: captures[{after}] begins {apart_s:.6g} s after captures[{before}] ({_TIME}), whose samples "
-                f"last {lasted_s:.6g} s: store each run in a recording of its own"
+                f"{path}: captures[{after}] begins {apart_s:.6g} s after captures[{before}] ({_TIME}), but the samples "
+                f"between last {lasted_s:.6g} s: store each run in a recording of its own"
             )
 
 
@@ -276,7 +277,7 @@ def _time(text: object) -> tuple[datetime, bool] | None:
     with suppress(ValueError):
         if isinstance(text, str):
             given = datetime.fromisoformat(text)
-            return given if given.tzinfo else given.replace(tzinfo=UTC), "." in text
+            return given if given.tzinfo else given.replace(tzinfo=UTC), "." in text or "," in text
     return None
 
 

@@ -13,8 +13,8 @@ from scipy import fft
 BLADES = {1: 0.1, 2: 0.65, 3: 0.25}
 
 #: Likewise blades that reflect evenly, points at their tips, a model of the literature rather than a blade, and blades
-#: that begin at so large a share of their length.
-PROFILES, ROOT = (0.55, 0.05, 0.4), 0.2
+#: that begin anywhere between these shares of their length.
+PROFILES, ROOTS = (0.55, 0.05, 0.4), (0.03, 0.6)
 
 #: No blade reflects quite evenly: where a line is strong, at so large a share of the tip's order, tells how that place
 #: on the blade reflects. The logarithm of the powers follows these powers of the distance from the tip, each by a
@@ -101,18 +101,22 @@ def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[
     z = (gamma[:, None] * np.cos(np.pi / fold * np.arange(steps + 1) / steps)).astype(np.float32)
     z[np.abs(z) < NEAR_ZERO] = NEAR_ZERO
     sine, cosine = np.sin(z), np.cos(z)
-    root_sine, root_cosine = np.sin(ROOT * z), np.cos(ROOT * z)
-    parts = [np.stack([sine / z, cosine, (sine - root_sine) / z])]
+    parts = [np.stack([sine / z, cosine])]
     if fold == 1:
-        parts.append(np.stack([(1 - cosine) / z, sine, (root_cosine - cosine) / z]))
-    amplitudes = np.empty((3, len(gamma), count))
+        parts.append(np.stack([(1 - cosine) / z, sine]))
+    amplitudes = np.empty((2, len(gamma), count))
     for odd, part in enumerate(parts):
         own = orders % 2 == odd if fold == 1 else slice(None)
         amplitudes[..., own] = fft.dct(part, 1)[..., orders[own]]
     amplitudes /= 2 * steps
     # or rounding would be lines of a family that ends far below them
     amplitudes *= np.abs(amplitudes) > LEAST_AMPLITUDE * np.sqrt(np.maximum(gamma / EXACT_TO, 1.0))[:, None]
-    return amplitudes**2
+    even, tip = amplitudes**2
+    # a blade that begins further out has no lines of inner orders but what both its ends leave of each other's ripple
+    begins = np.clip((blades * np.arange(1, count + 1) / gamma[:, None] - ROOTS[0]) / (ROOTS[1] - ROOTS[0]), 0, 1)
+    level = 1 / gamma[:, None]
+    ends = (np.abs(amplitudes[0]) - level) ** 2 + level**3 / (np.pi * np.mean(ROOTS))
+    return np.stack([even, tip, begins * even + (1 - begins) * ends])
 
 
 def _spread_powers(gamma: NDArray[np.float64], blades: int, count: int, spread: float) -> NDArray[np.float64]:
@@ -272,11 +276,13 @@ def fit_edge(
     edge, edge_std : float
         The tip's Doppler frequency and its standard deviation [chopping frequencies].
     """
+    power, noise = power / noise.mean(), noise / noise.mean()
     excess = np.maximum(power - noise, 0.0)
     loud = float((excess**2).sum() / max(excess.sum(), 1e-9))
     maybe = order[_coarse_nats(power, noise, bins, loud) > -COARSE_NATS]
     choices = list(BLADES) if blades is None else [blades]
     low, high = (maybe[end] - sign * _half_range(maybe[end], min(choices)) for end, sign in ((0, 1), (-1, -1)))
+    furthest = float(order[-1]) + _half_range(order[-1], min(choices))  # nothing speaks for an edge that nothing shows
     step = max(STEP, (high - low) / MOST_STEPS)
     # shares that the noise outweighs are all alike
     least = 0.1 * float((noise / bins).mean()) / max(loud, 1e-9)
@@ -327,7 +333,7 @@ def fit_edge(
         wider = further * np.array([held[0] == 0 and low > LEAST_EDGE, held[-1] == len(edges) - 1])
         if search and not wider.any() and std > FINE_ENOUGH * step:
             break
-        low, high = low - wider[0], high + wider[1]
+        low, high = low - wider[0], min(high + wider[1], max(furthest, high))
         step = (high - low) / FINE
         choices = [number for number, own in zip(choices, weight, strict=True) if own.sum() > NEGLIGIBLE]
         profiles = profiles[weight.sum(axis=(0, 2, 3, 4)) > NEGLIGIBLE]

@@ -35,6 +35,8 @@ def log_ticks(axis: Axis, ends: tuple[float, float]) -> None:
         places = [place for place in places if ends[0] <= place <= ends[1]]
         if len(places) >= _LEAST_NUMBERS:
             break
+    if len(places) < _LEAST_NUMBERS - 1:  # within a part of one
+        places = [place for place in MaxNLocator(4).tick_values(*ends) if ends[0] <= place <= ends[1]]
     axis.set_major_locator(FixedLocator(places))
     axis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
     axis.set_minor_locator(NullLocator())

@@ -99,6 +99,8 @@ def test_one_of_several_is_named(put, suffix, write):
         (".npz", npz(x=REAL), None, r"no complex array, it holds x float64 \(5,\): IQ must be complex"),
         (".mat", mat(x=REAL), None, r"no complex array, it holds x float64 \(1, 5\)"),
         (".mat", mat(I=REAL, Q=REAL, prf=2e4), None, r"I \+ jQ \(complex64\): store I \+ 1j \* Q"),
+        (".npz", npz(imag=REAL, real=REAL), None, r"store real \+ 1j \* imag$"),
+        (".npz", npz(time=REAL, voltage=REAL), None, r"I \+ jQ \(complex64\)$"),
         (".mat", mat(data={"iq": IQ}), None, "it holds data, a struct: store the complex samples as an array of their"),
         (".mat", mat(info={"a": 1}), "info", "variable 'info' is a struct: store complex numbers"),
         (".mat", b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM" + bytes(400), None,

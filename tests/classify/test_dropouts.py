@@ -6,6 +6,8 @@ from bladewing.classify import Classifier, answer, load_recording
 from bladewing.classify.dropouts import filled, lost_pulses
 from bladewing.classify.recording import Recording
 
+PULSES = np.arange(20000)
+
 
 def noise(rng: np.random.Generator, count: int = 4000) -> np.ndarray:
     """White noise of unit power."""
@@ -29,6 +31,13 @@ def test_zeros_that_a_converter_gives_of_weak_noise_are_none(steps: float, chann
     iq = np.round(given.real) + 1j * np.round(given.imag) * (channels == 2)
     assert np.any(iq == 0)
     assert not lost_pulses(iq.astype(np.complex64)).any()
+
+
+@pytest.mark.parametrize("sigma", [0.2, 0.3, 0.45, 0.6])
+def test_nor_are_those_beside_something_strong_for_a_while(sigma: float) -> None:
+    burst = np.where((PULSES > 8000) & (PULSES < 12000), 60 * np.sin(np.pi * (PULSES - 8000) / 4000), 0)
+    given = burst * np.exp(0.0628j * PULSES) + sigma * np.sqrt(2) * noise(np.random.default_rng(12), len(PULSES))
+    assert not lost_pulses((np.round(given.real) + 1j * np.round(given.imag)).astype(np.complex64)).any()
 
 
 def test_zeros_among_the_steps_of_a_strong_line_are_lost_pulses() -> None:
@@ -69,7 +78,6 @@ def test_a_recording_tells_of_them_and_how_many() -> None:
     assert said.startswith("lost: 10 of 2000 pulses are exactly 0")
 
 
-PULSES = np.arange(20000)
 PATTERNS = {
     "each 97th": PULSES % 97 == 0,
     "each 7th": PULSES % 7 == 0,
@@ -126,6 +134,7 @@ def test_lost_pulses_of_a_recording_draw_no_rotor(tmp_path) -> None:
 def test_of_a_recording_that_clips_no_comb_that_stays_is_counted(tmp_path) -> None:
     line = 100 * np.exp(2j * np.pi * 20 / 25e3 * PULSES) + noise(np.random.default_rng(11), len(PULSES))
     clipped = np.clip(line.real, -70, 70) + 1j * np.clip(line.imag, -70, 70)
+    clipped[::97] = 0  # what is filled in must not hide it
     np.save(tmp_path / "clipped.npy", clipped.astype(np.complex64))
     given = answer(load_recording(tmp_path / "clipped.npy", carrier_hz=9.85e9, prf_hz=25e3), Classifier.load())
     assert "comb" not in given.shown  # of 80 Hz, four times the line's own

@@ -330,3 +330,9 @@ def test_captures_between_which_time_went_by_are_refused(sigmf_pair, times, hole
         return
     with pytest.raises(BadInput, match=r"captures\[1\] begins .* s after captures\[0\] .*: store each run in a rec"):
         load_recording(path)
+
+
+def test_time_that_went_by_shows_across_a_capture_without_one(sigmf_pair):
+    first, last = ({"core:datetime": f"2026-01-01T00:{minute}:00.000Z"} for minute in ("00", "10"))
+    with pytest.raises(BadInput, match=r"captures\[2\] begins 600 s after captures\[0\]"):
+        load_recording(sigmf_pair(captures=[capture(0, **first), capture(2), capture(3, **last)]))

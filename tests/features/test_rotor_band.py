@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
-from bladewing.features.rotor_band import ROOT, _solved, _spread_powers, fit_edge, line_powers
+from bladewing.features.rotor_band import ROOTS, _solved, _spread_powers, fit_edge, line_powers
 from bladewing.simulate import RotorMotion, rotor_echo
 from hypothesis import given
 from hypothesis import strategies as st
@@ -43,9 +43,19 @@ def test_line_powers_are_those_of_bessel_functions(blades, gamma):
     # the integral of J_n from 0 to gamma is 2 (J_(n+1) + J_(n+3) + ...)
     series = jv(order[:, None] + 1 + 2 * np.arange(int(gamma) + 20), gamma).sum(axis=1)
     np.testing.assert_allclose(even, np.abs(2 * series / gamma), **SINGLE)
-    # a blade that begins further out lacks what a shorter one has
-    series -= jv(order[:, None] + 1 + 2 * np.arange(int(gamma) + 20), ROOT * gamma).sum(axis=1)
-    np.testing.assert_allclose(np.sqrt(powers[2]), np.abs(2 * series / gamma), **SINGLE)
+
+
+def test_blades_that_begin_anywhere_are_the_mean_of_those_that_begin_somewhere():
+    gamma, order = 124.0, 2 * np.arange(1, 75)
+    place = (np.arange(4000) + 0.5) / 4000
+    bessel = jv(order[:, None], gamma * place)
+    roots = np.linspace(*ROOTS, 40)
+    brute = np.mean([np.mean(bessel * (place > root), axis=1) ** 2 for root in roots], axis=0)
+    rooted = line_powers(np.array([gamma]), 2, len(order))[2, 0]
+    seen = order < gamma
+    ratio = rooted[seen] / brute[seen]
+    assert abs(np.median(ratio) - 1) < 0.1
+    assert np.quantile(np.abs(np.log(ratio)), 0.9) < 0.5
 
 
 @pytest.mark.parametrize("gamma", [0.9, 31.0, 290.0, 2000.0, 4000.0])
@@ -154,7 +164,9 @@ def test_what_lies_30_db_under_the_family_does_not_pull():
 def test_units_do_not_matter():
     power = lines(np.random.default_rng(3), 62.0, 20.0)
     base = fit_edge(ORDER, power, np.ones(144), SIDES, 2)
-    np.testing.assert_allclose(fit_edge(ORDER, 1e3 * power, np.full(144, 1e3), SIDES, 2), base, rtol=1e-6)
+    for unit in (1e-30, 1e3, 1e100):
+        given = fit_edge(ORDER, unit * power, np.full(144, unit), SIDES, 2)
+        np.testing.assert_allclose(given, base, rtol=1e-6)
 
 
 @pytest.mark.parametrize("spread", [0.01, 0.03])
@@ -176,6 +188,19 @@ def test_rotors_of_different_rates_mix_as_their_lines_fall(spread):
     assert np.quantile(np.abs(np.log(ratio)), 0.9) < 0.7
     np.testing.assert_allclose(mixed.sum(axis=-1), brute.sum(axis=-1), rtol=0.05)
     np.testing.assert_array_equal(_spread_powers(gamma, 2, orders, 0.0), line_powers(gamma, 2, orders))
+
+
+def test_no_edge_lies_far_past_all_lines_that_are_seen():
+    rng = np.random.default_rng(3)
+    for level in (10.0, 1e3):
+        for _ in range(20):
+            gamma = 2 * rng.uniform(4, 9)
+            shape = line_powers(np.array([gamma]), 2, 15)[0, 0]
+            power = np.mean(np.abs(np.sqrt(level * shape / shape.max()) + white(rng, 2, 15)) ** 2, axis=0)
+            assert fit_edge(ORDER[:15], power, np.ones(15), SIDES[:15])[0] < 20
+    equal = fit_edge(ORDER[:10], np.full(10, 1e3), np.ones(10), SIDES[:10], 2)[0]
+    assert equal < 16
+    assert fit_edge(np.array([7]), np.array([50.0]), np.ones(1), SIDES[:1], 2)[0] < 13
 
 
 def test_nothing_but_noise_has_no_sure_edge():
@@ -200,8 +225,12 @@ def test_the_band_of_a_dwell_is_that_of_eq_26_at_any_level(rates_rpm, snr_db, wi
 
 @pytest.mark.parametrize(
     "blade",
-    [{"root_m": 0.05}, {"root_m": 0.02, "edge_asymmetry": 0.9}, {"blade_amplitudes": (1.0, 0.85)}],
-    ids=["a hub", "unlike edges", "unequal blades"],
+    [
+        *({"root_m": root * 0.15} for root in (0.05, 0.1, 0.15, 0.2, 0.25, 1 / 3, 0.5)),
+        {"root_m": 0.02, "edge_asymmetry": 0.9},
+        {"blade_amplitudes": (1.0, 0.85)},
+    ],
+    ids=[*(f"a hub of {share}" for share in (5, 10, 15, 20, 25, 33, 50)), "unlike edges", "unequal blades"],
 )
 @pytest.mark.parametrize("snr_db", [0, 30])
 def test_blades_unlike_the_ideal_one_stay_within_what_is_stated(blade, snr_db):
@@ -215,7 +244,7 @@ def test_blades_unlike_the_ideal_one_stay_within_what_is_stated(blade, snr_db):
         error_hz = found.bandwidth_hz - 8 * np.pi * rate_hz * 0.15 / WAVELENGTH_M
         assert abs(error_hz) < 4 * found.bandwidth_hz_std
         relative.append(abs(error_hz) / found.bandwidth_hz)
-    assert np.median(relative) < 0.008
+    assert np.median(relative) < 0.012
 
 
 @pytest.mark.parametrize("gamma", [150.0, 470.0])
