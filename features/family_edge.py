@@ -26,9 +26,6 @@ SEVERAL_LEAK = 0.005
 #: lines lie in one another, and what an edge is off by at least [lines].
 AROUND_SCATTER, AROUND_LINES = 0.2, 0.035
 
-#: Where lines of rotors that are not told apart run into one another, what falls off there says nothing of the blades.
-AROUND_BEND = 0.05
-
 #: The orders mix at the edge where the tips of the fastest and of the slowest rotor lie more than twice so far apart
 #: [lines].
 MIXED_LINES = 0.25
@@ -335,7 +332,7 @@ def edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | Non
             blades,
             scatter=scatter,
             leak=SEVERAL_LEAK,
-            bend_std=AROUND_BEND,
+            plain=True,
             spread=relative,
         )
 

@@ -18,9 +18,9 @@ PROFILES, ROOTS = (0.55, 0.05, 0.4), (0.03, 0.6)
 
 #: No blade reflects quite evenly: where a line is strong, at so large a share of the tip's order, tells how that place
 #: on the blade reflects. The logarithm of the powers follows these powers of the distance from the tip, each by a
-#: factor of this standard deviation. (Chords that taper to half at the tip, off by 2 % with none of it, are then off by
-#: less than 1 %.)
-BENDS, BEND_STD = (0.5, 1.0, 2.0), 1.0
+#: factor of this standard deviation, or next to nothing. (Chords that taper to half at the tip are off by 2 % with none
+#: of it, and then by less than 1 %.)
+BENDS, BEND_STD, PLAIN_BEND = (0.5, 1.0, 2.0), 1.0, 0.05
 
 #: Lines so far below the family's level do not count: a share of its power, added to noise and lines alike. There is
 #: what strong lines leak, and what blades unlike the ideal ones put past the tip.
@@ -244,7 +244,7 @@ def fit_edge(
     *,
     scatter: NDArray[np.float64] | float = 0.0,
     leak: float = LEAK_SHARE,
-    bend_std: float = BEND_STD,
+    plain: bool = False,
     spread: float = 0.0,
 ) -> tuple[float, float]:
     """Fit the edge of a line family.
@@ -265,8 +265,9 @@ def fit_edge(
         What is known beforehand of how unlike the model the lines' powers are: variance over the mean's square.
     leak : float
         Share of the family's power that lines may leak past its edge: that much, or less by `LEAST_LEAK`.
-    bend_std : float
-        By how much the blades may reflect unevenly: standard deviation of what each of `BENDS` brings.
+    plain : bool
+        Take blades to reflect evenly or at their tips alone: where the lines of several rotors run into one another,
+        what falls off says nothing more of them.
     spread : float
         Range of several rotors' rates over their mean, in whose multiples the orders are counted: what lies about a
         high order is then of its neighbours too.
@@ -290,7 +291,8 @@ def fit_edge(
     scatter = np.broadcast_to(scatter, power.shape)
     prior = SHARE_FALL ** np.arange(len(SHARES))
     prior = np.append(prior[: len(SHARES) - len(every) + 1].sum(), prior[len(SHARES) - len(every) + 1 :])
-    few, profiles = np.arange(len(every))[::-FIRST_SHARES], np.arange(len(PROFILES))
+    few, profiles = np.arange(len(every))[::-FIRST_SHARES], np.arange(2 if plain else len(PROFILES))
+    bend_std = PLAIN_BEND if plain else BEND_STD
     bent, edge = np.zeros(len(BENDS)), high
     leaks = [leak]
     while len(leaks) < MOST_LEAKS and leaks[-1] * loud > LEAK_SEEN * float(noise.mean()):
