@@ -107,9 +107,7 @@ def _filled_block(iq: NDArray[np.complex128], lost: NDArray[np.bool_]) -> NDArra
 
     orders = min(MOST_ORDERS, len(iq) // 2)
     while orders > 1:
-        clear = (
-            ~np.lib.stride_tricks.sliding_window_view(lost, orders + 1).any(axis=1) if len(iq) > orders else lost[:0]
-        )
+        clear = ~np.lib.stride_tricks.sliding_window_view(lost, orders + 1).any(axis=1)
         if clear.sum() >= STRETCHES * orders:
             break
         orders //= 2

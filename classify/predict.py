@@ -12,7 +12,6 @@ from bladewing.features.heave import heave
 from bladewing.features.steady_comb import steady_comb
 from bladewing.features.wingbeat import wingbeat
 
-from .clipping import clipped_values
 from .errors import BadInput, one_line
 from .fusion import LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
@@ -210,7 +209,7 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
     shown: dict[str, float] = {}
     if any(dwells.labels != UNKNOWN) or np.ptp(dwells.probabilities) > 0:  # else nothing could be judged
         shown = long_look(recording.iq[: round(LONG_S * recording.prf_hz)], recording.carrier_hz, recording.prf_hz)
-        if clipped_values(recording.iq):  # it makes combs of its own
+        if recording.clipped:  # it makes combs of its own
             shown.pop("comb", None)
     track = fuse(
         dwells.probabilities,

@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,11 @@ class Recording:
         count = len(self.iq) // pulses
         return self.iq[: count * pulses].reshape(count, pulses)
 
+    @cached_property
+    def clipped(self) -> int:
+        """How many values of I and Q stand at the converter's largest, as `clipped_values` counts them."""
+        return clipped_values(self.iq)
+
     def left_out_s(self, dwells: NDArray[np.complex64]) -> float:
         """What `dwells` left out at the end [s]."""
         return round((len(self.iq) - dwells.size) / self.prf_hz, 9)
@@ -92,10 +98,10 @@ class Recording:
     def remarks(self, dwell_s: float, dwells: NDArray[np.complex64]) -> tuple[str, ...]:
         """What is to be known of the recording beside its answer: `cut_sentence`, and what ails its samples."""
         said = [self.cut_sentence(dwell_s, dwells)]
-        if clipped := clipped_values(self.iq):
+        if self.clipped:
             said.append(
-                f"clipped: {clipped} values of I and Q stand at the converter's largest, which makes lines that are no "
-                "target's, so that no comb that stays is counted: lower the gain"
+                f"clipped: {self.clipped} values of I and Q stand at the converter's largest, which makes lines that "
+                "are no target's, so that no comb that stays is counted: lower the gain"
             )
         if self.filled_in:
             said.append(
@@ -164,7 +170,7 @@ def load_recording(
         raise BadInput(f"{name}: the file says no PRF (SigMF core:sample_rate): give --prf-hz [Hz]")
     lost = lost_pulses(iq)
     whole = filled(iq, lost) if lost.any() else iq
-    return Recording(name, whole, carrier, prf, first / prf, int(lost.sum() - lost_pulses(whole).sum()))
+    return Recording(name, whole, carrier, prf, first / prf, int(np.count_nonzero(whole[lost])))
 
 
 def find_recording(path: str | os.PathLike[str]) -> Path:

@@ -182,7 +182,7 @@ def _log_likelihood(
     (lines, functions), begins with ones. The likeliest of all bends, from `start`, are given too.
     """
     lines, families = shape.shape
-    each = (lines, len(shares.T), families)
+    each = (lines, shares.shape[1], families)
     excess = (power - noise)[:, None, None]
     beat, own = ((2 * noise / bins)[:, None, None], ((noise + leak) ** 2 / bins)[:, None, None])
     by_line, shape = shares[:, :, None], shape[:, None]
@@ -277,7 +277,7 @@ def fit_edge(
     edge, edge_std : float
         The tip's Doppler frequency and its standard deviation [chopping frequencies].
     """
-    power, noise = power / noise.mean(), noise / noise.mean()
+    power, noise = power / noise.mean(), noise / noise.mean()  # of noise of mean 1
     excess = np.maximum(power - noise, 0.0)
     loud = float((excess**2).sum() / max(excess.sum(), 1e-9))
     maybe = order[_coarse_nats(power, noise, bins, loud) > -COARSE_NATS]
@@ -295,7 +295,7 @@ def fit_edge(
     bend_std = PLAIN_BEND if plain else BEND_STD
     bent, edge = np.zeros(len(BENDS)), high
     leaks = [leak]
-    while len(leaks) < MOST_LEAKS and leaks[-1] * loud > LEAK_SEEN * float(noise.mean()):
+    while len(leaks) < MOST_LEAKS and leaks[-1] * loud > LEAK_SEEN:
         leaks.append(LEAST_LEAK * leaks[-1])
     for search in range(SEARCHES):
         apart, edges = step, np.arange(max(low, LEAST_EDGE), high + step, step)
