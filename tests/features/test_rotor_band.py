@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
-from bladewing.features.rotor_band import ROOTS, _solved, _spread_powers, fit_edge, line_powers
+from bladewing.features.line_likelihood import solved
+from bladewing.features.line_shapes import ROOTS, line_powers, spread_powers
+from bladewing.features.rotor_band import fit_edge
 from bladewing.simulate import RotorMotion, rotor_echo
 from hypothesis import given
 from hypothesis import strategies as st
@@ -126,7 +128,7 @@ def test_small_systems_are_solved_side_by_side():
     root = rng.normal(size=(7, 4, 4))
     whole, wanted = root @ root.swapaxes(1, 2) + np.eye(4), rng.normal(size=(7, 4))
     entries = {(row, column): whole[:, row, column] for row in range(4) for column in range(row + 1)}
-    found, determinants = _solved(entries, wanted.T)
+    found, determinants = solved(entries, wanted.T)
     np.testing.assert_allclose(found.T, np.linalg.solve(whole, wanted[..., None])[..., 0])
     np.testing.assert_allclose(determinants, np.linalg.slogdet(whole)[1])
 
@@ -172,7 +174,7 @@ def test_units_do_not_matter():
 @pytest.mark.parametrize("spread", [0.01, 0.03])
 def test_rotors_of_different_rates_mix_as_their_lines_fall(spread):
     gamma, orders = np.array([124.6, 300.0]), 180
-    mixed = _spread_powers(gamma, 2, orders, spread)
+    mixed = spread_powers(gamma, 2, orders, spread)
     rates = 1 + spread * (np.arange(400) + 0.5 - 200) / 400
     lines = line_powers(gamma, 2, 200)
     # each rotor's lines where its rate puts them, all that lies nearest to an order summed
@@ -187,7 +189,7 @@ def test_rotors_of_different_rates_mix_as_their_lines_fall(spread):
     assert abs(np.median(ratio) - 1) < 0.05
     assert np.quantile(np.abs(np.log(ratio)), 0.9) < 0.7
     np.testing.assert_allclose(mixed.sum(axis=-1), brute.sum(axis=-1), rtol=0.05)
-    np.testing.assert_array_equal(_spread_powers(gamma, 2, orders, 0.0), line_powers(gamma, 2, orders))
+    np.testing.assert_array_equal(spread_powers(gamma, 2, orders, 0.0), line_powers(gamma, 2, orders))
 
 
 def test_no_edge_lies_far_past_all_lines_that_are_seen():

@@ -1,0 +1,169 @@
+"""How likely the powers of lines are, if their family has this shape, whatever its level and however it bends."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: No blade reflects quite evenly: where a line is strong, at so large a share of the tip's order, tells how that place
+#: on the blade reflects. The logarithm of the powers follows these powers of the distance from the tip, each by a
+#: factor of this standard deviation, or next to nothing. (Chords that taper to half at the tip are off by 2 % with none
+#: of it, and then by less than 1 %.)
+BENDS, BEND_STD, PLAIN_BEND = (0.5, 1.0, 2.0), 1.0, 0.05
+
+#: Gauss-Newton steps of the level and its bends, none of them larger than this [nepers of power].
+LEVEL_STEPS, LONGEST_STEP = 2, 3.0
+
+#: In place of sums that may be 0.
+LEAST_SUM = 1e-300
+
+
+@dataclass(frozen=True)
+class OrderPowers:
+    """What was seen at the orders of a line family.
+
+    Parameters
+    ----------
+    order : ndarray of int, shape (lines,)
+        Orders of the chopping lines, rising, >= 1.
+    power, noise : ndarray, shape (lines,)
+        Mean power of each line with its noise, and of the noise alone, > 0, in units in which its mean is 1.
+    bins : ndarray, shape (lines,)
+        Independent bins in each mean.
+    scatter : ndarray, shape (lines,)
+        What is known beforehand of how unlike the model the powers are: variance over the mean's square.
+    """
+
+    order: NDArray[np.intp]
+    power: NDArray[np.float64]
+    noise: NDArray[np.float64]
+    bins: NDArray[np.float64]
+    scatter: NDArray[np.float64]
+
+    @property
+    def loud(self) -> float:
+        """Level of the lines that stand out, the mean over their power."""
+        excess = np.maximum(self.power - self.noise, 0.0)
+        return float((excess**2).sum() / max(excess.sum(), 1e-9))
+
+    def upto(self, furthest: float) -> Self:
+        """Those up to an order, the first at least: that nothing is there speaks too."""
+        near = self.order <= max(furthest, self.order[0])
+        return type(self)(self.order[near], self.power[near], self.noise[near], self.bins[near], self.scatter[near])
+
+
+def log_likelihood(
+    lines: OrderPowers,
+    shape: NDArray[np.float64],
+    away: NDArray[np.float64],
+    start: NDArray[np.float64],
+    bend_std: float,
+    shares: NDArray[np.float64],
+    leak: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Log likelihood of line powers in noise, the family's level and bends the likeliest.
+
+    A mean of |line + noise|^2 as a gamma law of the same mean and variance: exact for noise alone.
+
+    Parameters
+    ----------
+    lines : OrderPowers
+        What was seen.
+    shape : ndarray, shape (lines, families)
+        Powers of each family's lines, side by side in memory, as what is done to each line is the same for all.
+    away : ndarray, shape (lines,)
+        How far from the tip each line speaks of, 0 at the tip to 1 at the hub.
+    start : ndarray, shape (len(BENDS),)
+        Bends to begin from.
+    bend_std : float
+        How far each may go.
+    shares : ndarray, shape (shares,)
+        How unlike the model the powers may be, beyond their `scatter`: variance over the mean's square.
+    leak : float
+        Power that does not count.
+
+    Returns
+    -------
+    nats : ndarray, shape (shares, families)
+        But for a constant.
+    bends : ndarray, shape (len(BENDS),)
+        The likeliest of all.
+    """
+    power, noise, bins = lines.power, lines.noise, lines.bins
+    bends = np.stack([away**exponent for exponent in (0.0, *BENDS)], axis=1)
+    each = (len(power), len(shares), shape.shape[1])
+    excess = (power - noise)[:, None, None]
+    beat, own = ((2 * noise / bins)[:, None, None], ((noise + leak) ** 2 / bins)[:, None, None])
+    by_line, shape = (shares[:, None] + lines.scatter).T[:, :, None], shape[:, None]
+    # past the edge of a narrow family there may be no line at all: its level is then anyone's guess
+    like = shape * np.exp(bends[:, 1:] @ start)[:, None, None]
+    level = np.maximum((excess * like).sum(axis=0) / np.maximum((like**2).sum(axis=0), LEAST_SUM), 1e-6)
+    bent = np.empty((bends.shape[1], each[1] * each[2]))
+    bent[0] = np.broadcast_to(np.log(level), each[1:]).ravel()
+    bent[1:] = start[:, None]
+    places = [(row, column) for row in range(len(bent)) for column in range(row + 1)]
+    pairs = np.stack([bends[:, row] * bends[:, column] for row, column in places])
+    # a level of any size is as likely, what is left of its logarithm counts as if it were known to one
+    known = np.array([1.0, *[bend_std**-2] * (len(bent) - 1)])
+    held = known * (np.arange(len(bent)) > 0)
+    for _ in range(LEVEL_STEPS):
+        line = np.exp(bends @ bent).reshape(each)
+        line *= shape
+        pull = line / _variance(line, by_line, beat, own)
+        score = bends.T @ ((excess - line) * pull).reshape(len(power), -1) - held[:, None] * bent
+        information = dict(zip(places, pairs @ (line * pull).reshape(len(power), -1), strict=True))
+        for row, information_before in enumerate(known):
+            information[row, row] += information_before
+        step, left = solved(information, score)
+        bent += np.clip(step, -LONGEST_STEP, LONGEST_STEP)
+    line = np.exp(bends @ bent).reshape(each)
+    line *= shape
+    mean = line + (noise + leak)[:, None, None]
+    number = mean**2
+    number /= _variance(line, by_line, beat, own)
+    ratio = np.divide((power + leak)[:, None, None], mean, out=mean)
+    nats = np.log(ratio)
+    nats -= ratio
+    nats += 1
+    nats *= number
+    # Stirling's series for the gamma function
+    nats += np.multiply(0.5, np.log(number, out=ratio), out=ratio)
+    nats -= np.divide(1 / 12, number, out=number)
+    total = nats.sum(axis=0) - 0.5 * ((held[:, None] * bent**2).sum(axis=0) + left).reshape(each[1:])
+    return np.asarray(total, np.float64), bent[1:, int(total.argmax())]
+
+
+def _variance(
+    line: NDArray[np.float64], share: NDArray[np.float64], beat: NDArray[np.float64], own: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Variance of the mean power of a line: (share x line + beat) x line + own."""
+    out = share * line
+    out += beat
+    out *= line
+    out += own
+    return out
+
+
+def solved(
+    matrix: dict[tuple[int, int], NDArray[np.float64]], vector: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Solutions of many small positive definite systems, and the logarithms of their determinants, by Cholesky.
+
+    The entries of the lower triangles stand by (row, column), those of each over the systems; likewise the vectors.
+    """
+    size = len(vector)
+    root: dict[tuple[int, int], NDArray[np.float64]] = {}
+    out = vector.copy()
+    for row in range(size):
+        for column in range(row + 1):
+            left = matrix[row, column] - sum(root[row, k] * root[column, k] for k in range(column))
+            root[row, column] = np.sqrt(left) if row == column else left / root[column, column]
+        for k in range(row):
+            out[row] -= root[row, k] * out[k]
+        out[row] /= root[row, row]
+    for row in reversed(range(size)):
+        for k in range(row + 1, size):
+            out[row] -= root[k, row] * out[k]
+        out[row] /= root[row, row]
+    return out, 2 * np.sum([np.log(root[row, row]) for row in range(size)], axis=0)
