@@ -7,14 +7,15 @@ import os
 import sys
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
 from .bounds import LEAST_RECORDS
-from .errors import BadInput, one_line
+from .errors import BadInput, Interrupted, one_line
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -227,9 +228,10 @@ def train(
     ] = None,
 ) -> None:
     """Train all models on synthetic records and write them as ONNX; interrupted, the same command goes on."""
-    from .train import run_training
+    from .train import PARTS, run_training
 
-    run_training(out, records=records, seed=seed, quick=quick, config=config, data=data, progress=True)
+    with _goes_on(out / PARTS):
+        run_training(out, records=records, seed=seed, quick=quick, config=config, data=data, progress=True)
 
 
 @app.command()
@@ -247,7 +249,8 @@ def dataset(
     """Write the records of a training to disk; interrupted, the same command goes on."""
     from .dataset import run_dataset
 
-    run_dataset(out, records=records, seed=seed, config=config, progress=True)
+    with _goes_on(out):
+        run_dataset(out, records=records, seed=seed, config=config, progress=True)
 
 
 @app.command()
@@ -289,10 +292,11 @@ def report(
         Path | None, typer.Option(metavar="FILE.toml", help="Settings; the options given here come first.")
     ] = None,
 ) -> None:
-    """Measure models on fresh synthetic records: what each choice of input and model costs and gives."""
-    from .report import run_report
+    """Measure models on fresh synthetic records: what each choice costs; interrupted, the same command goes on."""
+    from .report.run import PARTS, run_report
 
-    run_report(out, models=models, quick=quick, seed=seed, config=config, progress=True)
+    with _goes_on(out / PARTS):
+        run_report(out, models=models, quick=quick, seed=seed, config=config, progress=True)
 
 
 @app.command()
@@ -371,6 +375,17 @@ def tables(
     print(markdown(run_tables(out, seed)), flush=True)
 
 
+@contextmanager
+def _goes_on(kept: Path) -> Iterator[None]:
+    """Around a long run whose finished parts lie in a folder: stopped by Ctrl-C, it says how to go on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if not kept.is_dir():
+            raise
+        raise Interrupted(f"what is done is kept in {kept}: the same command goes on, or remove it") from None
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
@@ -398,6 +413,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return code if isinstance(code, int) else 0
     except (KeyboardInterrupt, typer.Abort):
         _complain("interrupted", kind="stopped")
+        return 130
+    except Interrupted as stop:
+        _complain(f"interrupted: {stop}", kind="stopped")
         return 130
     except BadInput as error:
         _complain(str(error))

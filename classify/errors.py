@@ -1,4 +1,4 @@
-"""The one exception for what a user can put right."""
+"""The exceptions that are told in one line: what a user can put right, and a long run that was stopped."""
 
 
 class BadInput(ValueError):  # noqa: N818 - it is the user's input that is bad
@@ -12,6 +12,10 @@ class BadInput(ValueError):  # noqa: N818 - it is the user's input that is bad
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message))
+
+
+class Interrupted(Exception):  # noqa: N818 - no error: the user stopped it
+    """A long run was stopped by Ctrl-C, and goes on from what it has kept."""
 
 
 def one_line(text: str) -> str:

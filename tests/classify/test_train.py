@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bladewing.classify import Classifier, train
+from bladewing.classify.cli import main
 from bladewing.classify.errors import BadInput
 from bladewing.classify.gather import Gathered, Sets, gather
 from bladewing.classify.labels import CLASSES
@@ -102,7 +103,7 @@ def test_trained_models_answer_through_the_classifier(trained, name):
     assert answer.probabilities[:, 0].mean() > other.probabilities[:, 0].mean() + 0.1
 
 
-def test_an_interrupted_training_leaves_the_old_files(trained, tmp_path, monkeypatch):
+def test_an_interrupted_training_leaves_the_old_files_and_says_how_it_goes_on(trained, tmp_path, monkeypatch, capsys):
     for name in ("features-linear.onnx", "train.json"):
         (tmp_path / name).write_bytes(b"old")
 
@@ -112,8 +113,9 @@ def test_an_interrupted_training_leaves_the_old_files(trained, tmp_path, monkeyp
     monkeypatch.setattr(tabular, "train_boosted", interrupted)
     config = tmp_path / "tiny.toml"
     config.write_text('records = 600\nmodels = ["features-linear", "features-boosted"]\n')
-    with pytest.raises(KeyboardInterrupt):
-        run_training(tmp_path, config=config, progress=False)
+    assert main(["train", "--out", str(tmp_path), "--config", str(config)]) == 130
+    said = f"what is done is kept in {tmp_path / 'train-parts'}: the same command goes on, or remove it"
+    assert capsys.readouterr().err.splitlines()[-1] == f"bladewing: stopped: interrupted: {said}"
     assert (tmp_path / "features-linear.onnx").read_bytes() == b"old"
     assert (tmp_path / "train.json").read_bytes() == b"old"
     left = ["features-linear.onnx", "tiny.toml", "train-parts", "train.json"]
