@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
-from bladewing.features.measure import BODY, EACH_ROTOR, Measurements, beyond_radars, measure
+from bladewing.features.measure import beyond_radars, measure
+from bladewing.features.measurements import BODY, EACH_ROTOR, Measurements
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 from bladewing.features.steady_comb import OVER_BODY
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat

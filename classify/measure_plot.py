@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-from bladewing.features.measure import Measurements
+from bladewing.features.measurements import Measurements
 from bladewing.features.notch import NOTCH_MPS
 from bladewing.features.spectrum import doppler_spectrum
 

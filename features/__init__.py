@@ -2,7 +2,8 @@
 
 from .acceleration import body_acceleration, without_acceleration
 from .inputs import model_inputs
-from .measure import Measurements, measure
+from .measure import measure
+from .measurements import Measurements
 from .schema import FEATURES, INPUT_SHAPES, JOINT_FEATURES, Feature, schema_hash
 from .spectrum import Spectrum, doppler_spectrum
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bladewing.features import measure
 from bladewing.features.bandwidth import half_empty
-from bladewing.features.measure import ONE_CHANNEL
+from bladewing.features.measure_record import ONE_CHANNEL
 from scipy.signal import hilbert
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, rotors, white

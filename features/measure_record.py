@@ -1,0 +1,225 @@
+"""The measurements of one record, by the names of `Measurements`."""
+
+from collections.abc import Iterable
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .bandwidth import half_empty, threshold_band_hz
+from .body_velocity import body_velocity, folded
+from .chopping import Chopping
+from .family import Family, find_family, slower_than_rotors
+from .family_edge import FASTEST_TIP_MPS, SPAN, edge_around, edge_of_lines, span_of, surer_edge
+from .measurements import BODY, EACH_ROTOR, Measurements
+from .notch import Body, body_line, notch_mask, notch_residual_db, residual
+from .periodogram import prepared
+from .rotors import MAX_ROTORS
+from .smearing import wide_smearing_index
+from .spectrum import LEAST_PART, Spectrum, largest_part
+
+#: Threshold of the paper's bandwidth rule over the noise [dB]: it took 20 on measured data, 30 on simulated.
+PAPER_THRESHOLD_DB = 20.0
+
+#: A fitted edge that may be so far out [cycles a sample] by so many of its deviations may be none.
+FURTHEST_EDGE, EDGE_DEVIATIONS = 0.48, 3.0
+
+#: Fitted lines that tell the edge of several rotors to no more than this share of it leave it to all about the orders.
+UNSURE_SHARE = 0.03
+
+#: Why there is no band where one channel was made analytic: the lines on both sides of the body lie in one another.
+ONE_CHANNEL = "no band: one side of the spectrum is empty, one channel has both folded onto the other: record I and Q"
+
+#: Where rates differ by more, the growth of their lines' width does not show it.
+WIDEST_INDEX = 0.04
+
+
+def measure_record(
+    iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | None, beta_rad: float | None
+) -> dict[str, Any]:
+    """Measure one record.
+
+    Parameters
+    ----------
+    iq : ndarray of complex64, shape (pulses,)
+        Its samples.
+    spectrum : Spectrum
+        Of these.
+    blades, beta_rad
+        As in `measure`.
+
+    Returns
+    -------
+    dict
+        A value for each array of `Measurements`.
+    """
+    out: dict[str, Any] = {field.name: np.nan for field in fields(Measurements)}
+    out |= dict.fromkeys(EACH_ROTOR, np.full(MAX_ROTORS, np.nan))
+    out |= {"rotors_resolved": False, "gear_reason": "no comb", "band_reason": ""}
+    if 0 < largest_part(iq) < LEAST_PART:
+        return out | {"reason": "no digits left in samples this small: raise the gain"}
+    data = prepared(iq, spectrum)
+    if data is None:
+        return out | {"reason": "no signal"}
+    body = body_line(spectrum)
+    mask = notch_mask(spectrum, body)
+    low, high = threshold_band_hz(spectrum, PAPER_THRESHOLD_DB)
+    out["threshold_bandwidth_hz"] = float(high - low)
+    out["notch_residual_db"] = float(notch_residual_db(spectrum, mask))
+    family, why = find_family(data, spectrum, blades)
+    if family is not None:
+        edge = _edge(family, blades)
+        why = slower_than_rotors(family.data, *edge)
+    if family is None or why:
+        return out | {"reason": why} | _named(BODY, body_velocity(data, spectrum, None))
+    out["reason"] = why
+    one_channel = bool(half_empty(spectrum.relative_power))
+    if one_channel:  # about a body whose sides lie in one another nothing is even: its own line tells
+        velocity = body_velocity(data, spectrum, None, blades=True)
+    else:
+        middle = family.rotors.fits[0] if len(family.rotors.rates) > 1 else family.comb.fit
+        steady, open_std = family.rotors.resolved, family.comb.body_std
+        velocity = body_velocity(family.data, spectrum, middle, steady=steady, open_std=open_std)
+    out |= _named(BODY, velocity) | _turning(family) | _geared(family)
+    out |= _band(family, edge, one_channel, beta_rad)
+    out |= _blade(family, out, blades)
+    return out | {"smearing_index": _index(family, spectrum, body, mask, out["chopping_hz"])}
+
+
+def _named(names: tuple[str, ...], values: Iterable[Any]) -> dict[str, Any]:
+    return dict(zip(names, values, strict=True))
+
+
+def _edge(family: Family, blades: int | None) -> tuple[float, float]:
+    """Edge of all rotors' lines and its standard deviation [cycles a sample], as what tells it surest has it."""
+    data, comb, rotors = family.data, family.comb, family.rotors
+    several = len(rotors.rates) > 1
+    edge, std = edge_of_lines(data, rotors.fits, rotors.rest, 1, blades) if several else (family.edge, family.edge_std)
+    if not rotors.resolved:
+        return surer_edge((edge, std), edge_around(data, comb, rotors, blades))
+    if several and not std < UNSURE_SHARE * edge:  # the lines of rates just resolved hardly part within it
+        around = edge_around(data, comb, rotors, blades)
+        return around if np.isinf(edge) else surer_edge((edge, std), around)
+    return edge, std
+
+
+def _turning(family: Family) -> dict[str, Any]:
+    """Comb, chopping frequency, single rotors and how their rates change."""
+    data, comb, rotors = family.data, family.comb, family.rotors
+    prf_hz, count = data.prf_hz, len(rotors.rates)
+    chopping, std = comb.chopping * prf_hz, comb.chopping_std * prf_hz
+    if count > 1:  # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
+        chopping = float(rotors.rates.mean()) * prf_hz
+        std = float(np.sqrt((rotors.stds**2).sum())) / count * prf_hz
+    if not rotors.resolved:  # the mean lies anywhere within what the unresolved rates span
+        std = float(np.hypot(std, rotors.spread * prf_hz / np.sqrt(12)))
+    drifts, drift_stds = family.drifts * (rotors.rates if count > 1 else comb.chopping) * prf_hz**2
+    each = (rotors.rates * prf_hz, rotors.stds * prf_hz, drifts, drift_stds)
+    padded = (np.pad(values, (0, MAX_ROTORS - count), constant_values=np.nan) for values in each)
+    return _named(EACH_ROTOR, padded) | {
+        "comb_order": float(comb.last // comb.per_turn),
+        "comb_snr_db": float(10 * np.log10(max(comb.fit.snr.sum() / data.pulses, 1e-9))),
+        "chopping_hz": chopping,
+        "chopping_hz_std": std,
+        "chopping_drift_hz_per_s": float(drifts.mean()),
+        "chopping_drift_hz_per_s_std": float(np.sqrt((drift_stds**2).sum())) / count,
+        "rotor_count": float(count),
+        "rotors_resolved": rotors.resolved,
+        "rotor_spread_hz": rotors.spread * prf_hz,
+    }
+
+
+def _geared(family: Family) -> dict[str, Any]:
+    """A helicopter's two combs, or why there is no second one."""
+    gear, out = family.gear, {"gear_reason": family.gear_reason}
+    if gear is None:
+        return out
+    (main, main_std), (tail, tail_std) = gear.rates * family.data.prf_hz
+    return out | {
+        "main_chopping_hz": main,
+        "main_chopping_hz_std": main_std,
+        "tail_chopping_hz": tail,
+        "tail_chopping_hz_std": tail_std,
+        "gear_ratio": gear.ratio,
+        "gear_ratio_std": gear.ratio_std,
+    }
+
+
+def _band(family: Family, edge: tuple[float, float], one_channel: bool, beta_rad: float | None) -> dict[str, Any]:
+    """Doppler bandwidth and tip speed, or why there is none.
+
+    Parameters
+    ----------
+    family : Family
+        What the lines come to.
+    edge : (float, float)
+        From `_edge`.
+    one_channel : bool
+        Whether one side of the spectrum is empty.
+    beta_rad
+        As in `measure`.
+    """
+    data, (away, std), span = family.data, edge, span_of(family.data)
+    mps = data.prf_hz * data.wavelength_m / 2  # [m/s] for a cycle a sample
+    furthest, why = FURTHEST_EDGE * span / SPAN, ""
+    if one_channel:
+        why = ONE_CHANNEL
+    elif family.fills_span or not away + EDGE_DEVIATIONS * std < furthest:
+        why = (
+            f"no band: lines may fill the unambiguous span, tips of {furthest * mps:.1f} m/s and more: raise the PRF"
+            if span == SPAN
+            else f"no band: lines reach {furthest * mps:.0f} m/s and more from the body, faster than any blade's tip"
+        )
+    if why:
+        away = std = np.nan
+    # counted from a line beside the body's, the family is so much the wider on one side
+    std = float(np.hypot(std, family.comb.body_std))
+    cosine = 1.0 if beta_rad is None else float(np.cos(beta_rad))
+    tip, tip_std = away * mps / cosine, std * mps / cosine
+    if tip - EDGE_DEVIATIONS * tip_std > FASTEST_TIP_MPS:
+        why = (
+            f"no tip speed: beta of {np.rad2deg(beta_rad or 0.0):.4g} deg makes it {tip:.0f} m/s, faster than any "
+            "blade's tip: give another angle, or none"
+        )
+        tip = tip_std = np.nan
+    return {
+        "bandwidth_hz": 2 * away * data.prf_hz,
+        "bandwidth_hz_std": 2 * std * data.prf_hz,
+        "tip_speed_mps": tip,
+        "tip_speed_mps_std": tip_std,
+        "band_reason": why,
+    }
+
+
+def _blade(family: Family, found: dict[str, Any], blades: int | None) -> dict[str, Any]:
+    """Rotation rate and blade length, where the number of blades is given or seen."""
+    comb, rates = family.comb, family.rotors.rates
+    # unequal blades tell their number; between the lines of several rotors the weak ones may be something else
+    seen = comb.per_turn if comb.per_turn > 1 and len(rates) == 1 else None
+    known = blades if blades is not None else seen
+    if known is None:
+        return {}
+    tip, tip_std = found["tip_speed_mps"], found["tip_speed_mps_std"]
+    length = tip / (2 * np.pi * float(rates.max()) * family.data.prf_hz / known)  # the edge is the fastest rotor's
+    return {
+        "rotation_hz": found["chopping_hz"] / known,
+        "rotation_hz_std": found["chopping_hz_std"] / known,
+        "blade_length_m": length,
+        "blade_length_m_std": length * float(np.hypot(tip_std / tip, comb.chopping_std / comb.chopping)),
+    }
+
+
+def _index(family: Family, spectrum: Spectrum, body: Body, mask: NDArray[np.bool_], chopping_hz: float) -> float:
+    """Smearing index: from rates that are told apart where they differ too much for their lines' width to show it."""
+    rates, data = family.rotors.rates, family.data
+    told = float(rates.std() / rates.mean()) if family.rotors.resolved else 0.0
+    if told > WIDEST_INDEX:
+        return told
+    centre_mps = np.float32(-folded(family.comb.fit.centre) * data.prf_hz * data.wavelength_m / 2)
+    energy = np.where(spectrum.level_db > 6.0, residual(spectrum, mask), np.float32(0))
+    nothing = np.asarray(np.float32(np.nan))
+    chopping = Chopping(np.asarray(np.float32(chopping_hz)), nothing, nothing)
+    return float(
+        wide_smearing_index(spectrum, energy, Body(body.index, np.asarray(centre_mps), body.level_db), chopping)
+    )
