@@ -46,5 +46,11 @@ def _at_top(side: NDArray[np.float32]) -> int:
     below = int((above >= top * np.float32(1 - BELOW_TOP)).sum()) - at
     if at < LEAST_AT_TOP or at <= below:
         return 0
-    values = np.unique(above)
-    return at if len(values) >= LEAST_DISTINCT and np.median(np.diff(values)) <= COARSE * top else 0
+    values, counts = np.unique(above, return_counts=True)
+    steps = np.diff(values)
+    steps = steps[steps > SAME * top]  # what rounding makes of one value is none
+    if len(steps) + 1 < LEAST_DISTINCT or np.median(steps) > COARSE * top:
+        return 0
+    # what was played again and again holds each value as often
+    often = int(counts[values < top * np.float32(1 - SAME)][-LEAST_DISTINCT:].min())
+    return at if at >= LEAST_AT_TOP * often else 0

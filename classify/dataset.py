@@ -21,7 +21,7 @@ from bladewing.simulate import Radar, draw_records, stream
 from bladewing.simulate.dataset import KIND_CLASS, RADAR_GROUP, Records, draw_radar
 
 from .errors import BadInput
-from .files import clear_litter, only_writer, read_bounded, write_whole
+from .files import clear_litter, only_writer, read_bounded, settle, write_whole
 from .gather import in_order
 from .progress import Progress
 from .shards import Contents, intact, read_shard, shard_bytes, write_shard
@@ -200,6 +200,7 @@ def _writable(folder: Path) -> Iterator[None]:
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        settle(folder)  # another command's files, decided and not yet renamed, are no litter
         with only_writer(folder, wait=False):
             yield
     except BlockingIOError:

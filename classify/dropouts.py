@@ -4,9 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 #: Samples no further from 0 than so many steps of the converter are nearly 0, and zeros are lost pulses where they are
-#: more than this share of these, and so many: 24 places (of one channel 4) lie so near, each about as likely as 0.
-#: Samples without steps differ by next to nothing, and next to none is nearly 0.
-NEAR_STEPS, NEAR_SHARE, LEAST_LOST = 2.1, 0.5, 3
+#: more than this share of these. Samples without steps differ by next to nothing, and next to none is nearly 0.
+NEAR_STEPS, NEAR_SHARE = 2.1, 0.5
+
+#: Nor may they be chance, likelier than this: of two channels 25 places lie so near, each about as likely as 0, of one
+#: channel 5. (Of two, three zeros and none nearly 0 are none; of one it takes six.)
+CHANCE, PLACES, PLACES_OF_ONE = 1e-4, 25, 5
 
 #: More zeros in a row are silence, which is no comb, and too long to be filled in.
 MOST_IN_A_ROW = 32
@@ -48,7 +51,7 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     lost = none.copy()
     lost[~there] = np.repeat(runs, runs) <= MOST_IN_A_ROW
     zeros = int(lost.sum())
-    if zeros < LEAST_LOST or not there.any():
+    if not zeros or not there.any():
         return none
     held = np.sort(size[there])
     steps = np.diff(held)
@@ -60,8 +63,16 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     beside = there & (np.convolve(lost, [1, 0, 1], "same") > 0)
     if np.median(size[beside]) <= nearly:
         return none
-    near = np.searchsorted(held, nearly, side="right")
-    return lost if zeros > NEAR_SHARE * near else none
+    near = int(np.searchsorted(held, nearly, side="right"))
+    places = PLACES if iq.real.any() and iq.imag.any() else PLACES_OF_ONE
+    return lost if zeros > NEAR_SHARE * near and _chance(zeros, near, 1 / places) < CHANCE else none
+
+
+def _chance(zeros: int, near: int, share: float) -> float:
+    """How likely so many zeros are, and more, among those and those nearly 0, if each is one by this chance."""
+    from scipy.special import bdtrc  # here, because dwells are judged without
+
+    return float(bdtrc(zeros - 1, zeros + near, share))
 
 
 def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.complex64]:

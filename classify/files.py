@@ -134,6 +134,8 @@ def _sync_folder(folder: Path) -> None:
 def result_folder(path: str | os.PathLike[str]) -> Path:
     """Make the folder that results will go to, and see that it can be written to before any work is done.
 
+    What an earlier writer decided and did not finish is finished: what is read there next is whole.
+
     Raises
     ------
     BadInput
@@ -152,6 +154,7 @@ def result_folder(path: str | os.PathLike[str]) -> Path:
     finally:
         with contextlib.suppress(OSError):
             probe.unlink()
+    settle(folder)
     return folder
 
 

@@ -247,14 +247,16 @@ def _check_captures(captures: list[dict[str, Any]], path: Path) -> None:
     ]
     for (before, start, place), (after, following, later) in pairwise(places):
         if missing := later - place - (following - start):
-            raise BadInput(
-                f"{path}: {missing} samples are missing between captures[{before}] and captures[{after}] "
-                f"({_INDEX}): store each run in a recording of its own"
+            wrong = (
+                f"{missing} samples are missing between captures[{before}] and captures[{after}]"
+                if missing > 0
+                else f"captures[{after}] begins {-missing} samples before captures[{before}] ends"
             )
+            raise BadInput(f"{path}: {wrong} ({_INDEX}): store each run in a recording of its own")
 
 
 def _check_times(captures: list[dict[str, Any]], prf_hz: object, path: Path) -> None:
-    """Nor may time have gone by between captures that follow one another without a hole in their samples."""
+    """Nor may time have gone by, or back, between captures that follow one another without a hole in their samples."""
     if isinstance(prf_hz, bool) or not isinstance(prf_hz, int | float) or not 0 < prf_hz < np.inf:
         return  # it is missing or wrong: that is told elsewhere
     dated = [
@@ -265,10 +267,10 @@ def _check_times(captures: list[dict[str, Any]], prf_hz: object, path: Path) -> 
     for (before, start, begun, fine), (after, following, later, fine_too) in pairwise(dated):
         lasted_s = (following - start) / prf_hz
         apart_s = (later - begun).total_seconds()
-        if apart_s > lasted_s * (1 + _DRIFT) + (_CLOCK_S if fine and fine_too else _ROUNDED_S):
+        if abs(apart_s - lasted_s) > lasted_s * _DRIFT + (_CLOCK_S if fine and fine_too else _ROUNDED_S):
             raise BadInput(
-                f"{path}: captures[{after}] begins {apart_s:.6g} s after captures[{before}] ({_TIME}), but the samples "
-                f"between last {lasted_s:.6g} s: store each run in a recording of its own"
+                f"{path}: captures[{after}] is dated {apart_s:.6g} s after captures[{before}] ({_TIME}), but the "
+                f"samples between last {lasted_s:.6g} s: store each run in a recording of its own"
             )
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from .dataset import SHARD_RECORDS, DataSet, Plan, simulator_digest
 from .envelope import Envelope
 from .errors import BadInput
-from .files import result_folder, settle, write_together
+from .files import result_folder, write_together
 from .gather import TASK_RECORDS, Gathered, Sets, gather, gather_from, inputs_digest
 from .inference import Classifier
 from .labels import CLASSES
@@ -79,7 +79,7 @@ def run_training(
     settings = training_config(config, records=records, seed=seed, quick=quick, stored=held)
     if stored is not None and stored.plan != Plan.of(settings):
         raise BadInput(f"{data}: holds sets of {stored.plan.records}, a training takes {settings.sets}: write it again")
-    settle(result_folder(out))
+    result_folder(out)
     _alone(out, settings)
     versions = _versions()
     simulator = simulator_digest() if stored is None else stored.simulator_sha256

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.ndimage import maximum_filter1d
 
 from .notch import LOBE_BINS, Body, body_line
 from .spectrum import Spectrum
@@ -97,6 +96,8 @@ def slow_body(spectrum: Spectrum, known: list[float], rest: NDArray[np.bool_]) -
     rest : ndarray of bool, shape (bins,)
         True in what is taken out about velocity zero: there it is looked for.
     """
+    from scipy.ndimage import maximum_filter1d  # here, because predicting needs no such import
+
     level_db, place = spectrum.level_db, np.arange(spectrum.bins)
     apart = _beside(spectrum, [0.0, *known], LOBE_BINS)
     across_db = maximum_filter1d(level_db[2 * (spectrum.bins // 2) - place - spectrum.bins], 2 * ACROSS_BINS + 1)

@@ -4,7 +4,7 @@ Everything heavy is imported when a report is made. ``report.json`` holds every 
 
 ==================== ==============================================================================================
 ``schema_version``   "3"; a page is drawn from this version alone
-``made``             date, command, quick, seed, seconds
+``made``             date, command, quick, seed, seconds, resumed
 ``machine``          cpu, cores, system, python, packages (name to version), load
 ``classes``          the order of every table
 ``records``          what the test set holds: total, by class, by kind, radars, extremes of SNR [dB] and dwell [s]
@@ -19,6 +19,8 @@ Everything heavy is imported when a report is made. ``report.json`` holds every 
 ``storage``          one a form of a record: see `storage.weigh`
 ``examples``         one a class: see `examples.show_examples`
 ``stft_pictures``    the paper's four STFTs: see `examples.show_stfts`
+``families``         what is lost on kinds left out of a training: see `families.left_out`
+``stability``        the worst of each stage and parameter, where stability.json lies beside: see `stability.run`
 ``tables``           the paper's tables made again: title to rows, see `classify.tables`
 ``training``         how the models were trained, None where no train.json lies beside them
 ``config``           the settings of the run: see `settings.ReportConfig`

@@ -21,7 +21,7 @@ from bladewing.models.seal import seal
 from bladewing.simulate import Radar, Records, draw_records
 from numpy.typing import NDArray
 
-from ..bounds import MOST_MODEL_BYTES
+from ..bounds import MOST_MODEL_BYTES, MOST_TEXT_BYTES
 from ..dataset import simulator_digest
 from ..errors import BadInput
 from ..files import read_bounded, result_folder, settle, write_together
@@ -260,7 +260,8 @@ def training_account(folder: Path | None) -> dict[str, Any] | None:
     place = folder if folder is not None else resources.files("bladewing.models.pretrained")
     file = place.joinpath(ACCOUNT)
     try:
-        found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        content = file.read_bytes() if folder is None else read_bounded(folder / ACCOUNT, MOST_TEXT_BYTES)
+        found: dict[str, Any] = json.loads(content)
     except FileNotFoundError:
         return None
     except (ValueError, RecursionError) as error:

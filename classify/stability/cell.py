@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +30,8 @@ class Cell:
         The stage's reason where there is no number.
     warned : str
         A warning from inside a library, or an exception that is no refusal; there must be none.
+    silent : bool
+        Whether a reason instead of a number is an answer here.
     """
 
     stage: str
@@ -41,11 +43,12 @@ class Cell:
     guard: str
     said: str = ""
     warned: str = ""
+    silent: bool = False
 
     @property
     def holds(self) -> bool:
-        """Whether the error is within its limit, or there is a reason instead of a number; and nothing warned."""
-        answered = bool(self.said) if self.error is None else self.error <= self.limit
+        """Whether the error is within its limit, or there is a reason where it may be; and nothing warned."""
+        answered = self.silent and bool(self.said) if self.error is None else self.error <= self.limit
         return answered and not self.warned
 
     def as_dict(self) -> dict[str, Any]:
@@ -62,6 +65,8 @@ def sweep(
     guard: str,
     error_at: Callable[[Any], Outcome],
     show: Callable[[Any], str] = "{:g}".format,
+    *,
+    silent: Collection[Any] = (),
 ) -> Iterator[Cell]:
     """Measure one stage along one parameter; whatever a stage does wrong becomes a cell that does not hold.
 
@@ -75,6 +80,8 @@ def sweep(
         The error at a value. Where `guard` says that the stage refuses, a ValueError of one line is its word.
     show : callable
         The value as text, with its unit.
+    silent : collection
+        Values at which a reason instead of a number is an answer; where `guard` says that the stage refuses, the only.
     """
     refuses = "refused" in guard
     for value in values:
@@ -91,10 +98,12 @@ def sweep(
                     said = f"refused: {line}"
                 else:
                     warned = f"{type(fault).__name__}: {line}"
+        if refuses and value in silent and not said:
+            warned = warned or "not refused"
         if caught and not warned:
             warned = f"{caught[0].category.__name__}: {caught[0].message}"
         if error is not None and not math.isfinite(error):
             error = None if math.isnan(error) else 1e300  # an infinity is no answer
-        yield Cell(
-            stage, parameter, show(value), None if error is None else float(error), measure, limit, guard, said, warned
-        )
+        number = None if error is None else float(error)
+        may = value in silent
+        yield Cell(stage, parameter, show(value), number, measure, limit, guard, said, warned, may)

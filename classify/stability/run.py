@@ -15,7 +15,7 @@ from ..progress import Progress
 from .cell import Cell
 
 #: Version of `stability.json`.
-FORMAT = 1
+FORMAT = 2
 
 
 def run_stability(out: Path, *, quick: bool = False, progress: bool = True) -> dict[str, Any]:

@@ -77,3 +77,19 @@ def test_coarse_steps_say_nothing(steps):
 )
 def test_what_has_one_value_alone_is_not_clipped(iq):
     assert clipped_values(iq.astype(np.complex64)) == 0
+
+
+@pytest.mark.parametrize("period", [*range(5, 13), 16, 20, 24, 30])
+def test_a_line_that_comes_round_to_the_same_few_values_is_not_clipped(period):
+    turns = np.arange(20 * period) / period
+    assert clipped_values(np.exp(2j * np.pi * turns).astype(np.complex64)) == 0
+    blades = 0.1 * np.exp(6j * np.sin(2 * np.pi * turns / 2))
+    assert clipped_values((np.exp(2j * np.pi * turns) + blades).astype(np.complex64)) == 0
+
+
+@pytest.mark.parametrize("times", [2, 5, 20])
+def test_what_is_played_again_and_again_is_not_clipped(times):
+    for seed in range(40):
+        once = (2 * _line(seed, 200) + _noise(seed, 200)).astype(np.complex64)
+        once[17] *= 1.5  # stands alone at the top
+        assert clipped_values(np.tile(once, times)) == 0

@@ -33,6 +33,17 @@ def test_zeros_that_a_converter_gives_of_weak_noise_are_none(steps: float, chann
     assert not lost_pulses(iq.astype(np.complex64)).any()
 
 
+@pytest.mark.parametrize("steps", [25, 100, 400, 1600])
+@pytest.mark.parametrize("channels", [1, 2])
+def test_a_few_zeros_of_a_fine_converter_are_none(steps: float, channels: int) -> None:
+    called = 0
+    for seed in range(100):
+        given = noise(np.random.default_rng(seed)) * np.float32(steps)
+        iq = np.round(given.real) + 1j * np.round(given.imag) * (channels == 2)
+        called += bool(lost_pulses(iq.astype(np.complex64)).any())
+    assert called == 0  # in one of ten thousand by chance
+
+
 @pytest.mark.parametrize("sigma", [0.2, 0.3, 0.45, 0.6])
 def test_nor_are_those_beside_something_strong_for_a_while(sigma: float) -> None:
     burst = np.where((PULSES > 8000) & (PULSES < 12000), 60 * np.sin(np.pi * (PULSES - 8000) / 4000), 0)

@@ -10,7 +10,7 @@ from bladewing import classify
 
 HEAVY = [
     "torch", "sklearn", "onnx", "skl2onnx", "onnxscript", "scipy.signal", "scipy.stats", "scipy.io", "scipy.optimize",
-    "matplotlib", "sigmf", "pydantic", "typer", "rich", "jinja2",
+    "scipy.ndimage", "matplotlib", "sigmf", "pydantic", "typer", "rich", "jinja2",
 ]  # fmt: skip
 
 PREDICT = """

@@ -268,6 +268,13 @@ def test_a_train_json_of_something_else_is_told_before_anything_is_measured(
         run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
 
 
+def test_a_train_json_that_never_ends_is_told_too(tiny_models: Path, tmp_path: Path) -> None:
+    (tmp_path / "spectrum-cnn.onnx").write_bytes((tiny_models / "spectrum-cnn.onnx").read_bytes())
+    os.mkfifo(tmp_path / "train.json")
+    with pytest.raises(BadInput, match=r"train\.json: not JSON: it is no regular file: remove it or train again"):
+        run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
+
+
 def test_what_was_measured_is_kept_for_the_same_cascade_on_the_same_machine_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

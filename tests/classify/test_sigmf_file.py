@@ -299,6 +299,8 @@ def test_a_hole_between_captures_is_refused_and_the_first_index_is_the_start(sig
     assert load_recording(sigmf_pair(captures=whole)).start_s == pytest.approx(500 / PRF_HZ)
     with pytest.raises(BadInput, match="997 samples are missing between captures"):
         load_recording(sigmf_pair(captures=[whole[0], capture(3, **{index: 1500})]))
+    with pytest.raises(BadInput, match=r"captures\[1\] begins 2 samples before captures\[0\] ends"):
+        load_recording(sigmf_pair(captures=[whole[0], capture(3, **{index: 501})]))
     between = [whole[0], capture(2), capture(3, **{index: 1500})]
     with pytest.raises(BadInput, match=r"997 samples are missing between captures\[0\] and captures\[2\]"):
         load_recording(sigmf_pair(captures=between))
@@ -316,6 +318,8 @@ def test_a_hole_between_captures_is_refused_and_the_first_index_is_the_start(sig
         (("2026-01-01T00:00:00.00Z", "2026-01-01T00:00:00.5Z"), True),
         (("2026-01-01T00:00:00Z", "2026-01-01T00:00:01Z"), False),  # of whole seconds they may be one apart
         (("2026-01-01T00:00:00", "2026-01-01T00:00:10Z"), True),
+        (("2026-01-01T00:00:10.000Z", "2026-01-01T00:00:00.000Z"), True),
+        (("2026-01-01T00:00:01Z", "2026-01-01T00:00:00Z"), False),
         (("yesterday", "2026-01-01T00:00:10Z"), False),
         ((None, "2026-01-01T00:00:10Z"), False),
     ],
@@ -328,11 +332,11 @@ def test_captures_between_which_time_went_by_are_refused(sigmf_pair, times, hole
     if not hole:
         load_recording(path)
         return
-    with pytest.raises(BadInput, match=r"captures\[1\] begins .* s after captures\[0\] .*: store each run in a rec"):
+    with pytest.raises(BadInput, match=r"captures\[1\] is dated .* s after captures\[0\] .*: store each run in a rec"):
         load_recording(path)
 
 
 def test_time_that_went_by_shows_across_a_capture_without_one(sigmf_pair):
     first, last = ({"core:datetime": f"2026-01-01T00:{minute}:00.000Z"} for minute in ("00", "10"))
-    with pytest.raises(BadInput, match=r"captures\[2\] begins 600 s after captures\[0\]"):
+    with pytest.raises(BadInput, match=r"captures\[2\] is dated 600 s after captures\[0\]"):
         load_recording(sigmf_pair(captures=[capture(0, **first), capture(2), capture(3, **last)]))

@@ -1,5 +1,6 @@
 import json
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,8 +11,8 @@ from bladewing.classify.stability.cell import Cell, sweep
 from bladewing.simulate.rotor import LARGEST_GAMMA, rotor_echo
 
 
-def at(error_at, limit=1.0, guard="guard"):
-    (cell,) = sweep("stage", "parameter", [1], "error", limit, guard, error_at, str)
+def at(error_at, limit=1.0, guard="guard", silent=(1,)):
+    (cell,) = sweep("stage", "parameter", [1], "error", limit, guard, error_at, str, silent=silent)
     return cell
 
 
@@ -21,6 +22,7 @@ def test_a_cell_holds_with_a_small_error_or_a_reason_only():
     assert not at(lambda _: np.nan).holds
     assert not at(lambda _: np.inf).holds
     assert at(lambda _: (np.nan, "no comb")).holds
+    assert not at(lambda _: (np.nan, "no comb"), silent=()).holds
 
 
 def test_a_refusal_is_an_answer_and_a_warning_is_none():
@@ -29,6 +31,8 @@ def test_a_refusal_is_an_answer_and_a_warning_is_none():
 
     assert at(refuse, guard="few pulses are refused").said == "refused: too few pulses"
     assert at(refuse, guard="few pulses are refused").holds
+    assert not at(refuse, guard="few pulses are refused", silent=()).holds
+    assert not at(lambda _: 0.0, guard="few pulses are refused").holds
     assert not at(refuse).holds  # no refusal was promised: it is a fault
     assert at(refuse).warned == "ValueError: too few pulses"
     assert at(lambda _: 1 / 0).warned == "ZeroDivisionError: division by zero"
@@ -50,6 +54,20 @@ def test_the_simulator_holds_at_its_extremes(part):
 @pytest.mark.parametrize("part", [spectra._spectra, spectra._shapes, spectra._features])
 def test_the_features_hold_at_their_extremes(part):
     assert [cell for cell in part(True) if not cell.holds] == []
+
+
+def test_an_estimator_that_never_finds_anything_does_not_hold(monkeypatch):
+    nothing = SimpleNamespace(chopping_hz=np.nan, reason="I never find anything")
+    monkeypatch.setattr(spectra, "measure", lambda *_, **__: nothing)
+    lost = {(cell.parameter, cell.value) for cell in spectra._combs() if not cell.holds}
+    assert {
+        ("rotation rate", "30000 rpm"),
+        ("SNR", "0 dB"),
+        ("pulses", "1021"),
+        ("amplitude", "1"),
+        ("carrier", "1 GHz"),
+    } < lost
+    assert not any(parameter == "record" for parameter, _ in lost)
 
 
 def test_softmax_holds_at_its_extremes():
@@ -84,7 +102,7 @@ def test_a_rotor_without_blades_has_no_echo():
 def test_the_command_writes_the_table_whole(tmp_path, monkeypatch, capsys):
     cells = [
         Cell("blade", "Gamma", "1e+06", 2e-7, "error [1]", 1e-3, "a | guard"),
-        Cell("blade", "Gamma", "<1>", None, "error [1]", 1e-3, "guard", said="refused: no blades"),
+        Cell("blade", "Gamma", "<1>", None, "error [1]", 1e-3, "guard", said="refused: no blades", silent=True),
         Cell("comb", "SNR", "200 dB", 0.5, "error [Hz]", 0.1, "guard"),
     ]
     monkeypatch.setattr(run, "_parts", lambda: {"all": lambda quick: iter(cells)})
@@ -109,7 +127,7 @@ def test_the_command_writes_the_table_whole(tmp_path, monkeypatch, capsys):
 
 def test_what_is_no_table_is_refused_and_none_is_none(tmp_path):
     assert run.worst_of_each(tmp_path) is None
-    for text in ('{"format": 1, "cells": [{"stage": 3}]}', "[]", '{"format": 2, "cells": []}', "["):
+    for text in ('{"format": 2, "cells": [{"stage": 3}]}', "[]", '{"format": 1, "cells": []}', "["):
         (tmp_path / "stability.json").write_text(text)
         with pytest.raises(BadInput, match=r"stability\.json: not a stability table"):
             run.worst_of_each(tmp_path)

@@ -7,7 +7,9 @@ import time
 
 import pytest
 from bladewing.classify import files
-from bladewing.classify.files import only_writer, settle, write_together
+from bladewing.classify.dataset import run_dataset
+from bladewing.classify.errors import BadInput
+from bladewing.classify.files import only_writer, result_folder, settle, write_together
 
 OLD, NEW = {"a": b"old a", "b": b"old b"}, {"a": b"new a", "b": b"new b", "c": b"new c"}
 
@@ -46,6 +48,24 @@ def test_a_fault_at_any_rename_leaves_all_old_or_all_new(tmp_path, monkeypatch, 
     settle(tmp_path)
     assert content(tmp_path) in (OLD, NEW)
     assert len(list(tmp_path.iterdir())) == len(content(tmp_path))
+
+
+def decided(folder):
+    """A change that was decided, and whose writer was killed before any rename."""
+    for name in NEW:
+        (folder / f".bladewing-{name}.new").write_bytes(NEW[name])
+    (folder / ".bladewing-pending.json").write_text(json.dumps({f".bladewing-{name}.new": name for name in NEW}))
+
+
+def test_what_was_decided_is_done_before_results_are_read_or_litter_is_cleared(tmp_path):
+    decided(tmp_path)
+    assert result_folder(tmp_path) == tmp_path
+    assert content(tmp_path) == NEW
+    (tmp_path / "data").mkdir()
+    decided(tmp_path / "data")
+    with pytest.raises(BadInput, match="not empty"):
+        run_dataset(tmp_path / "data", records=600, progress=False)
+    assert content(tmp_path / "data") == NEW
 
 
 def test_a_journal_moves_nothing_out_of_its_folder(tmp_path):
