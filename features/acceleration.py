@@ -29,11 +29,13 @@ LEAST_LINE_DB = 20.0
 #: line must stand so high over it [dB].
 BESIDE_BINS, LEAST_OVER_BESIDE_DB = 6, 10.0
 
-#: The smear is taken out where it is over a bin, sure by so many standard deviations, and the line rises so much [dB].
-SURE_DEVIATIONS, LEAST_RISE_DB = 5.0, 2.0
+#: The smear is taken out where it is sure by so many standard deviations: a third of a bin leaves enough of strong
+#: lines to pass for a second rotor. (In front of ground up to half a bin that is not there is so in one of a hundred.)
+SURE_DEVIATIONS = 5.0
 
-#: A line that is smeared over more bins than these rises when the smear is taken out; what does not is no line.
-SHOWN_STEPS = 2.5
+#: A line that is smeared over more bins than these rises by so much when the smear is taken out [dB]; what does not is
+#: no line. (Over three bins a line alone loses 2.4 dB.)
+SHOWN_STEPS, LEAST_RISE_DB = 3.2, 2.0
 
 #: Pulses that a line's smear can be told from, at least.
 LEAST_PULSES = 32
@@ -116,7 +118,7 @@ def body_acceleration(
         # the line's height is pulses^2 A^2, the noise's pulses sigma^2
         snr = height / beside / pulses
         std[index] = np.sqrt(90 / (snr * float(pulses) ** 5)) * prf_hz**2 * wavelength_m / (2 * np.pi)
-        smeared[index] = risen and abs(value[index]) > max(step, SURE_DEVIATIONS * std[index])
+        smeared[index] = abs(value[index]) > SURE_DEVIATIONS * std[index]
     lead = samples.shape[:-1]
     return value.reshape(lead), std.reshape(lead), smeared.reshape(lead)
 

@@ -69,14 +69,15 @@ def half_empty(relative_power: NDArray[np.float32]) -> NDArray[np.bool_]:
     Returns
     -------
     ndarray of bool, shape (...)
-        All of one side, but for its ends, lies `EMPTY_SHARE` under what three quarters of the other's bins are below.
+        All of one side, but for its ends, lies `EMPTY_SHARE` under what three quarters of the other's bins are over:
+        noise, also where a fast body's lines are all there.
     """
     bins = relative_power.shape[-1]
     middle, end = bins // 2, max(bins // ENDS, 4)
     if middle <= 2 * end:
         return np.zeros(relative_power.shape[:-1], bool)
     sides = relative_power[..., end : middle - end], relative_power[..., middle + end : bins - end]
-    noise = np.max([np.quantile(side, 0.75, axis=-1) for side in sides], axis=0)
+    noise = np.max([np.quantile(side, 0.25, axis=-1) for side in sides], axis=0)
     return np.asarray(np.min([side.max(axis=-1) for side in sides], axis=0) < EMPTY_SHARE * noise)
 
 

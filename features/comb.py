@@ -1,5 +1,6 @@
 """The comb of a rotor in one record: sought, judged against chance, fitted; or why there is none."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,10 +24,12 @@ LEAST_REACH_MPS = 12.0
 #: A comb needs so many lines, at least.
 LEAST_LINES = 4
 
-#: A comb whose lines all lie on multiples of the mains is taken for the supply's, this near to them, relative.
+#: A comb whose lines all lie on multiples of the mains is taken for the supply's, this near to them, relative: a simple
+#: converter's clock is off by some thousandths. Of two channels, and a comb that speaks loudly, less: that is what the
+#: mains themselves are off by.
 MAINS_HZ = (50.0, 60.0)
 MAINS_MULTIPLES = (1, 2, 3, 4, 6)
-MAINS_SHARE = 0.0055
+MAINS_SHARE, MAINS_SHARE_OF_TWO = 0.0055, 0.0025
 
 #: Where fewer bins than this lie between multiples of the mains, any centre lies near one: only one at rest tells then.
 MAINS_BINS = 4.0
@@ -44,9 +47,11 @@ UNEQUAL_FACTOR = 4.0
 #: Among the outer half of the lines alone, they must be by this.
 OUTER_FACTOR = 2.5
 
-#: A half or a third of the spacing, where that is too fine for the search, may be the comb's nevertheless: if its lines
-#: speak for it as loudly as this beside those of the spacing found.
+#: A fraction of the spacing, where that is too fine for the search, may be the comb's nevertheless: if its lines speak
+#: for it as loudly as this beside those of the spacing found. Most rotors chop faster than so many hertz: where a dwell
+#: is too short for that, less is enough, and of further fractions.
 FRACTIONS, FRACTION_SHARE = (2, 3), 0.9
+USUAL_HZ, USUAL_FRACTIONS, USUAL_SHARE = 60.0, (2, 3, 4, 5, 6, 7, 8), 0.85
 
 #: And so much must speak for two kinds of lines [nats]: near the noise every other one is strong by chance.
 UNEQUAL_NATS = 8.0
@@ -68,6 +73,8 @@ class Comb:
         Strong lines are this many spacings apart: 1 for equal blades (or a lone one), else the number of blades.
     body_std : float
         Standard deviation of the body's place, where several of its lines may be the body's [cycles a sample].
+    blades : int or None
+        How many blades unequal lines show; None where they do not.
     """
 
     fit: CombFit
@@ -75,6 +82,7 @@ class Comb:
     last: int
     per_turn: int
     body_std: float
+    blades: int | None
 
     @property
     def chopping(self) -> float:
@@ -88,9 +96,9 @@ class Comb:
 
 
 def strong_multiple(
-    orders: NDArray[np.intp], power: NDArray[np.float64], most: int = MOST_BLADES, factor: float = UNEQUAL_FACTOR
+    orders: NDArray[np.intp], power: NDArray[np.float64], tried: Iterable[int], factor: float = UNEQUAL_FACTOR
 ) -> int:
-    """Every how many-th line is strong: 1 to `most`.
+    """Every how many-th line is strong: 1, or one of those tried.
 
     Parameters
     ----------
@@ -98,14 +106,14 @@ def strong_multiple(
         Orders.
     power : ndarray, shape (lines,)
         Power of each line over the noise [1].
-    most : int
-        The largest multiple tried.
+    tried : iterable of int
+        Multiples that are tried.
     factor : float
         By which the strong ones are stronger in power.
     """
     best = 1
     outer = np.abs(orders) > np.median(np.abs(orders))
-    for multiple in range(2, most + 1):
+    for multiple in tried:
         strong = orders % multiple == 0
         # the outermost lines are edges; four of each kind tell them apart
         if strong.sum() < 4 or (~strong).sum() < 4:
@@ -116,11 +124,16 @@ def strong_multiple(
         if outer[strong].any() and outer[~strong].any():
             parted = _contrast(power[outer & strong].mean(), power[outer & ~strong].mean())
             ratio = ratio if parted > OUTER_FACTOR else 0.0
-        # log likelihood ratio of two means of exponentials against one
-        nats = len(power) * np.log(power.mean()) - strong.sum() * np.log(means[0]) - (~strong).sum() * np.log(means[1])
-        if ratio > factor and nats > UNEQUAL_NATS:
+        if ratio > factor and two_means_nats(power[strong], power[~strong]) > UNEQUAL_NATS:
             best, factor = multiple, ratio
     return best
+
+
+def two_means_nats(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Log likelihood ratio of two means of exponentials against one, of powers of two kinds of lines."""
+    means = (max(float(each.mean()), 1e-9) for each in (np.concatenate([one, other]), one, other))
+    both, first, second = (float(np.log(mean)) for mean in means)
+    return (len(one) + len(other)) * both - len(one) * first - len(other) * second
 
 
 def _contrast(strong: float, weak: float) -> float:
@@ -131,14 +144,20 @@ def _contrast(strong: float, weak: float) -> float:
 def of_mains(fit: CombFit, data: Periodogram, score: float, per_turn: int = 1) -> bool:
     """True where spacing and centre of strong lines (`per_turn` apart) are the mains', or a weak comb's spacing is."""
     spacing = fit.spacing * per_turn
+    share = MAINS_SHARE if data.one_channel or score < MAINS_SCORE else MAINS_SHARE_OF_TWO
     for mains_hz in MAINS_HZ:
         multiple = round(spacing * data.prf_hz / mains_hz)
-        if multiple in MAINS_MULTIPLES and abs(spacing * data.prf_hz / (multiple * mains_hz) - 1) < MAINS_SHARE:
+        if multiple in MAINS_MULTIPLES and abs(spacing * data.prf_hz / (multiple * mains_hz) - 1) < share:
             base = spacing / multiple
             nearest = base * round(fit.centre / base) if base * data.pulses >= MAINS_BINS else 0.0
             off = abs(fit.centre - nearest) * data.pulses
             return (data.rest_half > 0 and score < MAINS_SCORE) or off < max(0.2, 3 * fit.centre_std * data.pulses)
     return False
+
+
+def is_short(data: Periodogram) -> bool:
+    """True where a dwell is too short for the lines of a usual rotor to be told apart."""
+    return MIN_SPACING_BINS / data.pulses * data.prf_hz > USUAL_HZ
 
 
 def finer_spacing(data: Periodogram, fit: CombFit) -> float | None:
@@ -151,14 +170,22 @@ def finer_spacing(data: Periodogram, fit: CombFit) -> float | None:
     fit : CombFit
         A comb of two to three times that spacing: it holds every second or third line.
     """
-    spacings = fit.spacing / np.array([1, *FRACTIONS])
-    if spacings[-1] * data.pulses >= MIN_SPACING_BINS:
+    fractions, share, least_hz = (
+        (USUAL_FRACTIONS, USUAL_SHARE, USUAL_HZ)
+        if is_short(data)
+        else (FRACTIONS, FRACTION_SHARE, CHOPPING_RANGE_HZ[0])
+    )
+    spacings = fit.spacing / np.array([1, *fractions])
+    finer = (spacings * data.pulses < MIN_SPACING_BINS) & (spacings * data.prf_hz > least_hz)
+    if not finer.any():
         return None
+    finer[0] = True
+    spacings = spacings[finer]
     steps = 1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (FINE_STEPS * data.pulses)
     tried = np.outer(spacings, steps)
     scores = heights(data.contrast, tried.ravel(), np.full(tried.size, fit.centre)).reshape(tried.shape).max(axis=1)
-    finer = (spacings * data.pulses < MIN_SPACING_BINS) & (scores > FRACTION_SHARE * scores[0])
-    return float(spacings[finer][0]) if finer.any() else None
+    as_loud = np.flatnonzero(scores[1:] > share * scores[0]) + 1
+    return float(spacings[as_loud[0]]) if len(as_loud) else None
 
 
 def threshold(data: Periodogram) -> float:
@@ -217,8 +244,10 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     seen = fit.amplitudes + LineSpace(fitted[1]).at(fit.frequencies)[0]
     power = np.abs(seen) ** 2 * data.pulses / data.level_of(fitted[1])(fit.frequencies)
     within = (fit.orders >= start.low) & (fit.orders <= start.high)
-    per_turn = strong_multiple(fit.orders[within], power[within], max(MOST_BLADES, blades or 0))
+    tried = range(2, MOST_BLADES + 1) if blades is None else (blades,)
+    per_turn = strong_multiple(fit.orders[within], power[within], tried)
     for number in sorted({1, per_turn}):
         if of_mains(fit, data, start.score, number):
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"
-    return Comb(fit, fitted[1], max(start.high, -start.low), per_turn, open_orders * fit.spacing), ""
+    last, seen = max(start.high, -start.low), per_turn if per_turn > 1 else None
+    return Comb(fit, fitted[1], last, per_turn, open_orders * fit.spacing, seen), ""

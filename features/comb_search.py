@@ -39,6 +39,9 @@ FLASH_SHARE, REST_FLASH_SHARE = 2.0, 1.0
 #: What a comb whose sides reach unequally far must have more [nats].
 UNEVEN_COST = 4.0
 
+#: Lines further from another comb's than this are its own [bins].
+MIRROR_BINS = 1.5
+
 #: Steps to each side of a coarse spacing, of one bin at the PRF; then finer ones about the best families.
 COARSE_STEPS = 4
 FAMILIES = 8
@@ -275,6 +278,23 @@ def heights(evidence: Evidence, spacings: NDArray[np.float64], centres: NDArray[
     return out
 
 
+def _loudness(data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What speaks for combs: their lines, and where there is one channel those that it has of the other side."""
+    return heights(data.contrast, spacings, centres) + _mirrored(data, spacings, centres)
+
+
+def _mirrored(data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What else speaks for combs in one channel, where they stand about the body's mirror image as well [nats].
+
+    Without it a third or a fourth of the spacing, which holds about all of these lines and others, is the louder one.
+    """
+    if not data.one_channel:
+        return np.zeros(len(spacings))
+    off = 2 * centres / spacings
+    apart = np.abs(off - np.rint(off)) * spacings * data.pulses > MIRROR_BINS
+    return np.where(apart, heights(data.contrast, spacings, -centres), 0.0)
+
+
 def _families(
     spacings: NDArray[np.float64], scores: NDArray[np.float64], centres: NDArray[np.float64], pulses: int
 ) -> list[int]:
@@ -307,7 +327,7 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     factors = 1 + np.arange(-COARSE_STEPS, COARSE_STEPS + 1) / data.pulses
     spacings = np.concatenate([np.outer(s, factors).ravel() for s, _ in tried])
     centres = np.concatenate([np.full(len(s) * len(factors), c) for s, c in tried])
-    scores = heights(evidence, spacings, centres)
+    scores = _loudness(data, spacings, centres)
     if not len(scores):
         return None
     chosen = _families(spacings, scores, centres, data.pulses)
@@ -319,16 +339,17 @@ def best_candidate(data: Periodogram) -> Candidate | None:
         [np.repeat(centres[i] + np.array(s) / data.pulses, len(fine)) for i, s in zip(chosen, shifts, strict=True)]
     )
     spacings = np.concatenate([np.tile(spacings[i] * fine, len(s)) for i, s in zip(chosen, shifts, strict=True)])
-    scores = heights(evidence, spacings, centres)
+    scores = _loudness(data, spacings, centres)
     loudest_first = np.argsort(-scores, kind="stable")
     finest = loudest_first[np.unique(family[loudest_first], return_index=True)[1]]
     scores, lows, highs = score(evidence, spacings[finest], centres[finest])
+    all_scores = scores + _mirrored(data, spacings[finest], centres[finest])
     share = REST_FLASH_SHARE if data.rest_half > 0 else FLASH_SHARE
     # flashes can not bring what scores less near the best
-    near = np.flatnonzero((1 + share) * scores >= MULTIPLE_SHARE * scores.max())
+    near = np.flatnonzero((1 + share) * all_scores >= MULTIPLE_SHARE * all_scores.max())
     spacings, centres, lows, highs = spacings[finest[near]], centres[finest[near]], lows[near], highs[near]
     flashes = flash_evidence(data, spacings, centres, lows, highs)
     totals = scores[near] + np.minimum(flashes, share * scores[near])
-    best = coarsest(spacings.tolist(), totals.tolist())
+    best = coarsest(spacings.tolist(), (totals + _mirrored(data, spacings, centres)).tolist())
     low, high = int(lows[best]), int(highs[best])
     return Candidate(float(spacings[best]), float(centres[best]), low, high, float(totals[best]))

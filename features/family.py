@@ -5,10 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .bandwidth import half_empty
 from .changing import ChangingSeparation, may_be_sought
 from .changing_fit import ChangingFit, Start, fit_changing
-from .comb import LEAST_REACH_MPS, Comb, find_comb
+from .comb import LEAST_REACH_MPS, Comb, find_comb, is_short
 from .comb_fit import CombFit
 from .drift import Straightened, ahead_left, straightened
 from .family_edge import edge_around, edge_of_lines, span_of
@@ -19,6 +18,7 @@ from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
 from .spectrum import Spectrum
 from .turning import DEGREES, bend, is_sure
 from .unresolved import judged, not_all
+from .weak_lines import without_weak_lines
 
 #: What the lines tell of the rate grows by so much once its change is taken out, where several rotors were found that
 #: are one; and where these were told apart.
@@ -30,6 +30,9 @@ GEARED_STEPS = 4
 #: Where the edge of the lines fitted and that of all about the orders differ by so many deviations, the fit of outer
 #: lines went astray.
 EDGE_DEVIATIONS = 4.0
+
+#: In a short dwell rotors that are not told apart show by so many flashes what they have in common.
+LEAST_FLASHES = 5.5
 
 #: A comb whose spacing is off by more than this, relative, from any multiple of another's is no part of that.
 FAR_OFF = 0.003
@@ -90,6 +93,20 @@ def slower_than_rotors(data: Periodogram, edge: float, edge_std: float) -> str:
     if edge_mps + edge_std_mps < LEAST_REACH_MPS:
         return f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
     return ""
+
+
+def too_few_flashes(family: Family) -> str:
+    """Why rotors that are not told apart give no number, in so short a dwell; empty where they do.
+
+    Their lines, some bins apart, run into one another, and what that leaves may be strong at any spacing.
+    """
+    data, chopping = family.data, family.comb.chopping
+    if family.is_told_apart or chopping * data.pulses > LEAST_FLASHES or not is_short(data):
+        return ""
+    return (
+        f"dwell too short: lines about {chopping * data.prf_hz:.0f} Hz apart are not one rotor's, "
+        f"to tell what they are takes {1e3 * LEAST_FLASHES / chopping / data.prf_hz:.0f} ms at least"
+    )
 
 
 def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None) -> tuple[Family | None, str]:
@@ -153,14 +170,15 @@ def _changing(data: Periodogram, spectrum: Spectrum, family: Family, edge: float
             return replace(family, ahead=left)
     unsure = replace(family, rotors=not_all(known, data)) if known.resolved else family
     reach = max(round(edge / comb.chopping), 1)
-    if not may_be_sought(data, comb.chopping, reach) or half_empty(spectrum.relative_power):
+    if not may_be_sought(data, comb.chopping, reach) or data.one_channel:
         return unsure
     apart = separate_rotors(data, comb, edge, ChangingSeparation)
     fits = [fit for fit in apart.fits if isinstance(fit, ChangingFit)]
     if len(fits) < 2 or (known.resolved and len(fits) > len(known.rates)):
         return unsure
     powers = powers_of(fits)
-    own, around = edge_of_lines(data, apart.fits, apart.rest, 1, None), edge_around(data, comb, apart, None)
+    own = edge_of_lines(data, apart.fits, apart.rest, 1, None)
+    around = edge_around(data, comb, apart, None, own)
     fitted_to = max(float(np.abs(fit.orders).max()) * fit.spacing for fit in fits)
     rotors = judged(apart, data, comb, max(min(own[0], span_of(data)), edge), fitted_to=fitted_to)
     led_astray = abs(own[0] - around[0]) > EDGE_DEVIATIONS * np.hypot(own[1], around[1])
@@ -189,6 +207,11 @@ def _as_it_is(data: Periodogram, blades: int | None, even: Straightened | None =
         return None, slow
     fills_span = bool(np.isinf(edge))
     gear, rotors, reason = find_gear(data, comb, min(edge, span_of(data)))
+    if gear is None and len(rotors.rates) == 1:  # of several the lines lie anywhere
+        without, alike = without_weak_lines(data, comb, blades)
+        again = find_gear(without, alike, min(edge, span_of(data))) if without is not data else None
+        if again is not None and again[0] is None and len(again[1].rates) == 1:
+            data, comb, (_, rotors, reason) = without, alike, again
     if gear is not None:
         data, comb = gear.alone, gear.first
         edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades, gear.second.spacing)

@@ -18,6 +18,10 @@ MERGED_BINS = 1.0
 #: deviation.
 AGREED_DEVIATIONS, APART_SHARE, CHANCE_SHARE = 2.0, 0.7, 0.25
 
+#: All about the orders holds those lines too: where it ends before this share of their edge, it says nothing of that.
+#: (A background's skirt may be so strong that what a rotor has past it is none beside it.)
+ASTRAY_SHARE = 0.6
+
 #: Share of the power of several rotors' family that does not count past its edge: what their inner lines leave between
 #: them lifts the level that the outer ones are read against.
 SEVERAL_LEAK = 0.005
@@ -224,6 +228,8 @@ def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple
     """
     if not np.isfinite(lines[0] + around[0]):
         return np.inf, np.inf
+    if around[0] < ASTRAY_SHARE * lines[0] and lines[1] < ASTRAY_SHARE * lines[0]:
+        return lines
     apart = abs(around[0] - lines[0])
     std = float(np.hypot(lines[1], max(APART_SHARE * apart, CHANCE_SHARE * around[1])))
     return (lines[0], std) if apart < AGREED_DEVIATIONS * around[1] and std < around[1] else around
@@ -274,7 +280,9 @@ def _noise_about(smear: NDArray[np.float64], level: NDArray[np.float64], flat: f
     return np.concatenate([level[:last], np.minimum(level[last:], np.exp(way))])
 
 
-def edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | None) -> tuple[float, float]:
+def edge_around(
+    data: Periodogram, comb: Comb, rotors: Rotors, blades: int | None, lines: tuple[float, float]
+) -> tuple[float, float]:
     """Edge of the line family by all that lies about each order: rotors that are not told apart count too.
 
     Parameters
@@ -287,6 +295,8 @@ def edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | Non
         What was told apart of it.
     blades : int, optional
         Of a rotor.
+    lines : (float, float)
+        From `edge_of_lines`: where noise and lines may be taken for one another, it tells which is which.
 
     Returns
     -------
@@ -337,10 +347,20 @@ def edge_around(data: Periodogram, comb: Comb, rotors: Rotors, blades: int | Non
         )
 
     edge, std = fitted(noise)
+    fastest = float(max(nominal, rotors.rates.max()))
     if _uneven_past(order[seen], mean, count, edge):
         level = np.where(usable, data.level_at(frequency), 0.0).sum(axis=-1) * pulses / size
-        edge, std = fitted(_noise_about(order[seen] * relative, (level * own).sum(axis=0)[seen] / count, flat))
-    fastest = float(max(nominal, rotors.rates.max()))
+        other = fitted(_noise_about(order[seen] * relative, (level * own).sum(axis=0)[seen] / count, flat))
+        # strong lines near one another lift the level between them as a receiver's band does: the lines tell, if any
+        one, another = (
+            abs(tried * fastest - lines[0]) / np.hypot(its_std * fastest, lines[1])
+            for tried, its_std in ((edge, std), other)
+        )
+        apart = abs(edge - other[0])
+        if not (one < AGREED_DEVIATIONS and another > 2 * AGREED_DEVIATIONS):
+            edge, std = other
+            if not (another < AGREED_DEVIATIONS and one > 2 * AGREED_DEVIATIONS):
+                std = float(np.hypot(std, apart / 2))
     # where the orders mix at the edge, the tips of the fastest and of the slowest are all that is told apart
     mixed = edge * relative / np.sqrt(12)
     # and the fastest of rotors that were not found turns by so much faster than any that was

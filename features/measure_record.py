@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .bandwidth import half_empty, threshold_band_hz
+from .bandwidth import threshold_band_hz
 from .body_velocity import body_velocity, folded
 from .chopping import Chopping
-from .family import Family, find_family, slower_than_rotors
+from .family import Family, find_family, slower_than_rotors, too_few_flashes
 from .family_edge import FASTEST_TIP_MPS, SPAN, edge_around, edge_of_lines, span_of, surer_edge
 from .measurements import BODY, EACH_ROTOR, Measurements
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
@@ -70,19 +70,18 @@ def measure_record(
     family, why = find_family(data, spectrum, blades)
     if family is not None:
         edge = _edge(family, blades)
-        why = slower_than_rotors(family.data, *edge)
+        why = slower_than_rotors(family.data, *edge) or too_few_flashes(family)
     if family is None or why:
         return out | {"reason": why} | _named(BODY, body_velocity(data, spectrum, None))
     out["reason"] = why
-    one_channel = bool(half_empty(spectrum.relative_power))
-    if one_channel:  # about a body whose sides lie in one another nothing is even: its own line tells
+    if data.one_channel:  # about a body whose sides lie in one another nothing is even: its own line tells
         velocity = body_velocity(data, spectrum, None, blades=True)
     else:
         middle = family.rotors.fits[0] if len(family.rotors.rates) > 1 else family.comb.fit
         steady, open_std = family.rotors.resolved, family.comb.body_std
         velocity = body_velocity(family.data, spectrum, middle, steady=steady, open_std=open_std)
     out |= _named(BODY, velocity) | _turning(family) | _geared(family)
-    out |= _band(family, edge, one_channel, beta_rad)
+    out |= _band(family, edge, beta_rad)
     out |= _blade(family, out, blades)
     return out | {"smearing_index": _index(family, spectrum, body, mask, out["chopping_hz"])}
 
@@ -97,9 +96,9 @@ def _edge(family: Family, blades: int | None) -> tuple[float, float]:
     several = len(rotors.rates) > 1
     edge, std = edge_of_lines(data, rotors.fits, rotors.rest, 1, blades) if several else (family.edge, family.edge_std)
     if not rotors.resolved:
-        return surer_edge((edge, std), edge_around(data, comb, rotors, blades))
+        return surer_edge((edge, std), edge_around(data, comb, rotors, blades, (edge, std)))
     if several and not std < UNSURE_SHARE * edge:  # the lines of rates just resolved hardly part within it
-        around = edge_around(data, comb, rotors, blades)
+        around = edge_around(data, comb, rotors, blades, (edge, std))
         return around if np.isinf(edge) else surer_edge((edge, std), around)
     return edge, std
 
@@ -146,7 +145,7 @@ def _geared(family: Family) -> dict[str, Any]:
     }
 
 
-def _band(family: Family, edge: tuple[float, float], one_channel: bool, beta_rad: float | None) -> dict[str, Any]:
+def _band(family: Family, edge: tuple[float, float], beta_rad: float | None) -> dict[str, Any]:
     """Doppler bandwidth and tip speed, or why there is none.
 
     Parameters
@@ -155,15 +154,13 @@ def _band(family: Family, edge: tuple[float, float], one_channel: bool, beta_rad
         What the lines come to.
     edge : (float, float)
         From `_edge`.
-    one_channel : bool
-        Whether one side of the spectrum is empty.
     beta_rad
         As in `measure`.
     """
     data, (away, std), span = family.data, edge, span_of(family.data)
     mps = data.prf_hz * data.wavelength_m / 2  # [m/s] for a cycle a sample
     furthest, why = FURTHEST_EDGE * span / SPAN, ""
-    if one_channel:
+    if data.one_channel:
         why = ONE_CHANNEL
     elif family.fills_span or not away + EDGE_DEVIATIONS * std < furthest:
         why = (
@@ -196,8 +193,7 @@ def _blade(family: Family, found: dict[str, Any], blades: int | None) -> dict[st
     """Rotation rate and blade length, where the number of blades is given or seen."""
     comb, rates = family.comb, family.rotors.rates
     # unequal blades tell their number; between the lines of several rotors the weak ones may be something else
-    seen = comb.per_turn if comb.per_turn > 1 and len(rates) == 1 else None
-    known = blades if blades is not None else seen
+    known = blades if blades is not None or len(rates) > 1 else comb.blades
     if known is None:
         return {}
     tip, tip_std = found["tip_speed_mps"], found["tip_speed_mps_std"]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .bandwidth import half_empty
 from .bodies import LINE_DB, line_among, other_body, slow_body, turns_of, within
 from .clicks import without_clicks
 from .evidence import Evidence, line_evidence
@@ -84,6 +85,8 @@ class Periodogram:
         Their levels over the floor [dB].
     wavelength_m, prf_hz : float
         Of the radar.
+    one_channel : bool
+        Whether one side of the spectrum is empty: both sides of all lines lie on the other, see `half_empty`.
     """
 
     samples: NDArray[np.complex128]
@@ -95,6 +98,7 @@ class Periodogram:
     centres_db: tuple[float, ...]
     wavelength_m: float
     prf_hz: float
+    one_channel: bool
 
     @property
     def blocked(self) -> tuple[tuple[float, float], ...]:
@@ -364,4 +368,5 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
         tuple(level for _, level in centres),
         spectrum.wavelength_m,
         spectrum.prf_hz,
+        bool(half_empty(spectrum.relative_power)),
     )

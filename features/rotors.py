@@ -114,7 +114,9 @@ def _is_twice(rest: Periodogram, centre: float, rate: float, fits: Sequence[Comb
 
 def _holds_another(fit: CombFit, pulses: int) -> bool:
     """True where only every so many-th line of a comb is there: a tail rotor's, whose rate is that multiple."""
-    return strong_multiple(fit.orders, 1 + pulses * np.abs(fit.amplitudes) ** 2, MOST_GEAR, GEAR_FACTOR) > 1
+    return (
+        strong_multiple(fit.orders, 1 + pulses * np.abs(fit.amplitudes) ** 2, range(2, MOST_GEAR + 1), GEAR_FACTOR) > 1
+    )
 
 
 def powers_of(fits: Sequence[CombFit]) -> list[float]:
@@ -351,9 +353,9 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float, how: type[Separa
         At least one.
     """
     nominal, centre = comb.chopping, comb.fit.centre
-    # one comb fitted to several finds its centre between them: a strong line near it tells better
+    # one comb fitted to several finds its centre between them: a strong line near it tells better, if it is a body's
     for line, level_db in zip(data.centres, data.centres_db, strict=True):
-        if level_db > LINE_DB and abs(line - centre) * data.pulses < 1.5:
+        if level_db > LINE_DB and abs(line - centre) * data.pulses < 1.5 and abs(line) > data.rest_half:
             centre = line
     reach = max(comb.last // comb.per_turn, int(np.clip(round(edge / nominal), 1, 0.45 / nominal)))
     alone = Rotors(np.array([nominal]), np.array([comb.chopping_std]), True, 0.0, [comb.fit], comb.rest, nominal)

@@ -98,9 +98,12 @@ def test_blades_and_a_background_beside_the_line_show_in_its_deviation(airframe,
         [Scene.build({"radar": radar, "uav": [uav], "clutter": [ground]}).render(seed).iq for seed in range(96)]
     )
     found, std, smeared = body_acceleration(iq, carrier_hz=CARRIER_HZ, prf_hz=25e3)
-    assert not smeared.any()
     # one in ten at most: of a few draws alone, more or fewer by chance
     assert (np.abs(found) > 4 * std).mean() <= 1 / 10
+    # and what is taken out is less than a line is wide
+    assert smeared.mean() <= 1 / 12
+    step_mps2 = WAVELENGTH_M / 2 * (25e3 / pulses) ** 2
+    assert np.all(np.abs(found[smeared]) < step_mps2)
 
 
 @pytest.mark.parametrize("pulses", [8, 500])
@@ -124,3 +127,20 @@ def test_a_constant_has_a_body_at_rest_and_no_acceleration(value):
     assert (std > 0).all()
     np.testing.assert_allclose(found, 0, atol=1e-2)
     assert not smeared.any()
+
+
+@pytest.mark.parametrize("smear_bins", [0.3, 0.9, 1.6, 2.4, 2.8, 3.2])
+def test_a_smear_of_a_fraction_of_a_bin_to_some_is_taken_out_and_one_rotor_stays_one(smear_bins):
+    step_mps2 = WAVELENGTH_M / 2 * (PRF_HZ / PULSES) ** 2
+    rng = np.random.default_rng(int(10 * smear_bins))
+    for _ in range(4):
+        rates_hz, velocity_mps = rng.uniform(45, 90, 1), rng.uniform(-15, 15)
+        iq = accelerated(10 * rotors(rates_hz, body=10.0, velocity_mps=velocity_mps), smear_bins * step_mps2)
+        iq = iq + white(rng, PULSES)
+        found, std, smeared = body_acceleration(iq, **RADAR)
+        assert smeared
+        assert abs(found - smear_bins * step_mps2) < 5 * std
+        after = measure(without_acceleration(iq, found, **RADAR), **RADAR)
+        assert after.rotor_count == 1
+        assert after.rotors_resolved
+        assert after.chopping_hz == pytest.approx(2 * rates_hz[0], rel=1e-4)

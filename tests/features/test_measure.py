@@ -125,6 +125,43 @@ def test_where_there_is_no_comb_there_is_a_reason_and_no_number(iq):
     assert found.alternatives() == []
 
 
+@pytest.mark.parametrize(("chopping_hz", "mains"), [(149.3, False), (149.8, True), (150.3, True), (150.9, False)])
+def test_a_loud_rotor_a_little_off_the_mains_is_one(chopping_hz, mains):
+    # a body whose lines would all lie on multiples of 50 Hz
+    velocity_mps = -chopping_hz * 4 * WAVELENGTH_M / 2
+    iq = 10 * rotors([chopping_hz / 2], velocity_mps=velocity_mps) + white(np.random.default_rng(2), PULSES)
+    found = measure(iq, **RADAR)
+    assert ("mains" in str(found.reason)) == mains
+    assert mains or found.chopping_hz == pytest.approx(chopping_hz, rel=1e-4)
+
+
+@pytest.mark.parametrize("velocity_mps", [0.0, 4.0, 8.0])
+def test_four_rotors_in_a_dwell_of_under_three_flashes_are_no_comb_of_a_multiple(velocity_mps):
+    """Their lines run into one another: every second to sixth was called a rotor's, surely."""
+    wrong = 0
+    for seed in range(8):
+        iq = rotors(np.array([69.0, 70.0, 71.0, 72.0]) + 0.1 * seed, velocity_mps=velocity_mps, body=6.0)
+        iq = 3 * iq[:700] + white(np.random.default_rng(seed), 700)  # 20 ms
+        found = measure(iq, **RADAR)
+        wrong += bool(np.isfinite(found.chopping_hz) and not 0.9 < found.chopping_hz / 141 < 1.1)
+    assert wrong <= 1
+
+
+@pytest.mark.parametrize("velocity_mps", [0.08, 0.15, 0.2, -0.2])
+def test_one_that_hovers_in_front_of_ground_is_one(velocity_mps):
+    """The ground's line at rest passed for the body's, and one rotor for two to five."""
+    single = 0
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        rate_hz = rng.uniform(60, 140)
+        ground = np.convolve(white(rng, PULSES + 1500), np.hanning(1500), "valid")[:PULSES]
+        ground *= 10 / np.sqrt(np.mean(np.abs(ground) ** 2))
+        iq = 10 * rotors([rate_hz], velocity_mps=velocity_mps) + ground + white(rng, PULSES)
+        found = measure(iq, **RADAR)
+        single += bool(found.rotors_resolved and found.rotor_count == 1)
+    assert single >= 5
+
+
 def test_mains_harmonics_are_no_rotor():
     times_s = np.arange(PULSES) / PRF_HZ
     hum = sum(np.exp(2j * np.pi * 100 * order * times_s + 1j * order) for order in range(-30, 31))
@@ -189,8 +226,8 @@ def test_rotors_that_are_not_alike_are_told_apart(chopping_hz):
 def test_strong_lines_of_unequal_blades():
     orders = np.arange(-20, 21)
     power = np.where(orders % 2 == 0, 100.0, 5.0)
-    assert strong_multiple(orders, power) == 2
-    assert strong_multiple(orders, np.full(41, 50.0)) == 1
+    assert strong_multiple(orders, power, range(2, 5)) == 2
+    assert strong_multiple(orders, np.full(41, 50.0), range(2, 5)) == 1
 
 
 def test_bad_arguments_are_refused():

@@ -63,4 +63,4 @@ def test_the_coarser_of_two_combs_that_speak_alike():
 def test_lines_that_cancel_at_the_low_orders_only_make_no_unequal_blades():
     orders = np.arange(-20, 21)
     power = np.where((orders % 2 == 0) | (np.abs(orders) > 12), 100.0, 2.0)
-    assert strong_multiple(orders, power) == 1
+    assert strong_multiple(orders, power, range(2, 5)) == 1

@@ -7,7 +7,7 @@ from bladewing.features.bandwidth import half_empty
 from bladewing.features.measure_record import ONE_CHANNEL
 from scipy.signal import hilbert
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, rotors, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, white
 
 RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 SEEDS = 8
@@ -60,6 +60,29 @@ def test_one_channel_made_analytic_has_no_band(velocity_mps):
     assert found.chopping_hz == pytest.approx(114.6, rel=0.01)
     # nothing is even about the body any more: its own line tells, whose side is anyone's guess
     assert np.abs(found.body_velocity_mps) == pytest.approx(abs(velocity_mps), abs=0.05)
+
+
+@pytest.mark.parametrize("velocity_mps", [0.3, 2.0, 4.0, -5.0, 9.0])
+@pytest.mark.parametrize("blades", [2, 3])
+def test_one_channel_has_the_chopping_frequency_and_no_fraction_of_it(velocity_mps, blades):
+    """About the body's mirror image lies a second comb: every third line of a third of the spacing was one of these."""
+    right = 0
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        iq = rotors([61.3], velocity_mps=velocity_mps, amplitudes=np.ones(blades), body=10.0) * 5 + white(rng, PULSES)
+        found = measure(hilbert(iq.real), **RADAR)
+        right += abs(found.chopping_hz / (61.3 * blades) - 1) < 0.01
+    assert right >= 5  # before, in some of these places none
+
+
+@pytest.mark.parametrize("away", [0.31, -0.31])
+def test_a_fast_body_whose_lines_all_lie_on_one_side_is_no_single_channel(away):
+    rng = np.random.default_rng(8)
+    velocity_mps = away * PRF_HZ * WAVELENGTH_M / 2
+    iq = 30 * rotors([61.3], velocity_mps=velocity_mps, length_m=0.1) + white(rng, PULSES)
+    found = measure(iq, **RADAR, blades=2, beta_rad=0.0)
+    assert found.band_reason == ""
+    assert found.blade_length_m == pytest.approx(0.1, rel=0.01)
 
 
 @pytest.mark.parametrize("bins", [1, 2, 7, 8, 64, 4096])

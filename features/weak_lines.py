@@ -1,0 +1,81 @@
+"""Weak lines between those of a comb: blades that are not quite alike have some at every multiple of the rotation rate.
+
+Left out of the fit they leak into the strong ones, all the same way, and what they pull there passes for another rate
+or for one that changes: of two blades 0.1 rad apart, a quarter of a millimetre at 10 GHz, by some ten deviations.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from .comb import LEAST_LINES, MOST_BLADES, UNEQUAL_NATS, Comb, two_means_nats
+from .comb_fit import CombFit, fit_combs
+from .lines import LineSpace, squared, sum_of_lines
+from .periodogram import Periodogram
+from .slow_lines import remove_bands
+
+#: They are fitted where so much speaks for them, beside what lies as far from any line [nats]: needlessly fitted they
+#: do no harm. They must be so far from the strong ones and from one another [bins].
+LEAST_NATS, LEAST_BINS = 3.0, 2.5
+
+#: They are as even as noise: where the strongest of them holds so large a share of all, that is another's line.
+MOST_SHARE = 0.3
+
+
+def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None) -> tuple[Periodogram, Comb]:
+    """Fit a comb again with the lines that unlike blades have between its own, and take these out of the record.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    comb : Comb
+        The comb found in it.
+    blades : int, optional
+        Of a rotor: their number is else 2 to `MOST_BLADES`, if lines show it.
+
+    Returns
+    -------
+    data : Periodogram
+        The record without the lines between; the one given where there are none.
+    comb : Comb
+        The comb as it is fitted beside them.
+    """
+    fit, best, most = comb.fit, 1, 0.0
+    if comb.per_turn > 1:
+        return data, comb
+    space, level = LineSpace(comb.rest), data.level_of(comb.rest)
+    last = int(np.abs(fit.orders).max())
+    for parts in range(2, MOST_BLADES + 1) if blades is None else (blades,):
+        if parts < 2 or fit.spacing * data.pulses < LEAST_BINS * parts:
+            continue
+        order = np.arange(-last * parts, last * parts)
+        own = order[np.gcd(order, parts) == 1]  # those of fewer blades may be there without them
+        places = (fit.centre + fit.spacing * tried / parts for tried in (own, order + 0.5))
+        seen = [place[data.usable(place)] for place in places]
+        there, beside = (squared(space.at(place)[0]) * data.pulses / level(place) for place in seen)
+        if min(len(there), len(beside)) < LEAST_LINES or there.max() > MOST_SHARE * there.sum():
+            continue
+        nats = two_means_nats(there, beside)
+        if there.mean() > beside.mean() and nats > LEAST_NATS:
+            best, most = parts, nats
+    if best == 1:
+        return data, comb
+    reach = (int(fit.orders.min()) * best, int(fit.orders.max()) * best)
+    fitted = fit_combs(data, fit.centre, [fit.spacing / best], [reach])
+    if fitted is None:
+        return data, comb
+    (whole,), rest = fitted
+    strong = whole.orders % best == 0
+    weak = sum_of_lines(data.pulses, whole.frequencies[~strong], whole.amplitudes[~strong])
+    own = CombFit(
+        whole.spacing * best,
+        whole.centre,
+        whole.spacing_std * best,
+        whole.centre_std,
+        whole.orders[strong] // best,
+        whole.amplitudes[strong],
+        whole.snr[strong],
+    )
+    told = best if most > UNEQUAL_NATS else None
+    return data.left(data.samples - remove_bands(weak, data.bands)), replace(comb, fit=own, rest=rest, blades=told)
