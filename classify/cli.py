@@ -228,9 +228,10 @@ def train(
     ] = None,
 ) -> None:
     """Train all models on synthetic records and write them as ONNX; interrupted, the same command goes on."""
-    from .train import PARTS, run_training
+    from .parts import TRAIN_PARTS
+    from .train import run_training
 
-    with _goes_on(out / PARTS):
+    with _goes_on(out / TRAIN_PARTS):
         run_training(out, records=records, seed=seed, quick=quick, config=config, data=data, progress=True)
 
 
@@ -293,9 +294,10 @@ def report(
     ] = None,
 ) -> None:
     """Measure models on fresh synthetic records: what each choice costs; interrupted, the same command goes on."""
-    from .report.run import PARTS, run_report
+    from .parts import REPORT_PARTS
+    from .report import run_report
 
-    with _goes_on(out / PARTS):
+    with _goes_on(out / REPORT_PARTS):
         run_report(out, models=models, quick=quick, seed=seed, config=config, progress=True)
 
 
@@ -373,6 +375,7 @@ def tables(
     from .tables import markdown, run_tables
 
     print(markdown(run_tables(out, seed)), flush=True)
+    print(f"Wrote {out / 'tables.md'} and {out / 'tables.json'}", flush=True)
 
 
 @contextmanager

@@ -154,7 +154,8 @@ def run_dataset(
     plan = Plan.of(training_config(config, records=records, seed=seed))
     with Progress(visible=progress) as bars:
         written = write_dataset(Path(out), plan, bars)
-    bars.say(f"{out}: {sum(plan.records.values())} records, {written} shards written, complete")
+    count, shards = sum(plan.records.values()), len(plan.shards())
+    bars.say(f"{out}: complete: {count} records in shards: {shards}, of which {written} were written now")
     return plan
 
 

@@ -75,6 +75,16 @@ def _chance(zeros: int, near: int, share: float) -> float:
     return float(bdtrc(zeros - 1, zeros + near, share))
 
 
+def longest_silence(iq: NDArray[np.complex64]) -> tuple[int, int]:
+    """Where the longest run of zeros begins that is too long to be filled in, and its pulses; 0 where there is none."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], iq == 0, [0]])))
+    starts, lengths = edges[::2], np.diff(edges)[::2]
+    if not len(lengths) or lengths.max() <= MOST_IN_A_ROW or lengths.max() == len(iq):
+        return 0, 0
+    longest = int(lengths.argmax())
+    return int(starts[longest]), int(lengths[longest])
+
+
 def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.complex64]:
     """Fill in lost pulses from those before and after them.
 

@@ -64,8 +64,10 @@ def chosen_name(
     Raises
     ------
     BadInput
-        Both are given, or no model keeps to the budget.
+        Both are given, it is no name and no path, or no model keeps to the budget.
     """
+    if not isinstance(name_or_path, str | os.PathLike | None):
+        raise BadInput(f"the model is {name_or_path!r}: give a name or the path of an .onnx file")
     given = DEFAULT_MODEL if name_or_path is None else os.fspath(name_or_path)
     if budget_us is None and given not in PLACES:
         return given

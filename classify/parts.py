@@ -19,6 +19,9 @@ from numpy.typing import NDArray
 from .errors import BadInput
 from .files import read_bounded, write_whole
 
+#: Folders of what is finished so far, beside the results while a training or a report is not done.
+TRAIN_PARTS, REPORT_PARTS = "train-parts", "report-parts"
+
 _MOST_BYTES = 1 << 30
 
 

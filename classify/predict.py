@@ -157,7 +157,11 @@ class Answer:
             said = f"{_SHOWN[name].format(rate_hz)}: the odds of {_WHOSE[whose]} count {odds:g} times"
             console.print(Text(said))
         if self.declared_s is not None:
-            later = "" if self.track.declared == self.track.label else ", which later dwells do not bear out"
+            later = (
+                ""
+                if self.track.declared == self.track.label
+                else ", which later dwells and longer looks do not bear out"
+            )
             console.print(Text(f"declared {self.track.declared} after {self.declared_s:.3g} s{later}"))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .arrays import ARRAY_SUFFIXES, read_array
 from .clipping import clipped_values
-from .dropouts import filled, lost_pulses
+from .dropouts import filled, longest_silence, lost_pulses
 from .errors import BadInput
 from .samples import complex_samples, positive
 from .sigmf_file import find_sigmf, read_sigmf
@@ -113,6 +113,12 @@ class Recording:
                 f"lost: {lost} of {len(self.iq)} pulses are exactly 0, which draws lines that are no target's beside "
                 "every line: interpolate them from their neighbours"
             )
+        start, silent = longest_silence(self.iq)
+        if silent:
+            said.append(
+                f"silence: {silent} pulses in a row are exactly 0 from {self.start_s + start / self.prf_hz:.6g} s on, "
+                "too many to be filled in: what is said of dwells in which they lie is of less than a dwell"
+            )
         if self.iq.real.any() != self.iq.imag.any():
             said.append(
                 f"one channel: {'Q' if self.iq.real.any() else 'I'} is 0 in every pulse, so that both sides of the "
@@ -160,14 +166,14 @@ def load_recording(
     iq = _one_range_cell(samples, name)
     carrier = _agreed(name, "carrier", "--carrier-hz", carrier_hz, file_carrier_hz)
     prf = _agreed(name, "PRF", "--prf-hz", prf_hz, file_prf_hz)
-    if carrier is None and prf is None:
+    if carrier is None or prf is None:
+        missing = {"carrier (SigMF core:frequency)": carrier, "PRF (SigMF core:sample_rate)": prf}
         of_array = found.suffix.lower() in ARRAY_SUFFIXES
-        says = "of arrays the samples alone are read" if of_array else "the file says no carrier and no PRF"
-        raise BadInput(f"{name}: {says}: give --carrier-hz and --prf-hz [Hz]")
-    if carrier is None:
-        raise BadInput(f"{name}: the file says no carrier (SigMF core:frequency): give --carrier-hz [Hz]")
-    if prf is None:
-        raise BadInput(f"{name}: the file says no PRF (SigMF core:sample_rate): give --prf-hz [Hz]")
+        no = " and no ".join(what for what, value in missing.items() if value is None)
+        says = "of arrays the samples alone are read" if of_array else f"the file says no {no}"
+        options = {"--carrier-hz": carrier, "--prf-hz": prf}
+        give = " and ".join(option for option, value in options.items() if value is None)
+        raise BadInput(f"{name}: {says}: give {give} [Hz]")
     lost = lost_pulses(iq)
     whole = filled(iq, lost) if lost.any() else iq
     return Recording(name, whole, carrier, prf, first / prf, int(np.count_nonzero(whole[lost])))

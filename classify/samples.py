@@ -32,7 +32,11 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
         raise BadInput(f"{name}: {hidden} samples are masked: every sample counts: {FILL_IN}")
     given = np.asarray(values)
     if given.dtype.names is not None:
-        raise BadInput(f"{name}: a structured array with fields {list(given.dtype.names)}: store complex samples")
+        fields = list(given.dtype.names)
+        one, other = fields if len(fields) == 2 else ("re", "im")
+        raise BadInput(
+            f"{name}: a structured array with fields {fields}: store complex samples: x[{one!r}] + 1j * x[{other!r}]"
+        )
     if given.dtype.kind == "O":
         raise BadInput(f"{name}: an array of Python objects: store complex samples (complex64)")
     if given.dtype.kind in "fiub":

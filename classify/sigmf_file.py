@@ -216,9 +216,15 @@ def _check_structure(metadata: Any, path: Path) -> None:
     datatype = general.get("core:datatype")
     match = _DATATYPE.fullmatch(datatype) if isinstance(datatype, str) else None
     if match is None:
-        raise BadInput(f"{path}: core:datatype is {datatype!r}: it must be a SigMF type such as 'cf32_le'")
+        raise BadInput(
+            f"{path}: core:datatype is {datatype!r}: it must be the SigMF type of the samples, such as 'cf32_le' "
+            "(c for complex; f, i or u; 8, 16, 32 or 64 bits; _le or _be)"
+        )
     if match[1] == "r":
-        raise BadInput(f"{path}: real samples (core:datatype {datatype}): IQ must be complex, such as cf32_le")
+        raise BadInput(
+            f"{path}: real samples (core:datatype {datatype}): IQ must be complex, such as cf32_le: of one channel "
+            "scipy.signal.hilbert makes it"
+        )
     channels = _count(general, "core:num_channels", str(path), absent=1)
     if channels != 1:
         raise BadInput(

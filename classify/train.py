@@ -25,15 +25,12 @@ from .inference import Classifier
 from .labels import CLASSES
 from .ladder import CASCADE
 from .model_file import COVERAGES, CURVE_KEY, KINDS_KEY, SETS_KEY
-from .parts import Parts
+from .parts import TRAIN_PARTS, Parts
 from .progress import Progress
 from .train_network import OnFraction, ScoresOf, Taught, epochs_of, train_net
 from .training_account import ACCOUNT, alarm_threshold, covered, figures, print_table
 from .training_config import TrainingConfig, training_config
 from .training_costs import add_costs
-
-#: Folder of what is trained so far, beside the models while the run is not done.
-PARTS = "train-parts"
 
 
 def run_training(
@@ -84,7 +81,7 @@ def run_training(
     versions = _versions()
     simulator = simulator_digest() if stored is None else stored.simulator_sha256
     parts = Parts(
-        out / PARTS,
+        out / TRAIN_PARTS,
         {
             "settings": settings.model_dump(mode="json"),
             "run_records": TASK_RECORDS if stored is None else SHARD_RECORDS,  # kept parts hold so many of these
@@ -103,7 +100,7 @@ def run_training(
             parts.arrays(part)
     with Progress(visible=progress) as bars:
         if resumed:
-            bars.say(f"Going on with what an interrupted run left in {out / PARTS}")
+            bars.say(f"Going on with what an interrupted run left in {out / TRAIN_PARTS}")
         if simulator != simulator_digest():
             bars.say(f"{data}: written by another simulator or on another machine: a drawn set would differ")
         sets = _gather(settings, stored, bars, parts)

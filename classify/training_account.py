@@ -13,6 +13,9 @@ from .ladder import CASCADE, COST_KEY, STAGES_KEY
 #: Name of the account beside the models.
 ACCOUNT = "train.json"
 
+#: A cascade whose second model is asked about more records than this is of no use.
+MOST_ASKED = 0.9
+
 
 def alarm_threshold(probabilities: NDArray[np.floating], labels: NDArray[np.integer], false_alarm: float) -> float:
     """UAV probability that at most this share of the birds and the clutter reaches."""
@@ -88,8 +91,10 @@ def print_table(account: dict[str, Any], out: Path) -> None:
     )
     if cascade:
         first, second = cascade[STAGES_KEY]
+        useless = " (so many that the second alone is as fast)" if cascade["asked"] > MOST_ASKED else ""
         console.print(
-            f"cascade   {first} first, then {second}\n          about the {cascade['asked']:.0%} that it is not sure of"
+            f"cascade   {first} first, then {second}\n"
+            f"          about the {cascade['asked']:.0%} that it is not sure of{useless}"
         )
     since = " since the interruption" if account["resumed"] else ""
     took = f"trained in {account['seconds']['all']:.0f} s{since}"

@@ -29,7 +29,7 @@ from ..gather import inputs_digest
 from ..inference import Classifier
 from ..labels import CLASSES
 from ..ladder import CASCADE, STAGES_KEY
-from ..parts import Parts
+from ..parts import REPORT_PARTS, Parts
 from ..progress import Progress
 from ..stability.run import worst_of_each
 from ..training_account import ACCOUNT
@@ -45,9 +45,6 @@ from .page import SCHEMA_VERSION, draw_page
 from .pictures import PICTURES
 from .series import LADDER
 from .settings import ReportConfig, report_config
-
-#: Folder of what is measured so far, beside the report's own files while it is being made.
-PARTS = "report-parts"
 
 #: Name of the default model with its products in eight bits.
 EIGHT_BITS = f"{DEFAULT_MODEL}-int8"
@@ -329,7 +326,7 @@ def run_report(
         Classifier(content, source=name)  # what cannot be used is told before anything is measured
     out = result_folder(out)
     stability = worst_of_each(out)
-    parts = Parts(out / PARTS, _of(settings, found, account))
+    parts = Parts(out / REPORT_PARTS, _of(settings, found, account))
     started, clock, resumed = datetime.now(UTC), time.perf_counter(), parts.begun
     with Progress(visible=progress) as bars:
         body = measure(found, settings, parts=parts, progress=bars, account=account)

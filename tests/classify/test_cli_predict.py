@@ -142,13 +142,14 @@ def test_a_silent_dwell_is_unknown_and_left_out_of_the_track(run_json, sigmf_pai
     iq = noise(3200)
     iq[:1600] = 0
     silent, heard, closing = run_json(sigmf_pair(iq=iq))
+    (remark,) = closing["track"].pop("remarks")
+    assert remark.startswith("silence: 1600 pulses in a row are exactly 0 from 0 s on")
     assert (silent["label"], silent["reason"]) == ("unknown", "no signal: every sample is 0")
     said = {"label": "uav", "probabilities": heard["probabilities"], "dwells": 2}
     assert closing["track"] == said | {
         "declared": "uav",
         "declared_s": 0.16,
         "left_out_s": 0.0,
-        "remarks": [],
         **STILL,
     }  # the silent dwell took its time
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bladewing.classify import Classifier, answer, load_recording
-from bladewing.classify.dropouts import filled, lost_pulses
+from bladewing.classify.dropouts import filled, longest_silence, lost_pulses
 from bladewing.classify.recording import Recording
 
 PULSES = np.arange(20000)
@@ -70,6 +70,22 @@ def test_a_silence_is_no_lost_pulses() -> None:
     assert not lost_pulses(iq).any()
     iq[10:20] = 0
     assert np.flatnonzero(lost_pulses(iq)).tolist() == list(range(10, 20))
+
+
+def test_a_recording_tells_of_a_silence_that_cannot_be_filled_in() -> None:
+    iq = noise(np.random.default_rng(5), 2000)
+    iq[300:500] = iq[700:750] = 0
+    assert longest_silence(iq) == (300, 200)
+    recording = Recording("walk", iq, 24e9, 1e4)
+    (said,) = recording.remarks(0.1, recording.dwells(0.1))
+    assert said.startswith("silence: 200 pulses in a row are exactly 0 from 0.03 s on, too many to be filled in")
+    for whole in (
+        iq[:300],
+        np.zeros(200, np.complex64),
+        np.zeros(0, np.complex64),
+        np.where(np.arange(300) < 32, 0, 1),
+    ):
+        assert longest_silence(whole)[1] == 0
 
 
 def test_a_recording_tells_of_a_channel_that_is_missing() -> None:

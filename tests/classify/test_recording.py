@@ -82,8 +82,8 @@ def test_samples_that_are_refused(npy, array, said):
     ("options", "said"),
     [
         ({}, "of arrays the samples alone are read: give --carrier-hz and --prf-hz"),
-        ({"prf_hz": PRF_HZ}, "no carrier .*: give --carrier-hz"),
-        ({"carrier_hz": CARRIER_HZ}, "no PRF .*: give --prf-hz"),
+        ({"prf_hz": PRF_HZ}, "of arrays the samples alone are read: give --carrier-hz .Hz.$"),
+        ({"carrier_hz": CARRIER_HZ}, "of arrays the samples alone are read: give --prf-hz .Hz.$"),
         (RADAR | {"prf_hz": 0.0}, r"PRF given \(--prf-hz\) is 0: it must be a finite number above 0"),
         (RADAR | {"prf_hz": -5.0}, r"PRF given \(--prf-hz\) is -5"),
         (RADAR | {"carrier_hz": float("nan")}, r"carrier given \(--carrier-hz\) is nan"),

@@ -136,7 +136,9 @@ def test_the_files_hold_all_tables_and_no_nan(made):
 def test_the_command_prints_what_it_writes(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(module, "TABLES", {"The paper's bird": module.bird})
     assert main(["tables", "--out", str(tmp_path / "new"), "--seed", "2"]) == 0
-    assert capsys.readouterr().out.strip() == (tmp_path / "new" / "tables.md").read_text().strip()
+    *printed, written = capsys.readouterr().out.splitlines()
+    assert "\n".join(printed).strip() == (tmp_path / "new" / "tables.md").read_text().strip()
+    assert written == f"Wrote {tmp_path / 'new' / 'tables.md'} and {tmp_path / 'new' / 'tables.json'}"
 
 
 def test_a_folder_that_cannot_be_is_one_line(tmp_path, capsys, monkeypatch):

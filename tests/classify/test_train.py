@@ -14,6 +14,7 @@ from bladewing.classify.errors import BadInput
 from bladewing.classify.gather import Gathered, Sets, gather
 from bladewing.classify.labels import CLASSES
 from bladewing.classify.model_file import COVERAGES
+from bladewing.classify.parts import TRAIN_PARTS
 from bladewing.classify.train import run_training
 from bladewing.classify.train_network import CLASS_OF_KIND, kinds_of, train_net
 from bladewing.classify.training_account import alarm_threshold, figures
@@ -397,7 +398,7 @@ def test_a_run_that_another_one_overtook_writes_nothing_and_keeps_what_it_did(tm
     with pytest.raises(BadInput, match=r"holds image-cnn\.onnx of another training"):
         run_training(tmp_path, config=config, progress=False)
     assert not list(tmp_path.glob("features-linear*"))
-    assert list((tmp_path / train.PARTS).iterdir())
+    assert list((tmp_path / TRAIN_PARTS).iterdir())
 
 
 def test_a_file_in_the_place_of_the_folder_is_named(tmp_path):
