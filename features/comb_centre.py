@@ -23,6 +23,10 @@ EVEN, ENDS_DB, CLEAR_DB = 20.0, 20.0, 30.0
 #: another is so many times that of Gaussian levels, which are those of several rotors' lines.
 LEAST_UNEVEN, UNEVEN_WEIGHT = 0.05, 3.0
 
+#: By this variance [nats^2] levels to both sides differ that have nothing to do with one another; from half of it on it
+#: says less that they are about even there.
+UNRELATED = np.pi**2 / 3
+
 #: A family goes on over so many orders that do not show. So far about the middle of its ends [orders] the one about
 #: which it is even is sought.
 ENDS_GAP, MIDDLE_REACH = 2, 3
@@ -112,8 +116,8 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
     highest_db = 10 * float(np.log10(power.max(initial=1.0)))
     even: dict[int, float] = {}
     if highest_db > CLEAR_DB:
-        unlikely = _even_orders(data, found, 10 ** ((highest_db - ENDS_DB) / 10))
-        even = {order: EVEN - nats for order, nats in unlikely.items() if nats < EVEN}
+        unlikely, most_even = _even_orders(data, found, 10 ** ((highest_db - ENDS_DB) / 10))
+        even = {order: most_even - nats for order, nats in unlikely.items() if nats < most_even}
         out += [(found.centre + found.spacing * order, 0.0) for order in even]
     others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
     moving = 0.0
@@ -145,8 +149,8 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
     return most, even
 
 
-def _even_orders(data: Periodogram, found: Candidate, least: float) -> dict[int, float]:
-    """Orders about which what shows of this power is about even, and what the evenest has before each [nats].
+def _even_orders(data: Periodogram, found: Candidate, least: float) -> tuple[dict[int, float], float]:
+    """Orders about which what shows of this power is about even, and what the evenest has before each, and by itself.
 
     All that lies about each order counts, the lines of several rotors too that it has parted from. The levels of two
     places as far to both sides differ by what the blades' echoes make of it and by chance, of one variance for all.
@@ -162,7 +166,7 @@ def _even_orders(data: Periodogram, found: Candidate, least: float) -> dict[int,
     groups = np.split(shows, np.flatnonzero(np.diff(shows) > 1 + ENDS_GAP) + 1)
     own = [group for group in groups if np.any((order[group] >= found.low) & (order[group] <= found.high))]
     if not own:
-        return {0: 0.0}
+        return {0: 0.0}, EVEN
     first, last = int(own[0][0]), int(own[-1][-1])
     half = (last - first) // 2 + ENDS_GAP
     nats = np.pad(np.log(np.maximum(highest, least)), half, constant_values=np.log(least))
@@ -174,4 +178,5 @@ def _even_orders(data: Periodogram, found: Candidate, least: float) -> dict[int,
     count = np.maximum(both.sum(axis=1), 1)
     uneven = (both * (nats[after] - nats[before]) ** 2).sum(axis=1) / count + LEAST_UNEVEN
     unlikely = UNEVEN_WEIGHT * count / 2 * np.log(uneven / uneven.min())
-    return dict(zip(order[tried].tolist(), unlikely.tolist(), strict=True))
+    related = float(np.clip(2 * (1 - uneven.min() / UNRELATED), 0, 1))
+    return dict(zip(order[tried].tolist(), unlikely.tolist(), strict=True)), EVEN * related
