@@ -73,8 +73,10 @@ class Comb:
         Strong lines are this many spacings apart: 1 for equal blades (or a lone one), else the number of blades.
     body_std : float
         Standard deviation of the body's place, where several of its lines may be the body's [cycles a sample].
-    blades : int or None
-        How many blades unequal lines show; None where they do not.
+    blades : int
+        How many blades unequal lines speak for; 1 where they are equal.
+    blades_sure : bool
+        Whether that is more than chance.
     """
 
     fit: CombFit
@@ -82,7 +84,8 @@ class Comb:
     last: int
     per_turn: int
     body_std: float
-    blades: int | None
+    blades: int
+    blades_sure: bool
 
     @property
     def chopping(self) -> float:
@@ -249,5 +252,5 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     for number in sorted({1, per_turn}):
         if of_mains(fit, data, start.score, number):
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"
-    last, seen = max(start.high, -start.low), per_turn if per_turn > 1 else None
-    return Comb(fit, fitted[1], last, per_turn, open_orders * fit.spacing, seen), ""
+    last = max(start.high, -start.low)
+    return Comb(fit, fitted[1], last, per_turn, open_orders * fit.spacing, per_turn, per_turn > 1), ""

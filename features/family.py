@@ -1,6 +1,7 @@
 """The line family of a record's rotors: comb, edge, second comb and single rotors, of rates that may change."""
 
 from dataclasses import dataclass, replace
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
 from .spectrum import Spectrum
 from .turning import DEGREES, bend, is_sure
 from .unresolved import judged, not_all
-from .weak_lines import without_weak_lines
+from .weak_lines import by_rotation, without_weak_lines
 
 #: What the lines tell of the rate grows by so much once its change is taken out, where several rotors were found that
 #: are one; and where these were told apart.
@@ -139,20 +140,35 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
     edge = min(family.edge, span_of(data))
     several_gain = BELIEVED_GAIN if family.is_told_apart else SEVERAL_GAIN
     least_gain = several_gain if len(family.rotors.rates) > 1 else 0.0
-    even = straightened(data, family.comb, edge, least_gain=least_gain)
+
+    def evened(comb: Comb) -> tuple[Straightened | None, Family | None]:
+        even = straightened(data, comb, edge, least_gain=least_gain)
+        again = prepared((even.samples * np.sqrt(spectrum.floor)).astype(np.complex64), spectrum) if even else None
+        return even, _as_it_is(again, blades, even)[0] if again is not None else None
+
+    comb = by_rotation(family.comb)
+    even, other = evened(comb)
     if even is None:
         return _changing(data, spectrum, family, edge), ""
-    again = prepared((even.samples * np.sqrt(spectrum.floor)).astype(np.complex64), spectrum)
-    other = _as_it_is(again, blades, even)[0] if again is not None else None
+    if _is_one(other) and other.comb.blades > comb.blades:  # narrow, its lines show weak ones that pulled at its rate
+        comb = by_rotation(replace(family.comb, blades=other.comb.blades))
+        finer = evened(comb)
+        if finer[0] is not None and _is_one(finer[1]):
+            even, other = finer
     # what was straightened may be the tail's comb; but several rotors may pass for that one and a slower one as well
-    slower = other is not None and other.gear is not None and other.comb.fit.spacing < (1 - FAR_OFF) * even.fit.spacing
-    if other is not None and other.is_told_apart and len(other.rotors.rates) == 1 and not slower:
+    slower = other is not None and other.gear is not None and other.comb.chopping < (1 - FAR_OFF) * comb.chopping
+    if _is_one(other) and not slower:
         return other, ""
     apart = _changing(data, spectrum, family, edge)
     # and several that are so but for a change that they share are believed where nothing better is found
     if family.is_told_apart or apart.is_told_apart or other is None or not other.is_told_apart:
         return apart, ""
     return other, ""
+
+
+def _is_one(family: Family | None) -> TypeGuard[Family]:
+    """True where a family is that of one rotor, or of a helicopter, and nothing is left."""
+    return family is not None and family.is_told_apart and len(family.rotors.rates) == 1
 
 
 def _changing(data: Periodogram, spectrum: Spectrum, family: Family, edge: float) -> Family:

@@ -193,7 +193,7 @@ def _blade(family: Family, found: dict[str, Any], blades: int | None) -> dict[st
     """Rotation rate and blade length, where the number of blades is given or seen."""
     comb, rates = family.comb, family.rotors.rates
     # unequal blades tell their number; between the lines of several rotors the weak ones may be something else
-    known = blades if blades is not None or len(rates) > 1 else comb.blades
+    known = blades if blades is not None or len(rates) > 1 or not comb.blades_sure else comb.blades
     if known is None:
         return {}
     tip, tip_std = found["tip_speed_mps"], found["tip_speed_mps_std"]

@@ -77,5 +77,12 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None)
         whole.amplitudes[strong],
         whole.snr[strong],
     )
-    told = best if most > UNEQUAL_NATS else None
-    return data.left(data.samples - remove_bands(weak, data.bands)), replace(comb, fit=own, rest=rest, blades=told)
+    told = replace(comb, fit=own, rest=rest, blades=best, blades_sure=most > UNEQUAL_NATS)
+    return data.left(data.samples - remove_bands(weak, data.bands)), told
+
+
+def by_rotation(comb: Comb) -> Comb:
+    """The same comb counted in rotations, so that the weak lines between its own are of it too."""
+    parts, fit = comb.blades // comb.per_turn, comb.fit
+    finer = replace(fit, spacing=fit.spacing / parts, spacing_std=fit.spacing_std / parts, orders=fit.orders * parts)
+    return replace(comb, fit=finer, last=comb.last * parts, per_turn=comb.per_turn * parts)
