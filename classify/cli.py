@@ -384,9 +384,9 @@ def _goes_on(kept: Path) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        if not kept.is_dir():
+        if not kept.is_dir() or not any(kept.iterdir()):
             raise
-        raise Interrupted(f"what is done is kept in {kept}: the same command goes on, or remove it") from None
+        raise Interrupted(f"what is done is kept in {kept}: the same command goes on") from None
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 #: more than this share of these. Samples without steps differ by next to nothing, and next to none is nearly 0.
 NEAR_STEPS, NEAR_SHARE = 2.1, 0.5
 
-#: Nor may they be chance, likelier than this: of two channels 25 places lie so near, each about as likely as 0, of one
-#: channel 5. (Of two, three zeros and none nearly 0 are none; of one it takes six.)
-CHANCE, PLACES, PLACES_OF_ONE = 1e-4, 25, 5
+#: They are so many, and not chance, likelier than this: of two channels 25 places lie so near, each about as likely as
+#: 0, of one channel 5, so that it takes six of one. Samples that are hardly ever alike have no such places.
+LEAST_LOST, CHANCE, PLACES, PLACES_OF_ONE, ALIKE = 3, 1e-4, 25, 5, 0.01
 
 #: More zeros in a row are silence, which is no comb, and too long to be filled in.
 MOST_IN_A_ROW = 32
@@ -51,7 +51,7 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     lost = none.copy()
     lost[~there] = np.repeat(runs, runs) <= MOST_IN_A_ROW
     zeros = int(lost.sum())
-    if not zeros or not there.any():
+    if zeros < LEAST_LOST or not there.any():
         return none
     held = np.sort(size[there])
     steps = np.diff(held)
@@ -65,7 +65,8 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
         return none
     near = int(np.searchsorted(held, nearly, side="right"))
     places = PLACES if iq.real.any() and iq.imag.any() else PLACES_OF_ONE
-    return lost if zeros > NEAR_SHARE * near and _chance(zeros, near, 1 / places) < CHANCE else none
+    stepless = 1 - (len(steps) + 1) / len(held) < ALIKE
+    return lost if zeros > NEAR_SHARE * near and (stepless or _chance(zeros, near, 1 / places) < CHANCE) else none
 
 
 def _chance(zeros: int, near: int, share: float) -> float:
@@ -80,6 +81,8 @@ def longest_silence(iq: NDArray[np.complex64]) -> tuple[int, int]:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], iq == 0, [0]])))
     starts, lengths = edges[::2], np.diff(edges)[::2]
     if not len(lengths) or lengths.max() <= MOST_IN_A_ROW or lengths.max() == len(iq):
+        return 0, 0
+    if len(np.unique(np.maximum(np.abs(iq.real), np.abs(iq.imag)))) <= LEAST_DISTINCT:  # what hardly steps is often 0
         return 0, 0
     longest = int(lengths.argmax())
     return int(starts[longest]), int(lengths[longest])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
-from bladewing.features.measure import beyond_radars, measure
+from bladewing.features.measure import MOST_BLADES_GIVEN, beyond_radars, measure
 from bladewing.features.measurements import BODY, EACH_ROTOR, Measurements
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 from bladewing.features.steady_comb import OVER_BODY
@@ -67,9 +67,6 @@ LEAST_STD_MPS = 1e-6
 #: Where the middle half of so many combs and more reaches over this ratio, they are not the same in all dwells.
 LEAST_COMBS, UNSTEADY = 4, 1.25
 
-#: No rotor has more; eight is the most that fly.
-MOST_BLADES = 64
-
 
 @dataclass(frozen=True)
 class Settings:
@@ -98,8 +95,8 @@ class Settings:
         BadInput
             The dwell is not above 0, there is no such number of blades, or beta is not in 0 to below 90 degrees.
         """
-        if blades is not None and not 1 <= blades <= MOST_BLADES:
-            raise BadInput(f"--blades is {blades}: it must be a whole number of 1 to {MOST_BLADES}")
+        if blades is not None and not 1 <= blades <= MOST_BLADES_GIVEN:
+            raise BadInput(f"--blades is {blades}: it must be a whole number of 1 to {MOST_BLADES_GIVEN}")
         if beta_deg is not None and not 0 <= beta_deg < 90:
             raise BadInput(f"--beta-deg is {beta_deg:g}: it must be at least 0 and below 90 [deg]")
         return cls(checked_dwell_s(dwell_s), blades, None if beta_deg is None else math.radians(beta_deg))

@@ -273,7 +273,9 @@ def _check_times(captures: list[dict[str, Any]], prf_hz: object, path: Path) -> 
     for (before, start, begun, fine), (after, following, later, fine_too) in pairwise(dated):
         lasted_s = (following - start) / prf_hz
         apart_s = (later - begun).total_seconds()
-        if abs(apart_s - lasted_s) > lasted_s * _DRIFT + (_CLOCK_S if fine and fine_too else _ROUNDED_S):
+        slack_s = lasted_s * _DRIFT + (_CLOCK_S if fine and fine_too else _ROUNDED_S)
+        # one date for all is when the recording began
+        if later != begun and abs(apart_s - lasted_s) > slack_s:
             raise BadInput(
                 f"{path}: captures[{after}] is dated {apart_s:.6g} s after captures[{before}] ({_TIME}), but the "
                 f"samples between last {lasted_s:.6g} s: store each run in a recording of its own"

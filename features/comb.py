@@ -64,7 +64,7 @@ class Comb:
     Parameters
     ----------
     fit : CombFit
-        All its lines, weak ones between the strong included.
+        All its lines; where `per_turn` is more than 1, weak ones between the strong included.
     rest : ndarray of complex128, shape (pulses,)
         Samples that its lines leave.
     last : int
@@ -171,7 +171,7 @@ def finer_spacing(data: Periodogram, fit: CombFit) -> float | None:
     data : Periodogram
         The record.
     fit : CombFit
-        A comb of two to three times that spacing: it holds every second or third line.
+        A comb of some times that spacing: it holds every second, third or eighth line.
     """
     fractions, share, least_hz = (
         (USUAL_FRACTIONS, USUAL_SHARE, USUAL_HZ)

@@ -32,8 +32,8 @@ GEARED_STEPS = 4
 #: lines went astray.
 EDGE_DEVIATIONS = 4.0
 
-#: In a short dwell rotors that are not told apart show by so many flashes what they have in common.
-LEAST_FLASHES = 5.5
+#: In a short dwell rotors that are not told apart show by so many flashes or orders what they have in common.
+LEAST_FLASHES, MANY_ORDERS = 5.5, 60
 
 #: A comb whose spacing is off by more than this, relative, from any multiple of another's is no part of that.
 FAR_OFF = 0.003
@@ -102,7 +102,8 @@ def too_few_flashes(family: Family) -> str:
     Their lines, some bins apart, run into one another, and what that leaves may be strong at any spacing.
     """
     data, chopping = family.data, family.comb.chopping
-    if family.is_told_apart or chopping * data.pulses > LEAST_FLASHES or not is_short(data):
+    shows = chopping * data.pulses > LEAST_FLASHES or family.comb.last > MANY_ORDERS
+    if family.is_told_apart or shows or not is_short(data):
         return ""
     return (
         f"dwell too short: lines about {chopping * data.prf_hz:.0f} Hz apart are not one rotor's, "

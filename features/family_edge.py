@@ -18,9 +18,9 @@ MERGED_BINS = 1.0
 #: deviation.
 AGREED_DEVIATIONS, APART_SHARE, CHANCE_SHARE = 2.0, 0.7, 0.25
 
-#: All about the orders holds those lines too: where it ends before this share of their edge, it says nothing of that.
-#: (A background's skirt may be so strong that what a rotor has past it is none beside it.)
-ASTRAY_SHARE = 0.6
+#: All about the orders holds those lines too: where it ends before this share of their edge, known to that share of it,
+#: it says nothing of that. (A background's skirt may be so strong that what a rotor has past it is none beside it.)
+ASTRAY_SHARE, ASTRAY_SURE = 0.6, 0.02
 
 #: Share of the power of several rotors' family that does not count past its edge: what their inner lines leave between
 #: them lifts the level that the outer ones are read against.
@@ -228,7 +228,7 @@ def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple
     """
     if not np.isfinite(lines[0] + around[0]):
         return np.inf, np.inf
-    if around[0] < ASTRAY_SHARE * lines[0] and lines[1] < ASTRAY_SHARE * lines[0]:
+    if around[0] < ASTRAY_SHARE * lines[0] and lines[1] < ASTRAY_SURE * lines[0]:
         return lines
     apart = abs(around[0] - lines[0])
     std = float(np.hypot(lines[1], max(APART_SHARE * apart, CHANCE_SHARE * around[1])))
@@ -296,7 +296,7 @@ def edge_around(
     blades : int, optional
         Of a rotor.
     lines : (float, float)
-        From `edge_of_lines`: where noise and lines may be taken for one another, it tells which is which.
+        From `edge_of_lines`, infinite too: where noise and lines may be taken for one another, it tells which is which.
 
     Returns
     -------
@@ -353,14 +353,14 @@ def edge_around(
         other = fitted(_noise_about(order[seen] * relative, (level * own).sum(axis=0)[seen] / count, flat))
         # strong lines near one another lift the level between them as a receiver's band does: the lines tell, if any
         one, another = (
-            abs(tried * fastest - lines[0]) / np.hypot(its_std * fastest, lines[1])
+            abs(tried * fastest - lines[0]) / np.hypot(its_std * fastest, lines[1]) if np.isfinite(lines[0]) else np.inf
             for tried, its_std in ((edge, std), other)
         )
         apart = abs(edge - other[0])
         if not (one < AGREED_DEVIATIONS and another > 2 * AGREED_DEVIATIONS):
             edge, std = other
             if not (another < AGREED_DEVIATIONS and one > 2 * AGREED_DEVIATIONS):
-                std = float(np.hypot(std, apart / 2))
+                std = float(np.hypot(std, CHANCE_SHARE * apart))
     # where the orders mix at the edge, the tips of the fastest and of the slowest are all that is told apart
     mixed = edge * relative / np.sqrt(12)
     # and the fastest of rotors that were not found turns by so much faster than any that was

@@ -17,6 +17,9 @@ from .spectrum import Spectrum, doppler_spectrum, finite_complex
 #: Radars that are measured [Hz]: beyond, a frequency was given in another unit.
 CARRIER_RANGE_HZ, PRF_RANGE_HZ = (1e8, 1e12), (1.0, 1e8)
 
+#: No rotor has more blades; eight is the most that fly.
+MOST_BLADES_GIVEN = 64
+
 
 def beyond_radars(carrier_hz: float, prf_hz: float) -> str:
     """Which of both is no frequency of a radar that is measured, and the rule; empty where both are."""
@@ -44,7 +47,7 @@ def measure(
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz], within `CARRIER_RANGE_HZ` and `PRF_RANGE_HZ`.
     blades : int, optional
-        Blades of a rotor, >= 1.
+        Blades of a rotor, 1 to `MOST_BLADES_GIVEN`.
     beta_rad : float, optional
         Angle between the line of sight and the rotor plane [rad], 0 <= beta < pi/2.
     on_record : callable, optional
@@ -66,10 +69,11 @@ def measure(
     """
     if beyond := beyond_radars(carrier_hz, prf_hz):
         raise ValueError(f"{beyond}: give 9.85 GHz as 9.85e9, 20 kHz as 20e3")
-    if blades is not None and not (math.isfinite(blades) and blades == int(blades) >= 1):
-        raise ValueError(f"blades is {blades!r}: it must be a whole number of at least 1")
+    if blades is not None and not (math.isfinite(blades) and 1 <= blades == int(blades) <= MOST_BLADES_GIVEN):
+        raise ValueError(f"blades is {blades!r}: it must be a whole number of 1 to {MOST_BLADES_GIVEN}")
     if beta_rad is not None and not 0 <= beta_rad < np.pi / 2:
         raise ValueError(f"beta_rad is {beta_rad!r}: it must be at least 0 and below pi/2 [rad]")
+    blades = None if blades is None else int(blades)
     samples = finite_complex(iq)
     shape = samples.shape[:-1]
     some = samples if samples.size else np.zeros((1, *samples.shape[-1:]), np.complex64)  # of none, fields of no length

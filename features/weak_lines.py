@@ -11,12 +11,16 @@ import numpy as np
 from .comb import LEAST_LINES, MOST_BLADES, UNEQUAL_NATS, Comb, two_means_nats
 from .comb_fit import CombFit, fit_combs
 from .lines import LineSpace, squared, sum_of_lines
-from .periodogram import Periodogram
+from .periodogram import Level, Periodogram
 from .slow_lines import remove_bands
 
-#: They are fitted where so much speaks for them, beside what lies as far from any line [nats]: needlessly fitted they
-#: do no harm. They must be so far from the strong ones and from one another [bins].
+#: They are fitted where so much speaks for them, beside what lies as far from any line [nats]: noise that is fitted
+#: does no harm. They must be so far from the strong ones and from one another [bins].
 LEAST_NATS, LEAST_BINS = 3.0, 2.5
+
+#: The mirror image of a comb, which an imbalance of both channels makes, runs through places so near [bins]. It is as
+#: much weaker as the body's is, within so large a factor.
+MIRROR_BINS, IMAGE_FACTOR = 1.5, 6.0
 
 #: They are as even as noise: where the strongest of them holds so large a share of all, that is another's line.
 MOST_SHARE = 0.3
@@ -42,10 +46,11 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None)
         The comb as it is fitted beside them.
     """
     fit, best, most = comb.fit, 1, 0.0
-    if comb.per_turn > 1:
+    if comb.per_turn > 1 or data.one_channel:
         return data, comb
     space, level = LineSpace(comb.rest), data.level_of(comb.rest)
     last = int(np.abs(fit.orders).max())
+    image = _image_of_lines(data, fit, space, level)
     for parts in range(2, MOST_BLADES + 1) if blades is None else (blades,):
         if parts < 2 or fit.spacing * data.pulses < LEAST_BINS * parts:
             continue
@@ -55,6 +60,8 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None)
         seen = [place[data.usable(place)] for place in places]
         there, beside = (squared(space.at(place)[0]) * data.pulses / level(place) for place in seen)
         if min(len(there), len(beside)) < LEAST_LINES or there.max() > MOST_SHARE * there.sum():
+            continue
+        if _mirrored(fit, parts, data.pulses) and there.mean() - 1 < IMAGE_FACTOR * image:
             continue
         nats = two_means_nats(there, beside)
         if there.mean() > beside.mean() and nats > LEAST_NATS:
@@ -79,6 +86,24 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None)
     )
     told = replace(comb, fit=own, rest=rest, blades=best, blades_sure=most > UNEQUAL_NATS)
     return data.left(data.samples - remove_bands(weak, data.bands)), told
+
+
+def _mirrored(fit: CombFit, parts: int, pulses: int) -> bool:
+    """True where the mirror image of a comb, about velocity zero, lies at so many parts of its spacing."""
+    off = 2 * fit.centre / fit.spacing * parts
+    return round(off) % parts != 0 and abs(off - round(off)) / parts * fit.spacing * pulses < MIRROR_BINS
+
+
+def _image_of_lines(data: Periodogram, fit: CombFit, space: LineSpace, level: Level) -> float:
+    """Mean power over noise of the mirror image of a comb's lines, if it is as weak as that of the body's line."""
+
+    def level_of(place: float) -> float:
+        lines = zip(data.centres, data.centres_db, strict=True)
+        return max((10 ** (db / 10) for line, db in lines if abs(line - place) * data.pulses < 1), default=0.0)
+
+    body, mirror = level_of(fit.centre), np.array([-fit.centre])
+    left = float((squared(space.at(mirror)[0]) * data.pulses / level(mirror))[0])
+    return max(level_of(-fit.centre), left) / body * float(fit.snr.mean()) if body else np.inf
 
 
 def by_rotation(comb: Comb) -> Comb:

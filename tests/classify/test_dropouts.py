@@ -79,7 +79,9 @@ def test_a_recording_tells_of_a_silence_that_cannot_be_filled_in() -> None:
     recording = Recording("walk", iq, 24e9, 1e4)
     (said,) = recording.remarks(0.1, recording.dwells(0.1))
     assert said.startswith("silence: 200 pulses in a row are exactly 0 from 0.03 s on, too many to be filled in")
+    coarse = np.round(0.25 * noise(np.random.default_rng(6), 20000).real).astype(np.complex64)
     for whole in (
+        coarse,
         iq[:300],
         np.zeros(200, np.complex64),
         np.zeros(0, np.complex64),

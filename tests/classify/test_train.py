@@ -115,7 +115,7 @@ def test_an_interrupted_training_leaves_the_old_files_and_says_how_it_goes_on(tr
     config = tmp_path / "tiny.toml"
     config.write_text('records = 600\nmodels = ["features-linear", "features-boosted"]\n')
     assert main(["train", "--out", str(tmp_path), "--config", str(config)]) == 130
-    said = f"what is done is kept in {tmp_path / 'train-parts'}: the same command goes on, or remove it"
+    said = f"what is done is kept in {tmp_path / 'train-parts'}: the same command goes on"
     assert capsys.readouterr().err.splitlines()[-1] == f"bladewing: stopped: interrupted: {said}"
     assert (tmp_path / "features-linear.onnx").read_bytes() == b"old"
     assert (tmp_path / "train.json").read_bytes() == b"old"
