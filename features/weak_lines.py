@@ -45,7 +45,7 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None)
     comb : Comb
         The comb as it is fitted beside them.
     """
-    fit, best, most = comb.fit, 1, 0.0
+    fit, best, most, sure = comb.fit, 1, 0.0, True
     if comb.per_turn > 1 or data.one_channel:
         return data, comb
     space, level = LineSpace(comb.rest), data.level_of(comb.rest)
@@ -61,11 +61,10 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None)
         there, beside = (squared(space.at(place)[0]) * data.pulses / level(place) for place in seen)
         if min(len(there), len(beside)) < LEAST_LINES or there.max() > MOST_SHARE * there.sum():
             continue
-        if _mirrored(fit, parts, data.pulses) and there.mean() - 1 < IMAGE_FACTOR * image:
-            continue
         nats = two_means_nats(there, beside)
         if there.mean() > beside.mean() and nats > LEAST_NATS:
             best, most = parts, nats
+            sure = not _mirrored(fit, parts, data.pulses) or there.mean() - 1 > IMAGE_FACTOR * image
     if best == 1:
         return data, comb
     reach = (int(fit.orders.min()) * best, int(fit.orders.max()) * best)
@@ -84,7 +83,7 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None)
         whole.amplitudes[strong],
         whole.snr[strong],
     )
-    told = replace(comb, fit=own, rest=rest, blades=best, blades_sure=most > UNEQUAL_NATS)
+    told = replace(comb, fit=own, rest=rest, blades=best, blades_sure=sure and most > UNEQUAL_NATS)
     return data.left(data.samples - remove_bands(weak, data.bands)), told
 
 
@@ -95,15 +94,20 @@ def _mirrored(fit: CombFit, parts: int, pulses: int) -> bool:
 
 
 def _image_of_lines(data: Periodogram, fit: CombFit, space: LineSpace, level: Level) -> float:
-    """Mean power over noise of the mirror image of a comb's lines, if it is as weak as that of the body's line."""
+    """Mean power over noise of the mirror image of a comb's lines, if it is as weak as that of the body's line.
+
+    Infinite where nothing tells: one of both was taken out with what is at rest.
+    """
 
     def level_of(place: float) -> float:
         lines = zip(data.centres, data.centres_db, strict=True)
         return max((10 ** (db / 10) for line, db in lines if abs(line - place) * data.pulses < 1), default=0.0)
 
     body, mirror = level_of(fit.centre), np.array([-fit.centre])
+    if not body or not (level_of(-fit.centre) or data.usable(mirror)[0]):
+        return np.inf
     left = float((squared(space.at(mirror)[0]) * data.pulses / level(mirror))[0])
-    return max(level_of(-fit.centre), left) / body * float(fit.snr.mean()) if body else np.inf
+    return max(level_of(-fit.centre), left) / body * float(fit.snr.mean())
 
 
 def by_rotation(comb: Comb) -> Comb:
