@@ -35,6 +35,9 @@ _COUNTS = (2, 3, 16, 127, 1000, 1021, 8191, 65536)
 #: Records that no target makes: name to a function of (pulses, rng).
 ODD: dict[str, Callable[[int, np.random.Generator], NDArray[np.complex64]]] = {}
 
+# Those of them in which a rotor stands, and its chopping frequency.
+_ODD_ROTORS, _ODD_CHOPPING_HZ = ("clipped to one bit", "I only"), 200.0
+
 
 def cells(quick: bool) -> Iterator[Cell]:
     """Every cell of these stages; `quick` leaves out the dear ones."""
@@ -45,7 +48,7 @@ def cells(quick: bool) -> Iterator[Cell]:
 
 
 def rotor_record(
-    pulses: int = 2000, *, snr_db: float = 20.0, chopping_hz: float = 200.0, seed: int = 0
+    pulses: int = 2000, *, snr_db: float = 20.0, chopping_hz: float = _ODD_CHOPPING_HZ, seed: int = 0
 ) -> NDArray[np.complex64]:
     """A body line, a comb of a two-bladed rotor about it, and noise of unit power."""
     rng = np.random.default_rng(seed)
@@ -283,13 +286,18 @@ def _combs() -> Iterator[Cell]:
         silent=(300e9,),
     )  # fmt: skip
     yield from sweep(
-        stage, "record", list(ODD), measured, 0.01, "no comb, no number: a reason", _odd_comb, str, silent=ODD,
+        stage, "record", list(ODD), measured, 0.01,
+        "no comb, no number: a reason; of a rotor behind one bit or one channel its lines, or every so many-th",
+        _odd_comb, str, silent=ODD,
     )  # fmt: skip
 
 
 def _odd_comb(name: str) -> Outcome:
     found = measure(ODD[name](1000, np.random.default_rng(0)), carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
-    return (np.nan, str(found.reason)) if np.isnan(found.chopping_hz) else np.inf
+    if np.isnan(found.chopping_hz):
+        return np.nan, str(found.reason)
+    whole = float(found.chopping_hz) / _ODD_CHOPPING_HZ
+    return abs(whole / max(round(whole), 1) - 1) if name in _ODD_ROTORS else np.inf
 
 
 def _inputs(

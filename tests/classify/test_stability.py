@@ -70,6 +70,10 @@ def test_an_estimator_that_never_finds_anything_does_not_hold(monkeypatch):
     assert not any(parameter == "record" for parameter, _ in lost)
 
 
+def test_the_comb_estimator_holds_at_its_extremes():
+    assert [cell for cell in spectra._combs() if not cell.holds] == []
+
+
 def test_softmax_holds_at_its_extremes():
     networks = pytest.importorskip("bladewing.classify.stability.networks")
     assert [cell for cell in networks._softmax() if not cell.holds] == []
