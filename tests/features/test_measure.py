@@ -141,8 +141,10 @@ def test_four_rotors_in_a_dwell_of_under_three_flashes_are_no_comb_of_a_multiple
     wrong = 0
     for seed in range(8):
         iq = rotors(np.array([69.0, 70.0, 71.0, 72.0]) + 0.1 * seed, velocity_mps=velocity_mps, body=6.0)
-        iq = 3 * iq[:700] + white(np.random.default_rng(seed), 700)  # 20 ms
-        found = measure(iq, **RADAR)
+        iq = 3 * iq + white(np.random.default_rng(seed), PULSES)
+        if seed == 0:
+            assert measure(iq, **RADAR).chopping_hz == pytest.approx(141, rel=0.01)
+        found = measure(iq[:700], **RADAR)  # 20 ms
         wrong += bool(np.isfinite(found.chopping_hz) and not 0.9 < found.chopping_hz / 141 < 1.1)
     assert wrong <= 1
 
