@@ -44,10 +44,9 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
         noise, or nothing else. Zeros of longer silences are no lost pulses.
     """
     none = np.zeros(len(iq), bool)
-    size = np.maximum(np.abs(iq.real), np.abs(iq.imag))
+    size = _sizes(iq)
     there = size > 0
-    # runs of zeros between those that are there
-    runs = np.diff(np.flatnonzero(np.concatenate([[True], there, [True]]))) - 1
+    _, runs = _zero_runs(iq)
     lost = none.copy()
     lost[~there] = np.repeat(runs, runs) <= MOST_IN_A_ROW
     zeros = int(lost.sum())
@@ -76,13 +75,23 @@ def _chance(zeros: int, near: int, share: float) -> float:
     return float(bdtrc(zeros - 1, zeros + near, share))
 
 
+def _sizes(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """The larger part of each sample, in whose steps a converter counts."""
+    return np.asarray(np.maximum(np.abs(iq.real), np.abs(iq.imag)))
+
+
+def _zero_runs(iq: NDArray[np.complex64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Where each run of zeros begins, and its pulses."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], iq == 0, [0]])))
+    return edges[::2], np.diff(edges)[::2]
+
+
 def longest_silence(iq: NDArray[np.complex64]) -> tuple[int, int]:
     """Where the longest run of zeros begins that is too long to be filled in, and its pulses; 0 where there is none."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], iq == 0, [0]])))
-    starts, lengths = edges[::2], np.diff(edges)[::2]
+    starts, lengths = _zero_runs(iq)
     if not len(lengths) or lengths.max() <= MOST_IN_A_ROW or lengths.max() == len(iq):
         return 0, 0
-    if len(np.unique(np.maximum(np.abs(iq.real), np.abs(iq.imag)))) <= LEAST_DISTINCT:  # what hardly steps is often 0
+    if len(np.unique(_sizes(iq))) <= LEAST_DISTINCT:  # what hardly steps is often 0
         return 0, 0
     longest = int(lengths.argmax())
     return int(starts[longest]), int(lengths[longest])

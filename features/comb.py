@@ -47,14 +47,14 @@ UNEQUAL_FACTOR = 4.0
 #: Among the outer half of the lines alone, they must be by this.
 OUTER_FACTOR = 2.5
 
+#: And so much must speak for two kinds of lines [nats]: near the noise every other one is strong by chance.
+UNEQUAL_NATS = 8.0
+
 #: A fraction of the spacing, where that is too fine for the search, may be the comb's nevertheless: if its lines speak
 #: for it as loudly as this beside those of the spacing found. Most rotors chop faster than so many hertz: where a dwell
 #: is too short for that, less is enough, and of further fractions.
 FRACTIONS, FRACTION_SHARE = (2, 3), 0.9
 USUAL_HZ, USUAL_FRACTIONS, USUAL_SHARE = 60.0, (2, 3, 4, 5, 6, 7, 8), 0.85
-
-#: And so much must speak for two kinds of lines [nats]: near the noise every other one is strong by chance.
-UNEQUAL_NATS = 8.0
 
 
 @dataclass(frozen=True)
@@ -96,6 +96,11 @@ class Comb:
     def chopping_std(self) -> float:
         """Its standard deviation [cycles a sample]."""
         return self.fit.spacing_std * self.per_turn
+
+
+def blade_numbers(blades: int | None) -> range:
+    """Numbers of blades, from two on, that lines of unlike strength may show: the one given, or any up to the most."""
+    return range(2, MOST_BLADES + 1) if blades is None else range(max(blades, 2), blades + 1)
 
 
 def strong_multiple(
@@ -247,8 +252,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     seen = fit.amplitudes + LineSpace(fitted[1]).at(fit.frequencies)[0]
     power = np.abs(seen) ** 2 * data.pulses / data.level_of(fitted[1])(fit.frequencies)
     within = (fit.orders >= start.low) & (fit.orders <= start.high)
-    tried = range(2, MOST_BLADES + 1) if blades is None else (blades,)
-    per_turn = strong_multiple(fit.orders[within], power[within], tried)
+    per_turn = strong_multiple(fit.orders[within], power[within], blade_numbers(blades))
     for number in sorted({1, per_turn}):
         if of_mains(fit, data, start.score, number):
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"

@@ -39,7 +39,7 @@ FLASH_SHARE, REST_FLASH_SHARE = 2.0, 1.0
 #: What a comb whose sides reach unequally far must have more [nats].
 UNEVEN_COST = 4.0
 
-#: Lines further from another comb's than this are its own [bins].
+#: Further than this from its mirror image about velocity zero a comb's lines are others than that one's [bins].
 MIRROR_BINS = 1.5
 
 #: Steps to each side of a coarse spacing, of one bin at the PRF; then finer ones about the best families.
@@ -283,6 +283,14 @@ def _loudness(data: Periodogram, spacings: NDArray[np.float64], centres: NDArray
     return heights(data.contrast, spacings, centres) + _mirrored(data, spacings, centres)
 
 
+def from_mirror_bins(
+    spacing: NDArray[np.float64] | float, centre: NDArray[np.float64] | float, pulses: int
+) -> NDArray[np.float64]:
+    """How far a comb's lines lie from those of its mirror image about velocity zero [bins]."""
+    off = 2 * np.asarray(centre) / spacing
+    return np.asarray(np.abs(off - np.rint(off)) * spacing * pulses)
+
+
 def _mirrored(data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
     """What else speaks for combs in one channel, where they stand about the body's mirror image as well [nats].
 
@@ -290,8 +298,7 @@ def _mirrored(data: Periodogram, spacings: NDArray[np.float64], centres: NDArray
     """
     if not data.one_channel:
         return np.zeros(len(spacings))
-    off = 2 * centres / spacings
-    apart = np.abs(off - np.rint(off)) * spacings * data.pulses > MIRROR_BINS
+    apart = from_mirror_bins(spacings, centres, data.pulses) > MIRROR_BINS
     return np.where(apart, heights(data.contrast, spacings, -centres), 0.0)
 
 

@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from .comb import LEAST_LINES, MOST_BLADES, UNEQUAL_NATS, Comb, two_means_nats
+from .comb import LEAST_LINES, UNEQUAL_NATS, Comb, blade_numbers, two_means_nats
 from .comb_fit import CombFit, fit_combs
+from .comb_search import MIRROR_BINS, from_mirror_bins
 from .lines import LineSpace, squared, sum_of_lines
 from .periodogram import Level, Periodogram
 from .slow_lines import remove_bands
@@ -18,9 +19,9 @@ from .slow_lines import remove_bands
 #: does no harm. They must be so far from the strong ones and from one another [bins].
 LEAST_NATS, LEAST_BINS = 3.0, 2.5
 
-#: The mirror image of a comb, which an imbalance of both channels makes, runs through places so near [bins]. It is as
-#: much weaker as the body's is, within so large a factor.
-MIRROR_BINS, IMAGE_FACTOR = 1.5, 6.0
+#: The mirror image of a comb, which an imbalance of both channels makes, is as much weaker as the body's is, within so
+#: large a factor.
+IMAGE_FACTOR = 6.0
 
 #: They are as even as noise: where the strongest of them holds so large a share of all, that is another's line.
 MOST_SHARE = 0.3
@@ -36,7 +37,7 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None)
     comb : Comb
         The comb found in it.
     blades : int, optional
-        Of a rotor: their number is else 2 to `MOST_BLADES`, if lines show it.
+        Of a rotor: their number is else one of `blade_numbers`, if lines show it.
 
     Returns
     -------
@@ -51,8 +52,8 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None)
     space, level = LineSpace(comb.rest), data.level_of(comb.rest)
     last = int(np.abs(fit.orders).max())
     image = _image_of_lines(data, fit, space, level)
-    for parts in range(2, MOST_BLADES + 1) if blades is None else (blades,):
-        if parts < 2 or fit.spacing * data.pulses < LEAST_BINS * parts:
+    for parts in blade_numbers(blades):
+        if fit.spacing * data.pulses < LEAST_BINS * parts:
             continue
         order = np.arange(-last * parts, last * parts)
         own = order[np.gcd(order, parts) == 1]  # those of fewer blades may be there without them
@@ -89,8 +90,8 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None)
 
 def _mirrored(fit: CombFit, parts: int, pulses: int) -> bool:
     """True where the mirror image of a comb, about velocity zero, lies at so many parts of its spacing."""
-    off = 2 * fit.centre / fit.spacing * parts
-    return round(off) % parts != 0 and abs(off - round(off)) / parts * fit.spacing * pulses < MIRROR_BINS
+    part = fit.spacing / parts
+    return round(2 * fit.centre / part) % parts != 0 and bool(from_mirror_bins(part, fit.centre, pulses) < MIRROR_BINS)
 
 
 def _image_of_lines(data: Periodogram, fit: CombFit, space: LineSpace, level: Level) -> float:
@@ -99,15 +100,15 @@ def _image_of_lines(data: Periodogram, fit: CombFit, space: LineSpace, level: Le
     Infinite where nothing tells: one of both was taken out with what is at rest.
     """
 
-    def level_of(place: float) -> float:
+    def line_at(place: float) -> float:
         lines = zip(data.centres, data.centres_db, strict=True)
         return max((10 ** (db / 10) for line, db in lines if abs(line - place) * data.pulses < 1), default=0.0)
 
-    body, mirror = level_of(fit.centre), np.array([-fit.centre])
-    if not body or not (level_of(-fit.centre) or data.usable(mirror)[0]):
+    body, mirror = line_at(fit.centre), np.array([-fit.centre])
+    if not body or not (line_at(-fit.centre) or data.usable(mirror)[0]):
         return np.inf
     left = float((squared(space.at(mirror)[0]) * data.pulses / level(mirror))[0])
-    return max(level_of(-fit.centre), left) / body * float(fit.snr.mean())
+    return max(line_at(-fit.centre), left) / body * float(fit.snr.mean())
 
 
 def by_rotation(comb: Comb) -> Comb:
