@@ -1,5 +1,5 @@
 # make train   install what is missing, train on synthetic records, write models and report to out/
-# make test    install what is missing, lint, check types, run every test
+# make test    install what is missing, lint, check types, run every test, on up to four processors
 # make bench   speed and size, as ratios within one run
 # make fuzz    hostile files, faults, broken guards and long runs, by the ten thousand (an hour)
 PYTHON ?= python3
@@ -18,7 +18,7 @@ train: $(STAMP)
 	$(BIN)/bladewing report --quick --models $(OUT) --out $(OUT)
 
 test: $(STAMP) lint browser
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadfile
 
 # The report's page is tried in a real browser. Where there is none, Debian's is installed if this user may.
 browser:

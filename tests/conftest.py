@@ -6,6 +6,8 @@ from hypothesis import HealthCheck, settings
 
 # One thread each: the tests' models are tiny, and threads that wait for a core cost more than they bring.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+# What commands print is wrapped to the terminal, and workers of a test run have none.
+os.environ["COLUMNS"] = "120"
 
 # Machines are shared: how long an example takes says nothing. Where CI is set every run draws the same examples, so
 # that a change is judged by what it changed; elsewhere each run looks for new ones.
