@@ -11,6 +11,7 @@ import onnxruntime
 from bladewing.features.schema import INPUT_SHAPES, schema_hash
 from bladewing.models import DEFAULT_MODEL, KIND_SCORES
 from bladewing.models.operating import OperatingCurve, OperatingPoint
+from bladewing.models.session import quiet_session
 
 from .bounds import MOST_MODEL_BYTES
 from .envelope import Envelope
@@ -109,24 +110,15 @@ def read_model(given: str) -> tuple[bytes, str]:
 
 
 def open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.InferenceSession:
-    """A session of a model that may be trusted, silent on the terminal.
+    """A session of a model that may be trusted.
 
     Raises
     ------
     BadInput
         It cannot be opened.
     """
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads
-    options.inter_op_num_threads = 1
-    options.log_severity_level = 4  # its messages come as exceptions; nothing else may reach the user's terminal
     try:
-        return onnxruntime.InferenceSession(
-            onnx_bytes,
-            options,
-            providers=["CPUExecutionProvider"],
-            enable_fallback=0,  # which would print, and try the same again
-        )
+        return quiet_session(onnx_bytes, threads)
     except Exception as error:  # its exceptions share no base class
         raise BadInput(f"{source}: onnxruntime {onnxruntime.__version__} cannot open the model: {error}") from None
 

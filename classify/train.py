@@ -28,7 +28,7 @@ from .model_file import COVERAGES, CURVE_KEY, KINDS_KEY, SETS_KEY
 from .parts import TRAIN_PARTS, Parts
 from .progress import Progress
 from .train_network import OnFraction, ScoresOf, Taught, epochs_of, train_net
-from .training_account import ACCOUNT, alarm_threshold, covered, figures, print_table
+from .training_account import ACCOUNT, covered, figures, print_table
 from .training_config import TrainingConfig, training_config
 from .training_costs import add_costs
 
@@ -206,7 +206,7 @@ def train_one(
         fit_vector_scaling,
     )
     from bladewing.models.export import TABULAR_TOLERANCE, attach_metadata, check_export
-    from bladewing.models.operating import operating_curve
+    from bladewing.models.operating import least_named, operating_curve
     from bladewing.models.seal import seal
 
     started = time.perf_counter()
@@ -218,7 +218,7 @@ def train_one(
     calibrated = calibration.probabilities(scores_of(sets.calibrate))
     accept = acceptance_thresholds(calibrated, sets.calibrate.labels, settings.precision)
     # A false drone is what users complain of: "uav" must also keep the false-alarm rate, however many UAVs it costs.
-    accept[0] = max(accept[0], alarm_threshold(calibrated, sets.calibrate.labels, settings.false_alarm))
+    accept[0] = max(accept[0], least_named(calibrated[sets.calibrate.labels != 0, 0], settings.false_alarm))
     curve = operating_curve(calibrated, sets.calibrate.labels)
     limits = np.array([conformal_thresholds(calibrated, sets.calibrate.labels, coverage) for coverage in COVERAGES])
     onnx_bytes = export(calibration)

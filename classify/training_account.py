@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bladewing.models.operating import first_out
+from bladewing.models.operating import least_named
 from numpy.typing import NDArray
 
 from .labels import CLASSES
@@ -15,12 +15,6 @@ ACCOUNT = "train.json"
 
 #: A cascade whose second model is asked about more records than this is of no use.
 MOST_ASKED = 0.9
-
-
-def alarm_threshold(probabilities: NDArray[np.floating], labels: NDArray[np.integer], false_alarm: float) -> float:
-    """UAV probability that at most this share of the birds and the clutter reaches."""
-    # 1e-6 above: probabilities are float32 where they are compared with it
-    return first_out(probabilities[labels != 0, 0], false_alarm) + 1e-6
 
 
 def covered(
@@ -40,7 +34,7 @@ def figures(
     """What the table quotes, on records that neither training nor calibration has seen."""
     winner = probabilities.argmax(axis=1)
     recall = [float(np.mean(winner[labels == index] == index)) for index in range(len(CLASSES))]
-    threshold = alarm_threshold(probabilities, labels, false_alarm)
+    threshold = least_named(probabilities[labels != 0, 0], false_alarm)
     named = probabilities.max(axis=1) >= accept[winner]
     return {
         "balanced_accuracy": round(float(np.mean(recall)), 4),

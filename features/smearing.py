@@ -24,7 +24,6 @@ def smearing_index(
     body: Body,
     chopping: Chopping,
     root: NDArray[np.float32] | None = None,
-    max_order: int = MAX_ORDER,
 ) -> NDArray[np.float32]:
     """Relative spread of the rotor rates, from the growth of the line width with the order.
 
@@ -44,35 +43,14 @@ def smearing_index(
         The comb's spacing.
     root : ndarray of float32, shape (..., bins), optional
         Root of the energy if it is at hand.
-    max_order : int
-        Orders that take part.
 
     Returns
     -------
     ndarray of float32, shape (...)
         0 (one rate, narrow lines at all orders) to `FULLY_SMEARED`; NaN where no spacing or no energy is given.
     """
-    spacing = chopping.frequency_hz
-    per_order = np.float32(1) / spacing  # NaN where there is none, and so is all that follows
-    centre = body.velocity_mps * np.float32(-2 / spectrum.wavelength_m)
-    order = spectrum.frequency_hz_float32 - centre[..., None]
-    order *= per_order[..., None]
-    nearest = np.rint(order)
-    # Roots of the energy: one strong low line must not outvote the many weak high ones.
-    order -= nearest
-    x, y = np.square(nearest, out=nearest), np.square(order, out=order)
-    counts = x <= max_order**2
-    counts &= x > 0
-    weight = (np.sqrt(energy) if root is None else root) * weights(counts)
-    total = sums(weight)
-    per_total = 1 / np.maximum(total, np.float32(1e-30))
-    # centred first: where few orders hold energy, a difference of mean squares is rounding alone
-    x -= (np.vecdot(weight, x) * per_total)[..., None]
-    weight *= x
-    variance, covariance = np.vecdot(weight, x) * per_total, np.vecdot(weight, y) * per_total
-    slope = covariance * (variance > 1e-3) / np.maximum(variance, np.float32(1e-3))
-    index = np.sqrt(np.minimum(np.maximum(slope, 0), np.float32(FULLY_SMEARED**2)))
-    return np.where((total > 0) & (spacing > 0), index, np.float32(np.nan))
+    nearest, away = _squared_orders(spectrum, body, chopping)
+    return _growth(nearest, away, np.sqrt(energy) if root is None else root, MAX_ORDER)
 
 
 def wide_smearing_index(
@@ -87,8 +65,44 @@ def wide_smearing_index(
     spectrum, energy, body, chopping
         As there.
     """
-    index = smearing_index(spectrum, energy, body, chopping)
+    nearest, away = _squared_orders(spectrum, body, chopping)
+    root = np.sqrt(energy)
+    index = _growth(nearest.copy(), away, root, MAX_ORDER)
     for orders in FEWER_ORDERS:
-        inner = smearing_index(spectrum, energy, body, chopping, max_order=orders)
+        inner = _growth(nearest.copy(), away, root, orders)
         index = np.where(inner * orders > SATURATED, inner, index)
     return index
+
+
+def _squared_orders(
+    spectrum: Spectrum, body: Body, chopping: Chopping
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Nearest order of every bin and the distance to it [orders], both squared; NaN where no spacing is given."""
+    per_order = np.float32(1) / chopping.frequency_hz
+    centre = body.velocity_mps * np.float32(-2 / spectrum.wavelength_m)
+    order = spectrum.frequency_hz_float32 - centre[..., None]
+    order *= per_order[..., None]
+    nearest = np.rint(order)
+    order -= nearest
+    return np.square(nearest, out=nearest), np.square(order, out=order)
+
+
+def _growth(
+    nearest: NDArray[np.float32], away: NDArray[np.float32], root: NDArray[np.float32], most: int
+) -> NDArray[np.float32]:
+    """Root of the slope of `away` over `nearest`, which is overwritten, by so many orders; NaN where none holds energy.
+
+    Roots of the energy weigh the bins: one strong low line must not outvote the many weak high ones.
+    """
+    counts = nearest <= most**2  # nowhere without a spacing
+    counts &= nearest > 0
+    weight = root * weights(counts)
+    total = sums(weight)
+    per_total = 1 / np.maximum(total, np.float32(1e-30))
+    # centred first: where few orders hold energy, a difference of mean squares is rounding alone
+    nearest -= (np.vecdot(weight, nearest) * per_total)[..., None]
+    weight *= nearest
+    variance, covariance = np.vecdot(weight, nearest) * per_total, np.vecdot(weight, away) * per_total
+    slope = covariance * (variance > 1e-3) / np.maximum(variance, np.float32(1e-3))
+    index = np.sqrt(np.minimum(np.maximum(slope, 0), np.float32(FULLY_SMEARED**2)))
+    return np.where(total > 0, index, np.float32(np.nan))

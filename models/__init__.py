@@ -15,8 +15,10 @@ calibration
     From scores to probabilities that mean what they say, and the thresholds below which the answer is "unknown".
 export, seal
     ONNX with the calibration inside, and the seal that shows any later change of a byte.
+session
+    How a model's session is opened.
 
-Importing this package or `seal` imports no training library.
+Importing this package, `seal` or `session` imports no training library.
 """
 
 from dataclasses import dataclass

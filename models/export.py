@@ -22,6 +22,7 @@ from . import KIND_SCORES
 from ._checks import CLASS_COUNT
 from .calibration import Calibration
 from .seal import PLACEHOLDER, SEAL_KEY
+from .session import quiet_session
 
 if TYPE_CHECKING:
     from sklearn.ensemble import HistGradientBoostingClassifier
@@ -246,11 +247,7 @@ def check_export(
     ValueError
         Where the difference exceeds the tolerance, or is not a number.
     """
-    import onnxruntime
-
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
-    session = onnxruntime.InferenceSession(onnx_bytes, options, providers=["CPUExecutionProvider"])
+    session = quiet_session(onnx_bytes)
     names = [node.name for node in session.get_inputs()]
     count = len(reference_probabilities)
     worst = 0.0

@@ -17,10 +17,13 @@ SUPPORT = 10
 # Renard's series R10 (ISO 3), falling: with most rates their half is there too, which a cascade gives each model.
 _RATES = (5.0, 4.0, 3.15, 2.5, 2.0, 1.6, 1.25, 1.0, 0.8, 0.63)
 _EVERY_WIN = 0.3333333  # the most probable of three reaches it
+_ABOVE = 1e-6  # from a probability to a threshold over it: they are compared as float32, and kept with 7 decimals
 
 
 def first_out(scores: NDArray[np.floating], false_alarm: float) -> float:
     """Give the highest of the non-targets' scores that may no longer pass: what lies above it keeps to the rate.
+
+    The threshold for scores of any scale that are at hand: they are compared with it by ``>``.
 
     Parameters
     ----------
@@ -33,6 +36,20 @@ def first_out(scores: NDArray[np.floating], false_alarm: float) -> float:
     # The margin keeps 0.01 * 300 = 3.0000000000000004 and 2.9999999999999996 alike.
     passing = min(math.floor(false_alarm * len(scores) + 1e-9), len(scores) - 1)
     return float(np.sort(np.asarray(scores, np.float64))[::-1][passing])
+
+
+def least_named(probabilities: NDArray[np.floating], false_alarm: float) -> float:
+    """Give a probability that at most a share of the non-targets reaches.
+
+    The threshold that a model keeps: whatever is named later is compared with it by ``>=``, in float32 too. Of records
+    at hand it misses the few that lie over `first_out` by less than the margin, which holds them off.
+
+    Parameters
+    ----------
+    probabilities, false_alarm
+        As for `first_out`.
+    """
+    return first_out(probabilities, false_alarm) + _ABOVE
 
 
 @dataclass(frozen=True)
@@ -162,7 +179,6 @@ def operating_curve(probabilities: ArrayLike, labels: NDArray[np.integer]) -> Op
         rank = math.floor(rate * (len(false) + 1) * (1 + 1e-9))  # the threshold stands just above this one, from 1
         if rank < SUPPORT:
             break
-        # 1e-6 above: probabilities are float32, and the curve is stored with 7 decimals
-        threshold = max(round(float(false[rank - 1]) + 1e-6, 7), _EVERY_WIN)
+        threshold = max(round(float(false[rank - 1]) + _ABOVE, 7), _EVERY_WIN)
         points.append(OperatingPoint(rate, threshold, float(np.mean(true >= threshold))))
     return OperatingCurve(len(true), len(false), tuple(points))

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from bladewing.features import model_inputs
+from bladewing.models.session import quiet_session
 from bladewing.simulate import Radar, draw_records
 from numpy.typing import NDArray
 
@@ -251,11 +252,7 @@ def open_choice(kind: str, name: str, files: Sequence[bytes]) -> Answer:
     if kind == "model":
         classifier = classifier_of(name, files)
         return lambda iq, radar: classifier.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz).probabilities
-    import onnxruntime
-
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    session = onnxruntime.InferenceSession(files[0], options, providers=["CPUExecutionProvider"])
+    session = quiet_session(files[0])
     names = [node.name for node in session.get_inputs()]
 
     def answer(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.fft
 from bladewing.features.inputs import model_inputs
+from bladewing.models.session import quiet_session
 from numpy.typing import NDArray
 
 from ..inference import Classifier
@@ -112,11 +113,7 @@ def _works(
 
 def _network(content: bytes, inputs: tuple[str, ...], ready: list[dict[str, NDArray[np.float32]]]) -> Work:
     """Build the bare ONNX call of a model on inputs that are ready."""
-    import onnxruntime
-
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    session = quiet_session(content)
     feeds = [{name: one[name] for name in inputs} for one in ready]
     return in_turn([partial(session.run, ["probabilities"], feed) for feed in feeds])
 

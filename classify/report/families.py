@@ -17,7 +17,7 @@ from ..gather import Gathered, gather
 from ..inference import Classifier
 from ..labels import UNKNOWN
 from ..training_config import TrainingConfig
-from .metrics import mean_of_rates, rate
+from .metrics import mean_of_rates, rate, recalls
 
 #: Which records belong to a family, by their truth.
 FAMILIES: dict[str, Callable[[Mapping[str, NDArray]], NDArray[np.bool_]]] = {
@@ -118,19 +118,15 @@ def _described(
     probabilities: NDArray[np.floating], answers: NDArray[np.str_], test: Gathered, of: NDArray[np.bool_]
 ) -> dict[str, Any]:
     """What is said of a family's records."""
-    winner, own = probabilities.argmax(axis=1), np.unique(test.labels[of])
-    recalls, weights = [], np.zeros(len(winner))
-    for index in range(probabilities.shape[1]):
-        among = (test.labels == index) & (of if index in own else True)
-        recalls.append(rate(winner[among] == index))
-        weights[among] = 1 / max(1, among.sum())
-    named, right = answers[of] != UNKNOWN, winner[of] == test.labels[of]
+    named, right, classes = answers != UNKNOWN, probabilities.argmax(axis=1) == test.labels, probabilities.shape[1]
+    among = of | ~np.isin(test.labels, test.labels[of])
+    weights = among / np.maximum(1, np.bincount(test.labels[among], minlength=classes))[test.labels]
     # of a balanced world in which the family stands for its class: among records of one class alone even probabilities
     # that are right on the whole err
     error = expected_calibration_error(probabilities, test.labels, weights=weights) if of.any() else None
     return {
-        "accuracy": mean_of_rates(recalls),
-        "unknown": rate(~named),
-        "wrong": rate(named & ~right),
+        "accuracy": mean_of_rates(recalls(right[among], test.labels[among], classes)),
+        "unknown": rate(~named[of]),
+        "wrong": rate((named & ~right)[of]),
         "calibration_error": error,
     }

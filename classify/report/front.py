@@ -16,6 +16,7 @@ from bladewing.features.schema import INPUT_SHAPES
 from bladewing.simulate import Radar, draw_records
 from numpy.typing import NDArray
 
+from ..labels import CLASSES
 from ..ladder import non_dominated
 from ..parts import Parts
 from . import choices, metrics
@@ -177,8 +178,7 @@ def _stored(name: str, sets: Mapping[str, Sets], config: ReportConfig, done: OnD
 
 def _scores(labels: NDArray[np.int64], probabilities: NDArray[np.floating]) -> dict[str, Any]:
     """Balanced accuracy and the UAVs found at the false-alarm rate."""
-    best = probabilities.argmax(axis=1)
-    recalls = [metrics.rate(best[labels == number] == number) for number in range(3)]
+    recalls = metrics.recalls(probabilities.argmax(axis=1) == labels, labels, len(CLASSES))
     found = metrics.detection_at(probabilities[:, 0], labels == 0, false_alarm_rate=FALSE_ALARM_RATE)
     return {"balanced_accuracy": metrics.mean_of_rates(recalls), "uav_found": found["detection"]}
 

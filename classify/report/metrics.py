@@ -72,6 +72,19 @@ def rate(hits: NDArray[np.bool_]) -> Rate:
     return {"value": right / count, "low": low, "high": high, "right": right, "count": count}
 
 
+def recalls(hits: NDArray[np.bool_], labels: NDArray[np.integer], classes: int) -> list[Rate]:
+    """Rate of each class's records, in the order of the classes; `mean_of_rates` of them is the balanced accuracy.
+
+    Parameters
+    ----------
+    hits : (n,) bool
+    labels : (n,) int
+        Class number of each record.
+    classes : int
+    """
+    return [rate(hits[labels == number]) for number in range(classes)]
+
+
 def mean_of_rates(rates: Sequence[Rate]) -> Rate:
     """Mean of independent rates, with an interval recovered from theirs (MOVER, Zou and Donner 2008).
 

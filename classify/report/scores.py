@@ -122,7 +122,7 @@ def score(truth: Truth, answers: Answers) -> dict[str, Any]:
     label, probabilities = truth.label[seen], np.asarray(answers.probabilities[seen], np.float64)
     best, accepted = np.argmax(probabilities, axis=-1), answers.label[seen]
     right, uav = best == label, truth.classes.index("uav")
-    recalls = {name: metrics.rate(right[label == i]) for i, name in enumerate(truth.classes)}
+    recalls = metrics.recalls(right, label, len(truth.classes))
     at_pfa = metrics.detection_at(probabilities[:, uav], label == uav, false_alarm_rate=FALSE_ALARM_RATE)
     false_uav = {
         "best": metrics.rate(best[label != uav] == uav),
@@ -132,8 +132,8 @@ def score(truth: Truth, answers: Answers) -> dict[str, Any]:
         "refused": int(np.count_nonzero(~seen)),
         "accuracy": metrics.rate(right),
         "design_effect": metrics.design_effect(right, truth.radar[seen]),
-        "balanced_accuracy": metrics.mean_of_rates(list(recalls.values())),
-        "recall": recalls,
+        "balanced_accuracy": metrics.mean_of_rates(recalls),
+        "recall": dict(zip(truth.classes, recalls, strict=True)),
         "confusion": _confusion(label, best, accepted, len(truth.classes)),
         "uav_at_pfa": at_pfa,
         "false_uav": false_uav,
@@ -185,8 +185,9 @@ def _sliced(
     slices = []
     for low, high in pairwise(edges):
         inside = (values >= low) & (values < high)
-        rates = {name: metrics.rate(right[inside & (label == i)]) for i, name in enumerate(truth.classes)}
-        slices.append({"from": float(low), "to": float(high), "all": metrics.rate(right[inside]), **rates})
+        rates = metrics.recalls(right[inside], label[inside], len(truth.classes))
+        named = dict(zip(truth.classes, rates, strict=True))
+        slices.append({"from": float(low), "to": float(high), "all": metrics.rate(right[inside]), **named})
     return slices
 
 

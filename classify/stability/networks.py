@@ -6,13 +6,13 @@ from typing import Any
 
 import mpmath
 import numpy as np
-import onnxruntime
 import torch
 from bladewing.features import INPUT_SHAPES, model_inputs
 from bladewing.models import LADDER
 from bladewing.models.calibration import Calibration, softmax
 from bladewing.models.cnn import EvidenceNet, ImageNet, SpectrumNet
 from bladewing.models.export import export_network, in_eight_bits
+from bladewing.models.session import quiet_session
 from bladewing.models.training import network_scores
 from bladewing.simulate import Radar, draw_records
 from numpy.typing import NDArray
@@ -126,7 +126,5 @@ def _difference(run: Callable[[Inputs], NDArray], reference: Callable[[Inputs], 
 
 
 def _runner(onnx_bytes: bytes) -> Callable[[Inputs], NDArray[np.float32]]:
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
-    session = onnxruntime.InferenceSession(onnx_bytes, options, providers=["CPUExecutionProvider"])
+    session = quiet_session(onnx_bytes)
     return lambda given: session.run(["probabilities"], given)[0]

@@ -17,10 +17,11 @@ from bladewing.classify.model_file import COVERAGES
 from bladewing.classify.parts import TRAIN_PARTS
 from bladewing.classify.train import run_training
 from bladewing.classify.train_network import CLASS_OF_KIND, kinds_of, train_net
-from bladewing.classify.training_account import alarm_threshold, figures
+from bladewing.classify.training_account import figures
 from bladewing.classify.training_config import TrainingConfig, training_config
 from bladewing.features import INPUT_SHAPES
 from bladewing.models import tabular, training
+from bladewing.models.operating import least_named
 from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.dataset import KIND_CLASS
 
@@ -314,7 +315,7 @@ def test_the_threshold_of_a_rate_keeps_to_it_on_its_own_records(others, tied):
     probabilities = np.random.default_rng(others).dirichlet(np.ones(3), others + 50).astype(np.float32)
     probabilities[:tied, 0] = 0.999
     labels = np.repeat([1, 0], [others, 50])
-    threshold = alarm_threshold(probabilities, labels, 0.01)
+    threshold = least_named(probabilities[labels != 0, 0], 0.01)
     false = np.sum(probabilities[labels != 0, 0] >= threshold)
     assert false <= 0.01 * others
     assert tied or false == int(0.01 * others)
