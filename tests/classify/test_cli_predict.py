@@ -192,7 +192,8 @@ def test_good_recordings_are_answered_beside_a_bad_one(run, sigmf_pair, tmp_path
 def test_people_get_a_table_that_fits_80_columns(run, sigmf_pair):
     code, out, err = run(sigmf_pair("one"), sigmf_pair("two", sample_rate=1000.0), "--dwell", 1)
     assert (code, err) == (0, "")
-    lines = [line.rstrip() for line in out.splitlines()]
+    lines = out.splitlines()
+    assert not [line for line in lines if line.endswith(" ")]
     table = [line for line in lines if ".sigmf-" not in line]  # a path is as long as it is
     assert max(map(len, table)) <= 80
     assert lines[0].endswith("one.sigmf-meta")
