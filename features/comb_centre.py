@@ -1,9 +1,11 @@
 """Which line of a comb is the body's, about which its orders count."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .bodies import LINE_DB
 from .comb_search import FINE_STEPS, Candidate, even_scores
+from .folding import outermost_orders
 from .periodogram import Periodogram
 
 #: What speaks for the comb's centre where a line stands so far over all others of it [nats, dB], and more for each dB
@@ -39,6 +41,9 @@ REST, HOVERS = 8.0, 11.0
 #: A line is at rest so near to it [bins].
 AT_REST_BINS = 1.0
 
+#: Before a static background only what stands so far out of its skirt is a line [times the local level].
+OUT_OF_SKIRT = 12.0
+
 #: Other orders that have at most so much less [nats] leave the choice open; asked are those within so many of the best.
 OPEN_NATS, NEAR_ORDERS = 3.0, 3
 
@@ -71,7 +76,8 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
     shifts = [round((centre - found.centre) / found.spacing) for centre in bonuses]
     # one comb for several rotors may pass a little beside the body's line: either place will do
     either = np.stack([list(bonuses), found.centre + found.spacing * np.array(shifts)], axis=1)
-    scores, _ = even_scores(evidence, np.repeat(steps, either.size), np.tile(either.ravel(), len(steps)))
+    furthest = float(outermost_orders(data, found.spacing)) * found.spacing if found.is_folded else 0.5
+    scores, _ = even_scores(evidence, np.repeat(steps, either.size), np.tile(either.ravel(), len(steps)), furthest)
     scores = scores.reshape(len(steps), *either.shape).max(axis=2)
     for shift, (centre, bonus), own in zip(shifts, bonuses.items(), scores.T, strict=True):
         index = int(own.argmax())
@@ -92,7 +98,7 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
     chosen = round((best.centre - found.centre) / found.spacing)
     others = np.setdiff1d(chosen + np.arange(-NEAR_ORDERS, NEAR_ORDERS + 1), list(totals))
     places = best.centre + best.spacing * (others - chosen)
-    scores, _ = even_scores(evidence, np.full(len(others), best.spacing), places)
+    scores, _ = even_scores(evidence, np.full(len(others), best.spacing), places, furthest)
     away = np.append(others, list(totals)) - chosen
     likely = np.exp(np.append(scores, list(totals.values())) - most)
     likely[likely < np.exp(-OPEN_NATS)] = 0.0
@@ -105,6 +111,13 @@ def _moves(data: Periodogram, centre: float) -> bool:
     return abs(centre) * data.pulses >= AT_REST_BINS and (nearer or abs(centre) > data.rest_half)
 
 
+def _stands_out(
+    data: Periodogram, places: NDArray[np.floating], power: NDArray[np.floating] | float
+) -> NDArray[np.bool_]:
+    """False where so much power at places [cycles a sample] is a static background's skirt, or may be."""
+    return np.asarray(~data.in_skirt(places) | (power > OUT_OF_SKIRT * data.level_at(places)), np.bool_)
+
+
 def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], dict[int, float]]:
     """What speaks for the body's line besides the comb [nats]: by place [cycles a sample], and by order of the comb."""
     middle = found.centre + found.spacing * round((found.high + found.low) / 2)
@@ -113,9 +126,10 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
     if (found.high - found.low + AROUND_ORDERS) * found.spacing > 1:  # all around the circle: it has no middle
         out += [(float(place), 0.0) for place in places]
     power = data.at(places) * data.level_at(places) * data.usable(places)
+    power *= _stands_out(data, places, power)
     highest_db = 10 * float(np.log10(power.max(initial=1.0)))
     even: dict[int, float] = {}
-    if highest_db > CLEAR_DB:
+    if highest_db > CLEAR_DB and not found.is_folded:  # on both sides of any line there are those of the other end
         unlikely, most_even = _even_orders(data, found, 10 ** ((highest_db - ENDS_DB) / 10))
         even = {order: most_even - nats for order, nats in unlikely.items() if nats < most_even}
         out += [(found.centre + found.spacing * order, 0.0) for order in even]
@@ -124,7 +138,8 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
     # a line beside rest is a slow body's own, and hides no other
     hides = abs(data.centres[0]) * data.pulses < AT_REST_BINS and not any(_moves(data, line) for line in data.centres)
     for centre, level_db in sorted(zip(data.centres, data.centres_db, strict=True), key=lambda line: -abs(line[0])):
-        over_db = max(level_db - others_db, 0.0)
+        is_line = _stands_out(data, np.array([centre]), 10 ** (level_db / 10))[0]
+        over_db = max(level_db - others_db, 0.0) if is_line else 0.0
         nats = STRONG_LINE * min(over_db / STRONG_OVER_DB, 1.0)
         nats += STRONG_LINE_DB * max(over_db - STRONG_OVER_DB, 0.0)
         # a line at rest that is no background may be an offset of the receiver all the same
@@ -159,9 +174,13 @@ def _even_orders(data: Periodogram, found: Candidate, least: float) -> tuple[dic
     order = np.arange(-furthest, furthest + 1)
     borders = np.rint((found.centre + found.spacing * (np.append(order, furthest + 1) - 0.5)) * size).astype(np.intp)
     bins = np.arange(borders[0], borders[-1]) % size
-    highest = np.maximum.reduceat((data.power * data.level * data.seen)[bins], borders[:-1] - borders[0])
-    hidden = ~np.logical_or.reduceat(data.seen[bins], borders[:-1] - borders[0])
+    starts = borders[:-1] - borders[0]
+    power = data.power * data.level
+    seen = data.seen & _stands_out(data, np.arange(size) / size, power)
+    highest = np.maximum.reduceat((power * seen)[bins], starts)
+    hidden = ~np.logical_or.reduceat(data.seen[bins], starts)
     shows = np.flatnonzero((highest > least) | hidden)
+    hidden |= ~np.logical_or.reduceat(seen[bins], starts)
     # from what speaks for the comb outwards: another family may follow
     groups = np.split(shows, np.flatnonzero(np.diff(shows) > 1 + ENDS_GAP) + 1)
     own = [group for group in groups if np.any((order[group] >= found.low) & (order[group] <= found.high))]

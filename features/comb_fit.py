@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .folding import outermost_orders
 from .lines import sum_of_lines
 from .periodogram import LEAST_LEVEL, Level, Periodogram
 from .slow_lines import LineProducts, notched_products, parts, remove_bands, times, whole
@@ -83,6 +84,8 @@ def over_orders(
 def orders_within(data: Periodogram, centre: float, spacing: float, reach: tuple[int, int]) -> NDArray[np.intp]:
     """Orders of the lines that are fitted: some past the outermost that speak, and none that were taken out."""
     (low, high), widest = reach, int(0.49 / spacing)
+    if max(high, -low) * spacing > 0.5:  # they come back from the other end of the span
+        widest = int(outermost_orders(data, spacing))
     own = np.arange(max(low - MARGIN_ORDERS, -widest), min(high + MARGIN_ORDERS, widest) + 1)
     return np.asarray(own[~data.removed(centre + spacing * own)], np.intp)
 

@@ -12,6 +12,7 @@ from .chopping import CHOPPING_RANGE_HZ
 from .comb_sums import running_sums
 from .evidence import MOST_SNRS, Evidence
 from .flashes import flash_evidence
+from .folding import outermost_orders
 from .octaves import MULTIPLE_SHARE, coarsest
 from .periodogram import Periodogram
 
@@ -38,6 +39,12 @@ FLASH_SHARE, REST_FLASH_SHARE = 2.0, 1.0
 
 #: What a comb whose sides reach unequally far must have more [nats].
 UNEVEN_COST = 4.0
+
+#: Lines of tips faster than the unambiguous velocity count where they speak for so much more [nats].
+FOLDED_NATS = 8.0
+
+#: A comb whose lines do is believed where one whose lines do not has less than this share of its score.
+UNFOLDED_SHARE = 0.97
 
 #: Further than this from its mirror image about velocity zero a comb's lines are others than that one's [bins].
 MIRROR_BINS = 1.5
@@ -70,6 +77,11 @@ class Candidate:
     low: int
     high: int
     score: float
+
+    @property
+    def is_folded(self) -> bool:
+        """Whether its outer lines come back from the other end of the span."""
+        return max(self.high, -self.low) * self.spacing > 0.5
 
 
 @dataclass(frozen=True)
@@ -167,6 +179,7 @@ def score(
     evidence: Evidence,
     spacings: NDArray[np.float64],
     centres: NDArray[np.float64],
+    outermost: NDArray[np.intp] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
     """Score combs by their lines, each side of the centre out to where its lines stop.
 
@@ -176,6 +189,8 @@ def score(
         Of each bin.
     spacings, centres : ndarray, shape (candidates,)
         [cycles a sample].
+    outermost : ndarray of int, shape (candidates,), optional
+        Lines up to this order count; else those within half a span of the centre.
 
     Returns
     -------
@@ -185,7 +200,7 @@ def score(
         Outermost orders.
     """
     size = evidence.rows.shape[-1]
-    widest = (0.5 / spacings).astype(np.intp)
+    widest = (0.5 / spacings).astype(np.intp) if outermost is None else outermost
     order = np.arange(1, widest.max(initial=0) + 1)
     beyond = order > widest[:, None]
     step = (spacings * size)[:, None] * order
@@ -258,8 +273,8 @@ def _sums_of_sides(
 ) -> Iterator[NDArray[np.float32]]:
     """Running sums to both sides of combs, the spacings rising: as `running_sums` gives them."""
     size = evidence.rows.shape[-1]
-    # a line beyond half the PRF is the alias on the other side; a turn more, that no place is below 0
-    start, step = (1 + centres % 1.0) * size, spacings * size
+    # a line beyond half the PRF is the alias on the other side; turns more, that no place is below 0
+    start, step = (np.ceil(furthest) + centres % 1.0) * size, spacings * size
     return running_sums(evidence, np.stack([start, start]), np.stack([-step, step]), furthest * size)
 
 
@@ -349,14 +364,21 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     scores = _loudness(data, spacings, centres)
     loudest_first = np.argsort(-scores, kind="stable")
     finest = loudest_first[np.unique(family[loudest_first], return_index=True)[1]]
-    scores, lows, highs = score(evidence, spacings[finest], centres[finest])
+    within = score(evidence, spacings[finest], centres[finest])
+    further = score(evidence, spacings[finest], centres[finest], outermost_orders(data, spacings[finest]))
+    folded = further[0] > within[0] + FOLDED_NATS
+    scores, lows, highs = (np.where(folded, far, own) for far, own in zip(further, within, strict=True))
     all_scores = scores + _mirrored(data, spacings[finest], centres[finest])
     share = REST_FLASH_SHARE if data.rest_half > 0 else FLASH_SHARE
     # flashes can not bring what scores less near the best
     near = np.flatnonzero((1 + share) * all_scores >= MULTIPLE_SHARE * all_scores.max())
-    spacings, centres, lows, highs = spacings[finest[near]], centres[finest[near]], lows[near], highs[near]
+    spacings, centres = spacings[finest[near]], centres[finest[near]]
+    lows, highs, folded = lows[near], highs[near], folded[near]
     flashes = flash_evidence(data, spacings, centres, lows, highs)
     totals = scores[near] + np.minimum(flashes, share * scores[near])
-    best = coarsest(spacings.tolist(), (totals + _mirrored(data, spacings, centres)).tolist())
+    all_totals = totals + _mirrored(data, spacings, centres)
+    each = [np.flatnonzero(own) for own in (~folded, folded) if own.any()]
+    ends = [int(own[coarsest(spacings[own], all_totals[own])]) for own in each]
+    best = max(ends, key=lambda end: all_totals[end] * (UNFOLDED_SHARE if folded[end] else 1.0))
     low, high = int(lows[best]), int(highs[best])
     return Candidate(float(spacings[best]), float(centres[best]), low, high, float(totals[best]))

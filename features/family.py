@@ -138,7 +138,7 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
         return None, reason
     if family.ahead is not None and not is_sure(*family.ahead):
         return family, ""
-    edge = min(family.edge, span_of(data))
+    edge = min(family.edge, span_of(data, [family.comb.fit]))
     several_gain = BELIEVED_GAIN if family.is_told_apart else SEVERAL_GAIN
     least_gain = several_gain if len(family.rotors.rates) > 1 else 0.0
 
@@ -223,10 +223,11 @@ def _as_it_is(data: Periodogram, blades: int | None, even: Straightened | None =
     if slow := slower_than_rotors(data, edge, std):
         return None, slow
     fills_span = bool(np.isinf(edge))
-    gear, rotors, reason = find_gear(data, comb, min(edge, span_of(data)))
+    furthest = min(edge, span_of(data, [comb.fit]))
+    gear, rotors, reason = find_gear(data, comb, furthest)
     if gear is None and len(rotors.rates) == 1:  # of several the lines lie anywhere
         without, alike = without_weak_lines(data, comb, blades)
-        again = find_gear(without, alike, min(edge, span_of(data))) if without is not data else None
+        again = find_gear(without, alike, furthest) if without is not data else None
         if again is not None and again[0] is None and len(again[1].rates) == 1:
             data, comb, (_, rotors, reason) = without, alike, again
     if gear is not None:

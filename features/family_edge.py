@@ -1,10 +1,13 @@
 """Where the line families of one or several rotors end, from the lines that were fitted or from all about them."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .comb import Comb
 from .comb_fit import CombFit
+from .folding import fastest_tip, outermost_orders
 from .lines import LineSpace
 from .periodogram import Periodogram
 from .rotor_band import LEAK_SHARE, fit_edge
@@ -48,9 +51,6 @@ FOREIGN_FACTOR, FOREIGN_ORDERS = 10.0, 8
 #: been folded back between its lines.
 SPAN, SPAN_SHARE, SPAN_DEVIATIONS = 0.49, 0.05, 4.0
 
-#: No blade's tip is faster [m/s]; a radar of a wide span sees further, but what stands there is another's or noise.
-FASTEST_TIP_MPS = 250.0
-
 #: The orders beyond this share of the span are those asked whether it ends there.
 SPAN_OUTER = 0.9
 
@@ -70,9 +70,15 @@ GAPS_SHOW = 0.4
 LEAST_SPREAD = 0.02
 
 
-def span_of(data: Periodogram) -> float:
-    """How far from the body lines of a rotor are looked for [cycles a sample]: `SPAN`, or the fastest tip's."""
-    return min(SPAN, 2 * FASTEST_TIP_MPS / (data.wavelength_m * data.prf_hz))
+def span_of(data: Periodogram, fits: Sequence[CombFit] = ()) -> float:
+    """How far from the body lines of a rotor are looked for [cycles a sample].
+
+    `SPAN`, or further for one rotor whose fitted lines come back from the other end of it; up to the fastest tip's.
+    """
+    span = SPAN
+    if len(fits) == 1 and float(np.abs(fits[0].orders).max()) * fits[0].spacing > 0.5:
+        span = 2 * SPAN * int(outermost_orders(data, fits[0].spacing)) * fits[0].spacing
+    return min(span, fastest_tip(data))
 
 
 def _orders(spacing: float, span: float) -> NDArray[np.intp]:
@@ -116,7 +122,7 @@ def edge_of_lines(
     """
     spacings = np.array([fit.spacing * per_turn for fit in fits])
     fastest = float(spacings.max())
-    span = span_of(data)
+    span = span_of(data, fits)
     order = _orders(fastest, span)
     sides = np.array([[-1], [1]]) * order
     centres = np.array([fit.centre for fit in fits])

@@ -11,7 +11,8 @@ from .bandwidth import threshold_band_hz
 from .body_velocity import body_velocity, folded
 from .chopping import Chopping
 from .family import Family, find_family, slower_than_rotors, too_few_flashes
-from .family_edge import FASTEST_TIP_MPS, SPAN, edge_around, edge_of_lines, span_of, surer_edge
+from .family_edge import SPAN, edge_around, edge_of_lines, span_of, surer_edge
+from .folding import FASTEST_TIP_MPS, fastest_tip
 from .measurements import BODY, EACH_ROTOR, Measurements
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .periodogram import prepared
@@ -157,7 +158,7 @@ def _band(family: Family, edge: tuple[float, float], beta_rad: float | None) -> 
     beta_rad
         As in `measure`.
     """
-    data, (away, std), span = family.data, edge, span_of(family.data)
+    data, (away, std), span = family.data, edge, span_of(family.data, family.rotors.fits)
     mps = data.prf_hz * data.wavelength_m / 2  # [m/s] for a cycle a sample
     furthest, why = FURTHEST_EDGE * span / SPAN, ""
     if data.one_channel:
@@ -165,7 +166,7 @@ def _band(family: Family, edge: tuple[float, float], beta_rad: float | None) -> 
     elif family.fills_span or not away + EDGE_DEVIATIONS * std < furthest:
         why = (
             f"no band: lines may fill the unambiguous span, tips of {furthest * mps:.1f} m/s and more: raise the PRF"
-            if span == SPAN
+            if span < fastest_tip(data)
             else f"no band: lines reach {furthest * mps:.0f} m/s and more from the body, faster than any blade's tip"
         )
     if why:

@@ -33,7 +33,7 @@ def over_neighbours(evidence: NDArray[np.float32], block: int) -> NDArray[np.flo
     return np.asarray(evidence - anywhere, np.float32)
 
 
-def coarsest(spacings: Sequence[float], scores: Sequence[float]) -> int:
+def coarsest(spacings: Sequence[float] | NDArray[np.float64], scores: Sequence[float] | NDArray[np.float64]) -> int:
     """Which comb has the highest score, or lies at a multiple of that one's spacing and comes near its score.
 
     The lines that a fraction of the spacing adds, if they are there, speak as loudly as the others; of several rotors'
@@ -41,9 +41,9 @@ def coarsest(spacings: Sequence[float], scores: Sequence[float]) -> int:
 
     Parameters
     ----------
-    spacings : sequence of float
+    spacings : sequence of float, or ndarray
         Of the combs, any unit.
-    scores : sequence of float
+    scores : sequence of float, or ndarray
         Their scores [nats].
     """
     best = int(np.argmax(scores))

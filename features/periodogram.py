@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +62,10 @@ STOP_SHARE = 0.3
 
 #: A local level as a function of the frequency [cycles a sample].
 Level = Callable[[NDArray[np.floating]], NDArray[np.float64]]
+
+
+#: The skirt of a static background falls by so much from one octave of the velocity to the next [nats], over so many.
+SKIRT_FALL, SKIRT_OCTAVES = 0.3, 2
 
 
 @dataclass(frozen=True)
@@ -153,6 +158,28 @@ class Periodogram:
             away = frequency - centre
             ok &= np.abs(away - np.rint(away)) > half + 1.5 / self.pulses
         return ok
+
+    @cached_property
+    def _skirt_half(self) -> float:
+        """How far the skirt of a static background reaches to both sides [cycles a sample], 0 where there is none."""
+        size, first = len(self.level), int(self.rest_half * len(self.level)) + 1
+        octaves = int(np.log2(size / 2 / first)) if self.rest_half > 0 else 0
+        both = np.minimum(self.level, np.roll(self.level[::-1], 1))[: size // 2]
+        ends = first * 2 ** np.arange(octaves + 1)
+        levels = [float(np.log(both[low:high]).mean()) for low, high in pairwise(ends)]
+        falls = np.append(np.diff(levels) < -SKIRT_FALL, False)
+        last = int(falls.argmin())
+        if last < SKIRT_OCTAVES or np.log(both[ends[1] :].max()) > levels[0] + SKIRT_FALL:
+            return 0.0
+        return float(ends[last + 1]) / size
+
+    def in_skirt(self, frequency: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """True at frequencies [cycles a sample] where the level is that of the skirt of a static background.
+
+        That falls from velocity zero to both sides, and no level further out is higher; where lines fill their band it
+        rises towards the tips.
+        """
+        return np.asarray(np.abs(frequency - np.rint(frequency)) < self._skirt_half, np.bool_)
 
     def in_band(self, frequency: NDArray[np.floating]) -> NDArray[np.bool_]:
         """True where the receiver lets noise through: past its filter there is less than anywhere within."""

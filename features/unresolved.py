@@ -83,11 +83,18 @@ _About = tuple[NDArray[np.float64], NDArray[np.floating], NDArray[np.bool_]]
 
 
 def _power_about(data: Periodogram, rest: NDArray[np.complex128], centre: float) -> _About:
-    """Of each bin of what is left: how far from a centre it is [cycles a sample], its power, whether it can be seen."""
+    """Of each bin of what is left: how far from a centre it is [cycles a sample], its power, whether it can be seen.
+
+    A background's skirt is nothing that rotors leave: there the power is what stands over that.
+    """
     frequency = fft.fftfreq(data.pulses)
     away = np.abs(frequency - centre)
     seen = data.usable(frequency) & data.in_band(frequency)
-    return np.abs(away - np.rint(away)), squared(fft.fft(rest)) / data.pulses, seen
+    power = squared(fft.fft(rest)) / data.pulses
+    skirt = data.in_skirt(frequency)
+    if skirt.any():
+        power[skirt] /= np.maximum(data.level_of(rest)(frequency[skirt]), 1.0)
+    return np.abs(away - np.rint(away)), power, seen
 
 
 def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[float, bool]:
