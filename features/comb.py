@@ -15,7 +15,7 @@ from .lines import LineSpace
 from .periodogram import Periodogram
 
 #: Score that chance alone exceeds in under 1 % of the records: of white noise; where a line was taken out; where the
-#: static background was, with its skirt [nats]. Checked by tests/benchmarks/measurement_tables.py.
+#: static background was, with its skirt, or in one channel, whose combs are sought about two places [nats]. Checked by tests/benchmarks/measurement_tables.py.
 THRESHOLDS = (18.0, 18.0, 25.0)
 
 #: A rotor's lines reach at least so far from the body [m/s]; wings, limbs and wheels seldom do with so few lines.
@@ -34,8 +34,8 @@ MAINS_SHARE, MAINS_SHARE_OF_TWO = 0.0055, 0.0025
 #: Where fewer bins than this lie between multiples of the mains, any centre lies near one: only one at rest tells then.
 MAINS_BINS = 4.0
 
-#: Beside a static background a comb of less evidence [nats] is not believed at such a spacing, wherever its centre is:
-#: supplies click.
+#: Beside a static background a comb of less evidence [nats], or one channel's, is not believed at such a spacing,
+#: wherever its centre is: supplies click.
 MAINS_SCORE = 70.0
 
 #: A rotor has up to so many blades, if its number is not known.
@@ -159,7 +159,8 @@ def of_mains(fit: CombFit, data: Periodogram, score: float, per_turn: int = 1) -
             base = spacing / multiple
             nearest = base * round(fit.centre / base) if base * data.pulses >= MAINS_BINS else 0.0
             off = abs(fit.centre - nearest) * data.pulses
-            return (data.rest_half > 0 and score < MAINS_SCORE) or off < max(0.2, 3 * fit.centre_std * data.pulses)
+            clicks = data.rest_half > 0 and (data.one_channel or score < MAINS_SCORE)
+            return clicks or off < max(0.2, 3 * fit.centre_std * data.pulses)
     return False
 
 
@@ -198,7 +199,7 @@ def finer_spacing(data: Periodogram, fit: CombFit) -> float | None:
 
 def threshold(data: Periodogram) -> float:
     """Score a comb must exceed in this record [nats]."""
-    if data.rest_half > 0:
+    if data.rest_half > 0 or data.one_channel:
         return THRESHOLDS[2]
     return THRESHOLDS[1] if data.centres_db[0] > LINE_DB else THRESHOLDS[0]
 

@@ -14,6 +14,7 @@ from bladewing.features.rotors import MAX_ROTORS
 from bladewing.features.slow_lines import notched_products, remove_bands, slepian
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 from bladewing.simulate.catalogue import AIRFRAMES
+from scipy.signal import hilbert
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from ..benchmarks import records
@@ -169,6 +170,20 @@ def test_mains_harmonics_are_no_rotor():
     hum = sum(np.exp(2j * np.pi * 100 * order * times_s + 1j * order) for order in range(-30, 31))
     found = measure(hum + white(np.random.default_rng(0), PULSES), **RADAR)
     assert "mains" in str(found.reason)
+
+
+@pytest.mark.parametrize("level", [0.3, 1.0])
+def test_loud_mains_of_one_channel_beside_a_background_are_no_rotor(level):
+    """Whatever line of it they are counted from: of a measured one a dwell in fifty was called a rotor of 100.5 Hz."""
+    times_s = np.arange(PULSES) / PRF_HZ
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        hum = sum(np.cos(2 * np.pi * (100.5 * n + 12) * times_s + rng.uniform(0, 6)) for n in range(1, 60))
+        ground = np.convolve(white(rng, PULSES + 1500), np.hanning(1500), "valid")[:PULSES].real
+        channel = hilbert(level * hum + 3 * ground + white(rng, PULSES).real)
+        found = measure(channel.astype(np.complex64), **RADAR)
+        assert np.isnan(found.chopping_hz)
+        assert "mains" in str(found.reason)
 
 
 def test_a_batch_gives_what_a_loop_gives():
