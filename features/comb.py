@@ -15,7 +15,8 @@ from .lines import LineSpace
 from .periodogram import Periodogram
 
 #: Score that chance alone exceeds in under 1 % of the records: of white noise; where a line was taken out; where the
-#: static background was, with its skirt, or in one channel, whose combs are sought about two places [nats]. Checked by tests/benchmarks/measurement_tables.py.
+#: static background was, with its skirt, or in one channel, whose combs are sought about two places [nats]. Checked by
+#: tests/benchmarks/measurement_tables.py.
 THRESHOLDS = (18.0, 18.0, 25.0)
 
 #: A rotor's lines reach at least so far from the body [m/s]; wings, limbs and wheels seldom do with so few lines.
@@ -55,6 +56,11 @@ UNEQUAL_NATS = 8.0
 #: is too short for that, less is enough, and of further fractions.
 FRACTIONS, FRACTION_SHARE = (2, 3), 0.9
 USUAL_HZ, USUAL_FRACTIONS, USUAL_SHARE = 60.0, (2, 3, 4, 5, 6, 7, 8), 0.85
+
+
+#: Nor is it a rotor's where lines between its own, so many times as dense and slower than any rotor chops, are about as
+#: many again: they speak for so many times as much, and noise there for less than nothing.
+SLOWER_FRACTIONS, SLOWER_SHARE = (2, 3, 4), 1.3
 
 
 @dataclass(frozen=True)
@@ -190,11 +196,35 @@ def finer_spacing(data: Periodogram, fit: CombFit) -> float | None:
         return None
     finer[0] = True
     spacings = spacings[finer]
-    steps = 1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (FINE_STEPS * data.pulses)
-    tried = np.outer(spacings, steps)
-    scores = heights(data.contrast, tried.ravel(), np.full(tried.size, fit.centre)).reshape(tried.shape).max(axis=1)
+    scores = _scores_near(data, fit, spacings)
     as_loud = np.flatnonzero(scores[1:] > share * scores[0]) + 1
     return float(spacings[as_loud[0]]) if len(as_loud) else None
+
+
+def slower_spacing(data: Periodogram, fit: CombFit) -> float | None:
+    """Spacing at which no rotor chops, where lines stand between those of a comb; or None [cycles a sample].
+
+    Parameters
+    ----------
+    data, fit
+        As in `finer_spacing`.
+    """
+    spacings = fit.spacing / np.array([1, *SLOWER_FRACTIONS])
+    slower = (spacings * data.prf_hz < CHOPPING_RANGE_HZ[0]) & (spacings * data.pulses >= MIN_SPACING_BINS)
+    if not slower[1:].any():
+        return None
+    slower[0] = True
+    scores = _scores_near(data, fit, spacings[slower])
+    best = int(scores.argmax())
+    return float(spacings[slower][best]) if scores[best] > SLOWER_SHARE * scores[0] else None
+
+
+def _scores_near(data: Periodogram, fit: CombFit, spacings: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What speaks for combs of about these spacings, about the centre of another [nats]."""
+    steps = 1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (FINE_STEPS * data.pulses)
+    tried = np.outer(spacings, steps)
+    scores = heights(data.contrast, tried.ravel(), np.full(tried.size, fit.centre)).reshape(tried.shape)
+    return np.asarray(scores.max(axis=1), np.float64)
 
 
 def threshold(data: Periodogram) -> float:
@@ -249,6 +279,12 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
         return None, (
             f"dwell too short: lines {fit.spacing * data.prf_hz:.0f} Hz apart with others between them, "
             f"to tell them apart takes {1e3 * least_s:.0f} ms at least"
+        )
+    slower = slower_spacing(data, fit)
+    if slower is not None:
+        return None, (
+            f"no rotor: lines every {slower * data.prf_hz:.1f} Hz, "
+            f"rotors chop at {CHOPPING_RANGE_HZ[0]:.0f} Hz and more"
         )
     seen = fit.amplitudes + LineSpace(fitted[1]).at(fit.frequencies)[0]
     power = np.abs(seen) ** 2 * data.pulses / data.level_of(fitted[1])(fit.frequencies)

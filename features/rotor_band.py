@@ -33,8 +33,9 @@ SHARE_FALL = 0.6
 #: Widths of the roll-off, Gamma^(1/3) orders, past the tip that lines are followed.
 REACH = 3.0
 
-#: Step of the first search [lines]: the lines' ripple repeats every pi of the phase deviation.
-STEP = 0.2
+#: Step of the first search [lines], and of more blades than are tried [rad of phase deviation], in which the lines'
+#: ripple repeats every pi.
+STEP, STEP_GAMMA = 0.2, 0.4
 
 #: The first search goes so far about all lines that may be the last [lines], and so many widths of the roll-off, over
 #: which strong lines still show; which these are the coarse search has as likely as this [nats]. It takes so many steps
@@ -152,7 +153,8 @@ def fit_edge(
     maybe = order[_coarse_nats(lines, loud) > -COARSE_NATS]
     low, high = maybe[0] - _half_range(maybe[0], fewest), maybe[-1] + _half_range(maybe[-1], fewest)
     furthest = float(order[-1]) + _half_range(order[-1], fewest)  # nothing speaks for an edge that nothing shows
-    step = max(STEP, (high - low) / MOST_STEPS)
+    most = max(tried.blades)
+    step = max(STEP if most <= max(BLADES) else STEP_GAMMA / most, (high - low) / MOST_STEPS)
     bend_std = PLAIN_BEND if plain else BEND_STD
     bent, edge = np.zeros(len(BENDS)), high
     for search in range(SEARCHES):

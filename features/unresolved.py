@@ -18,6 +18,9 @@ from .rotors import RESOLVED_BINS, Rotors
 SECOND_FLASH_SHARE, FLASH_WIDTH, FLASH_PADDING = 0.3, 2.5, 16
 LEAST_FLASH_LINES = 6
 
+#: Blades that reflect at their tips are taken for this many, at most.
+MOST_TIPS = 6
+
 #: What is left between the lines within the band, over what is left beyond it, and as a share of the lines' power,
 #: speaks of rotors that were not found where it exceeds both of these.
 LEFT_OVER, LEFT_SHARE = 0.3, 0.05
@@ -42,7 +45,8 @@ def _flashes_twice(fit: CombFit, per_turn: int, tip: float) -> bool:
     at every speed below the tip's, before and after that comes straight on: its lines are J_n(Gamma) (the paper's eq.
     24), and flash once when these are taken for what they are; `tip` is the order its edge has.
     """
-    return all(_second_flashes(fit, per_turn, blade) for blade in (None, (1, tip), (2, tip), (3, tip)))
+    blades = [None, *((number, tip) for number in range(1, MOST_TIPS + 1))]
+    return all(_second_flashes(fit, per_turn, blade) for blade in blades)
 
 
 def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) -> bool:
@@ -65,16 +69,21 @@ def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) 
             continue
         lines = np.zeros(order.max() + 1, np.complex128)
         lines[order] = fit.amplitudes[side]
-        if tip is not None:
-            lines *= jv(tip[0] * np.arange(len(lines)), tip[0] * tip[1])
         size = FLASH_PADDING * len(lines)
+        alone = np.zeros(size)
+        if tip is not None:
+            shape = jv(tip[0] * np.arange(len(lines)), tip[0] * tip[1])
+            lines *= shape
+            shape[np.setdiff1d(np.arange(len(lines)), order)] = 0.0
+            alone = np.abs(fft.fft(shape**2, size)) ** 2 / max(float((shape**2).sum()) ** 2, 1e-30)
         power = np.abs(fft.fft(lines, size)) ** 2
         first = int(power.argmax())
+        power = power / power[first] - np.roll(alone, first)  # few lines of unlike strength flash beside as well
         lines_away = np.abs((np.arange(size) - first + size // 2) % size - size // 2) / FLASH_PADDING
         other = lines_away > FLASH_WIDTH
         for part in (2, 3):  # unequal blades of one rotor flash at fractions of the turn
             other &= np.abs(lines_away - len(lines) / part) > 1
-        shares.append(power[other].max(initial=0) / power[first])
+        shares.append(float(power[other].max(initial=0.0)))
     return len(shares) == 2 and min(shares) > SECOND_FLASH_SHARE / 2 and sum(shares) > 2 * SECOND_FLASH_SHARE
 
 

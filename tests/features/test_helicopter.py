@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
-from bladewing.simulate import Scene
+from bladewing.simulate import RotorMotion, Scene, rotor_echo
 from bladewing.simulate.catalogue import AIRFRAMES
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, rotors, white
@@ -169,3 +169,16 @@ def test_the_tail_does_not_move_the_tip_of_the_main_rotor(snr_db, tail_db, tail_
         assert found.gear_reason == ""
         off = found.tip_speed_mps - 2 * np.pi * main_hz * 0.35
         assert abs(off) < 4 * found.tip_speed_mps_std
+
+
+@pytest.mark.parametrize("rotation_hz", [5.7, 6.6, 8.1])
+def test_a_helicopter_slower_than_rotors_chop_is_told_to_be(rotation_hz):
+    """Two blades of 5 m: every second line was given, surely."""
+    rng = np.random.default_rng(int(10 * rotation_hz))
+    radar = {"carrier_hz": 3.3e9, "prf_hz": 15e3}
+    times_s = np.arange(8000) / radar["prf_hz"]
+    echo = rotor_echo(RotorMotion(rotation_hz, 1.0).angle_rad(times_s), wavelength_m=0.0908, blade_length_m=5.0)
+    iq = 4 * echo / np.sqrt(np.mean(np.abs(echo) ** 2)) + 10 + white(rng, 8000)
+    found = measure(iq.astype(np.complex64), **radar)
+    assert np.isnan(found.chopping_hz)
+    assert f"lines every {2 * rotation_hz:.1f} Hz, rotors chop at 18 Hz and more" in str(found.reason)
