@@ -279,3 +279,22 @@ def test_whatever_orders_are_seen_an_edge_is_found(data):
     )
     assert 0 < edge < 2 * orders[-1] + 20
     assert std >= 0
+
+
+def test_a_point_at_the_tip_of_even_blades_shows_in_the_deviation():
+    """It is strongest where the band ends, at a phase of its own: half of the tips came out 4 % and more too fast."""
+    errors, off = [], []
+    for seed in range(24):
+        rng = np.random.default_rng(seed)
+        rate_hz = rng.uniform(45, 95)
+        angle_rad = RotorMotion(rate_hz, rng.uniform(0, 6)).angle_rad(np.arange(PULSES) / PRF_HZ)
+        blade = {"wavelength_m": WAVELENGTH_M, "blade_length_m": 0.15}
+        point = rng.uniform(0.15, 0.4) * np.exp(2j * np.pi * rng.uniform()) * rotor_echo(angle_rad, **blade, points=1)
+        echo = rotor_echo(angle_rad, **blade) + point
+        iq = 10 * echo / np.sqrt(np.mean(np.abs(echo) ** 2)) + 40 + white(rng, PULSES)
+        found = measure(iq.astype(np.complex64), carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
+        tip_mps = 2 * np.pi * rate_hz * 0.15
+        off.append(found.tip_speed_mps / tip_mps - 1)
+        errors.append((found.tip_speed_mps - tip_mps) / found.tip_speed_mps_std)
+    assert np.median(np.abs(off)) < 0.025
+    assert np.sqrt(np.nanmean(np.square(errors))) < 3.0  # it was 5
