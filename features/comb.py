@@ -58,8 +58,8 @@ FRACTIONS, FRACTION_SHARE = (2, 3), 0.9
 USUAL_HZ, USUAL_FRACTIONS, USUAL_SHARE = 60.0, (2, 3, 4, 5, 6, 7, 8), 0.85
 
 
-#: Nor is it a rotor's where lines between its own, so many times as dense and slower than any rotor chops, are about as
-#: many again: they speak for so many times as much, and noise there for less than nothing.
+#: A comb is no rotor's where lines so many times as dense, slower than rotors chop, speak for so many times as much:
+#: a full-size helicopter's for twice as much, noise between a rotor's lines for less than those alone.
 SLOWER_FRACTIONS, SLOWER_SHARE = (2, 3, 4), 1.3
 
 
@@ -211,12 +211,13 @@ def slower_spacing(data: Periodogram, fit: CombFit) -> float | None:
     """
     spacings = fit.spacing / np.array([1, *SLOWER_FRACTIONS])
     slower = (spacings * data.prf_hz < CHOPPING_RANGE_HZ[0]) & (spacings * data.pulses >= MIN_SPACING_BINS)
-    if not slower[1:].any():
+    if not slower[1:].any() or fit.is_folded:  # what comes back from the other end of the span lies between as well
         return None
     slower[0] = True
     scores = _scores_near(data, fit, spacings[slower])
     best = int(scores.argmax())
-    return float(spacings[slower][best]) if scores[best] > SLOWER_SHARE * scores[0] else None
+    least = SLOWER_SHARE * max(scores[0], threshold(data))
+    return float(spacings[slower][best]) if scores[best] > least else None
 
 
 def _scores_near(data: Periodogram, fit: CombFit, spacings: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,5 +1,7 @@
 """Which line of a comb is the body's, about which its orders count."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -76,7 +78,9 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
     shifts = [round((centre - found.centre) / found.spacing) for centre in bonuses]
     # one comb for several rotors may pass a little beside the body's line: either place will do
     either = np.stack([list(bonuses), found.centre + found.spacing * np.array(shifts)], axis=1)
-    furthest = float(outermost_orders(data, found.spacing)) * found.spacing if found.is_folded else 0.5
+    # only lines that were found to come back from the other end of the span lie past it
+    outermost = int(outermost_orders(data, found.spacing))
+    furthest, within = (outermost * found.spacing, outermost) if found.is_folded else (0.5, int(0.5 / found.spacing))
     scores, _ = even_scores(evidence, np.repeat(steps, either.size), np.tile(either.ravel(), len(steps)), furthest)
     scores = scores.reshape(len(steps), *either.shape).max(axis=2)
     for shift, (centre, bonus), own in zip(shifts, bonuses.items(), scores.T, strict=True):
@@ -91,8 +95,8 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
                 best = Candidate(
                     float(steps[index]),
                     centre,
-                    min(found.low - shift, 0),
-                    max(found.high - shift, 0),
+                    max(min(found.low - shift, 0), -within),
+                    min(max(found.high - shift, 0), within),
                     found.score,
                 )
     chosen = round((best.centre - found.centre) / found.spacing)
@@ -102,6 +106,9 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
     away = np.append(others, list(totals)) - chosen
     likely = np.exp(np.append(scores, list(totals.values())) - most)
     likely[likely < np.exp(-OPEN_NATS)] = 0.0
+    if found.is_folded:
+        _, (reach,) = even_scores(evidence, np.array([best.spacing]), np.array([best.centre]), furthest)
+        best = replace(best, centre=best.centre - round(best.centre), low=-int(reach), high=int(reach))
     return best, float(np.sqrt((likely * away**2).sum() / likely.sum()))
 
 

@@ -61,6 +61,11 @@ class CombFit:
     snr: NDArray[np.float64]
 
     @property
+    def is_folded(self) -> bool:
+        """Whether its outer lines come back from the other end of the span."""
+        return bool(np.abs(self.orders).max(initial=0) * self.spacing > 0.5)
+
+    @property
     def frequencies(self) -> NDArray[np.float64]:
         """Where its lines are [cycles a sample]."""
         return np.asarray(self.centre + self.spacing * self.orders, np.float64)

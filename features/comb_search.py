@@ -40,11 +40,14 @@ FLASH_SHARE, REST_FLASH_SHARE = 2.0, 1.0
 #: What a comb whose sides reach unequally far must have more [nats].
 UNEVEN_COST = 4.0
 
-#: Lines of tips faster than the unambiguous velocity count where they speak for so much more [nats].
+#: Lines of tips faster than the unambiguous velocity count where they speak for so much more [nats]: noise there speaks
+#: for less than nothing.
 FOLDED_NATS = 8.0
 
-#: A comb whose lines do is believed where one whose lines do not has less than this share of its score.
-UNFOLDED_SHARE = 0.97
+#: They may be those of the comb found without them, no further off than so many bins at the PRF. Another comb is
+#: believed where none without them has this share of its score, and if it is hardly finer than the one found: each
+#: finer one finds some of several rotors' lines all over the span.
+SAME_BINS, UNFOLDED_SHARE, FINER = 4.0, 0.88, 0.9
 
 #: Further than this from its mirror image about velocity zero a comb's lines are others than that one's [bins].
 MIRROR_BINS = 1.5
@@ -190,7 +193,7 @@ def score(
     spacings, centres : ndarray, shape (candidates,)
         [cycles a sample].
     outermost : ndarray of int, shape (candidates,), optional
-        Lines up to this order count; else those within half a span of the centre.
+        Lines up to this order count, of sides that reach equally far; else those within half a span of the centre.
 
     Returns
     -------
@@ -220,6 +223,11 @@ def score(
         last = both.argmax(axis=1)
         total = np.maximum(both[number, last], 0)
         ends = np.stack([last, last]) + 1
+        if outermost is not None:
+            better = total > best
+            best[better] = total[better]
+            reach[:, better] = ends[:, better]
+            continue
         apart = np.stack([side.argmax(axis=1) for side in sides])
         peaks = np.stack([np.maximum(side[number, end], 0) for side, end in zip(sides, apart, strict=True)])
         uneven = peaks.sum(axis=0) - np.float32(UNEVEN_COST)
@@ -364,21 +372,67 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     scores = _loudness(data, spacings, centres)
     loudest_first = np.argsort(-scores, kind="stable")
     finest = loudest_first[np.unique(family[loudest_first], return_index=True)[1]]
-    within = score(evidence, spacings[finest], centres[finest])
-    further = score(evidence, spacings[finest], centres[finest], outermost_orders(data, spacings[finest]))
-    folded = further[0] > within[0] + FOLDED_NATS
-    scores, lows, highs = (np.where(folded, far, own) for far, own in zip(further, within, strict=True))
-    all_scores = scores + _mirrored(data, spacings[finest], centres[finest])
+    spacings, centres = spacings[finest], centres[finest]
+    scored = score(evidence, spacings, centres)
+    totals = _with_flashes(data, spacings, centres, scored)
+    all_totals = np.where(totals > 0, totals + _mirrored(data, spacings, centres), 0.0)
+    best = coarsest(spacings, all_totals)
+    low, high = int(scored[1][best]), int(scored[2][best])
+    found = Candidate(float(spacings[best]), float(centres[best]), low, high, float(totals[best]))
+    if data.one_channel:
+        return found
+    return _folded(data, spacings, centres, scored[0], float(all_totals.max()), found) or found
+
+
+#: Of combs: what speaks for each [nats], and its outermost orders, low <= 0 <= high.
+_Scored = tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]
+
+
+def _with_flashes(
+    data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64], scored: _Scored
+) -> NDArray[np.float64]:
+    """What speaks for combs with their flashes, shape (combs,) [nats]; 0 where these do not bring one near the best."""
+    scores, lows, highs = scored
+    all_scores = scores + _mirrored(data, spacings, centres)
     share = REST_FLASH_SHARE if data.rest_half > 0 else FLASH_SHARE
-    # flashes can not bring what scores less near the best
     near = np.flatnonzero((1 + share) * all_scores >= MULTIPLE_SHARE * all_scores.max())
-    spacings, centres = spacings[finest[near]], centres[finest[near]]
-    lows, highs, folded = lows[near], highs[near], folded[near]
-    flashes = flash_evidence(data, spacings, centres, lows, highs)
-    totals = scores[near] + np.minimum(flashes, share * scores[near])
-    all_totals = totals + _mirrored(data, spacings, centres)
-    each = [np.flatnonzero(own) for own in (~folded, folded) if own.any()]
-    ends = [int(own[coarsest(spacings[own], all_totals[own])]) for own in each]
-    best = max(ends, key=lambda end: all_totals[end] * (UNFOLDED_SHARE if folded[end] else 1.0))
+    flashes = flash_evidence(data, spacings[near], centres[near], lows[near], highs[near])
+    totals = np.zeros(len(spacings))
+    totals[near] = scores[near] + np.minimum(flashes, share * scores[near])
+    return totals
+
+
+def _folded(
+    data: Periodogram,
+    spacings: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    within: NDArray[np.float64],
+    most: float,
+    found: Candidate,
+) -> Candidate | None:
+    """The comb whose lines come back from the other end of the span, if one speaks louder than all that do not.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    spacings, centres, within : ndarray, shape (candidates,)
+        Combs [cycles a sample] and their scores within the span [nats].
+    most : float
+        The most that speaks for any of these [nats].
+    found : Candidate
+        The one chosen of them.
+    """
+    scores, lows, highs = score(data.contrast, spacings, centres, outermost_orders(data, spacings))
+    own = (scores > within + FOLDED_NATS) & (highs * spacings > 0.5) & (spacings > FINER * found.spacing)
+    same = own & (np.abs(spacings / found.spacing - 1) * data.pulses < SAME_BINS)
+    own = same if same.any() else own
+    if not own.any():
+        return None
+    spacings, centres, lows, highs = spacings[own], centres[own], lows[own], highs[own]
+    totals = _with_flashes(data, spacings, centres, (scores[own], lows, highs))
+    best = int(totals.argmax())
+    if not same.any() and UNFOLDED_SHARE * totals[best] < most:
+        return None
     low, high = int(lows[best]), int(highs[best])
     return Candidate(float(spacings[best]), float(centres[best]), low, high, float(totals[best]))

@@ -46,9 +46,9 @@ COVERED_BINS = 1.5
 #: Lines stronger by this than the one on the other side and than most of so many beside it are another target's.
 FOREIGN_FACTOR, FOREIGN_ORDERS = 10.0, 8
 
-#: Lines are looked for so far from the body [cycles a sample]. A family that still stands there at this share of its
-#: mean power, by so many deviations of the noise, has no edge to be seen: it fills the span, and what lies beyond has
-#: been folded back between its lines.
+#: Lines are looked for so far from the body [cycles a sample], or further where those past the span are told from the
+#: others. A family that still stands there at this share of its mean power, by so many deviations of the noise, has no
+#: edge to be seen: what lies beyond has been folded back between its lines.
 SPAN, SPAN_SHARE, SPAN_DEVIATIONS = 0.49, 0.05, 4.0
 
 #: The orders beyond this share of the span are those asked whether it ends there.
@@ -76,7 +76,7 @@ def span_of(data: Periodogram, fits: Sequence[CombFit] = ()) -> float:
     `SPAN`, or further for one rotor whose fitted lines come back from the other end of it; up to the fastest tip's.
     """
     span = SPAN
-    if len(fits) == 1 and float(np.abs(fits[0].orders).max()) * fits[0].spacing > 0.5:
+    if len(fits) == 1 and fits[0].is_folded:
         span = 2 * SPAN * int(outermost_orders(data, fits[0].spacing)) * fits[0].spacing
     return min(span, fastest_tip(data))
 

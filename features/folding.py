@@ -10,7 +10,7 @@ FASTEST_TIP_MPS = 250.0
 
 #: Lines up to so many times the unambiguous velocity are told from the others where they fall further than so many bins
 #: from these. (A comb of a fraction of the spacing finds some of them among its own.)
-FOLDED_TIMES, FOLDED_BINS = 4, 1.5
+FOLDED_TIMES, FOLDED_BINS = 4, 2.0
 
 
 def fastest_tip(data: Periodogram) -> float:

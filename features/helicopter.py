@@ -137,8 +137,8 @@ def _second_comb(data: Periodogram, comb: Comb, furthest: float) -> tuple[Gear |
     rival = _rival(rest, evidence, hidden, best)
     if rival > 0:
         return None, f"no second comb: the lines left over repeat every {rival * data.prf_hz:.1f} Hz as well"
-    orders = comb.fit.orders
-    reach = (min(int(orders.min()) + MARGIN_ORDERS, 0), max(int(orders.max()) - MARGIN_ORDERS, 0))
+    orders, margin = comb.fit.orders, 0 if comb.fit.is_folded else MARGIN_ORDERS
+    reach = (min(int(orders.min()) + margin, 0), max(int(orders.max()) - margin, 0))
     spacings = [comb.fit.spacing, best.spacing]
     fitted = fit_combs(data, comb.fit.centre, spacings, [reach, (best.low, best.high)])
     if fitted is None:

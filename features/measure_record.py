@@ -161,9 +161,10 @@ def _band(family: Family, edge: tuple[float, float], beta_rad: float | None) -> 
     data, (away, std), span = family.data, edge, span_of(family.data, family.rotors.fits)
     mps = data.prf_hz * data.wavelength_m / 2  # [m/s] for a cycle a sample
     furthest, why = FURTHEST_EDGE * span / SPAN, ""
+    not_told = family.comb.fit.is_folded and not family.is_told_apart
     if data.one_channel:
         why = ONE_CHANNEL
-    elif family.fills_span or not away + EDGE_DEVIATIONS * std < furthest:
+    elif family.fills_span or not_told or not away + EDGE_DEVIATIONS * std < furthest:
         why = (
             f"no band: lines may fill the unambiguous span, tips of {furthest * mps:.1f} m/s and more: raise the PRF"
             if span < fastest_tip(data)

@@ -94,7 +94,8 @@ _About = tuple[NDArray[np.float64], NDArray[np.floating], NDArray[np.bool_]]
 def _power_about(data: Periodogram, rest: NDArray[np.complex128], centre: float) -> _About:
     """Of each bin of what is left: how far from a centre it is [cycles a sample], its power, whether it can be seen.
 
-    A background's skirt is nothing that rotors leave: there the power is what stands over that.
+    A background's skirt is nothing that rotors leave: there the power is in units of that, or what is so loud would
+    outweigh all others by chance.
     """
     frequency = fft.fftfreq(data.pulses)
     away = np.abs(frequency - centre)
@@ -118,9 +119,10 @@ def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[float, 
     low, high = 2 * fits[0].spacing, 0.9 * edge
     within = usable & (away < high) & (away > low)
     beyond = usable & (away > 1.1 * edge)
-    if within.sum() < LEAST_BINS or beyond.sum() < LEAST_BINS:
+    nothing_beyond = edge > 0.5  # where lines come back from the other end of the span the floor tells the noise
+    if within.sum() < LEAST_BINS or (beyond.sum() < LEAST_BINS and not nothing_beyond):
         return 0.0, False
-    noise = float(power[beyond].mean())
+    noise = 1.0 if nothing_beyond else float(power[beyond].mean())
     over = float(power[within].mean()) - noise
     lines = sum(float((np.abs(fit.amplitudes) ** 2).sum()) for fit in fits) * pulses
     share = over * within.sum() / lines if over > LEFT_OVER * noise else 0.0
@@ -132,7 +134,7 @@ def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[float, 
         held += float((np.abs(fit.amplitudes[inside]) ** 2).sum()) * pulses / len(fits)
         apart = np.minimum(1.0, (1 + order[inside] * range_bins) / len(fits))
         taken += float((apart * fit.snr[inside] / (1 + fit.snr[inside])).sum())
-    deviation = noise * float(np.sqrt(1 / within.sum() + 1 / beyond.sum()))
+    deviation = noise * float(np.sqrt(1 / within.sum() + 1 / max(beyond.sum(), LEAST_BINS)))
     most = over + noise * taken / within.sum() + HIDDEN_DEVIATIONS * deviation
     return share, most * within.sum() > held
 
@@ -176,8 +178,10 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float, *, fitted
     twice = any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
     about = _power_about(data, rotors.rest, rotors.fits[0].centre)
     share, hidden = _left_over(about, rotors.fits, edge)
+    # lines that come back from the other end of the span are none of a family that ends within it
+    contradicted = not several and rotors.fits[0].is_folded and edge < 0.5
     past = (not several or fitted_to is not None) and _stands_past(about, rotors.fits, fitted_to or edge)
-    if not (twice or hidden or past or share > (LEFT_SHARE if several else LEFT_ALONE)):
+    if not (twice or hidden or past or contradicted or share > (LEFT_SHARE if several else LEFT_ALONE)):
         return rotors
     apart = abs(rotors.next_rate - float(rotors.rates[0])) if hidden and not several else 0.0
     return not_all(rotors, data, apart)
