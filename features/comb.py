@@ -57,7 +57,6 @@ UNEQUAL_NATS = 8.0
 FRACTIONS, FRACTION_SHARE = (2, 3), 0.9
 USUAL_HZ, USUAL_FRACTIONS, USUAL_SHARE = 60.0, (2, 3, 4, 5, 6, 7, 8), 0.85
 
-
 #: A comb is no rotor's where lines so many times as dense, slower than rotors chop, speak for so many times as much:
 #: a full-size helicopter's for twice as much, noise between a rotor's lines for less than those alone.
 SLOWER_FRACTIONS, SLOWER_SHARE = (2, 3, 4), 1.3

@@ -79,8 +79,8 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
     # one comb for several rotors may pass a little beside the body's line: either place will do
     either = np.stack([list(bonuses), found.centre + found.spacing * np.array(shifts)], axis=1)
     # only lines that were found to come back from the other end of the span lie past it
-    outermost = int(outermost_orders(data, found.spacing))
-    furthest, within = (outermost * found.spacing, outermost) if found.is_folded else (0.5, int(0.5 / found.spacing))
+    within = int(outermost_orders(data, found.spacing)) if found.is_folded else int(0.5 / found.spacing)
+    furthest = within * found.spacing if found.is_folded else 0.5
     scores, _ = even_scores(evidence, np.repeat(steps, either.size), np.tile(either.ravel(), len(steps)), furthest)
     scores = scores.reshape(len(steps), *either.shape).max(axis=2)
     for shift, (centre, bonus), own in zip(shifts, bonuses.items(), scores.T, strict=True):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .folding import outermost_orders
+from .folding import comes_back, outermost_orders
 from .lines import sum_of_lines
 from .periodogram import LEAST_LEVEL, Level, Periodogram
 from .slow_lines import LineProducts, notched_products, parts, remove_bands, times, whole
@@ -63,7 +63,7 @@ class CombFit:
     @property
     def is_folded(self) -> bool:
         """Whether its outer lines come back from the other end of the span."""
-        return bool(np.abs(self.orders).max(initial=0) * self.spacing > 0.5)
+        return bool(comes_back(np.abs(self.orders).max(initial=0), self.spacing))
 
     @property
     def frequencies(self) -> NDArray[np.float64]:
@@ -89,7 +89,7 @@ def over_orders(
 def orders_within(data: Periodogram, centre: float, spacing: float, reach: tuple[int, int]) -> NDArray[np.intp]:
     """Orders of the lines that are fitted: some past the outermost that speak, and none that were taken out."""
     (low, high), widest = reach, int(0.49 / spacing)
-    if max(high, -low) * spacing > 0.5:  # they come back from the other end of the span
+    if comes_back(max(high, -low), spacing):
         widest = int(outermost_orders(data, spacing))
     own = np.arange(max(low - MARGIN_ORDERS, -widest), min(high + MARGIN_ORDERS, widest) + 1)
     return np.asarray(own[~data.removed(centre + spacing * own)], np.intp)

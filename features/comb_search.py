@@ -12,7 +12,7 @@ from .chopping import CHOPPING_RANGE_HZ
 from .comb_sums import running_sums
 from .evidence import MOST_SNRS, Evidence
 from .flashes import flash_evidence
-from .folding import outermost_orders
+from .folding import comes_back, outermost_orders
 from .octaves import MULTIPLE_SHARE, coarsest
 from .periodogram import Periodogram
 
@@ -84,7 +84,7 @@ class Candidate:
     @property
     def is_folded(self) -> bool:
         """Whether its outer lines come back from the other end of the span."""
-        return max(self.high, -self.low) * self.spacing > 0.5
+        return bool(comes_back(max(self.high, -self.low), self.spacing))
 
 
 @dataclass(frozen=True)
@@ -223,16 +223,12 @@ def score(
         last = both.argmax(axis=1)
         total = np.maximum(both[number, last], 0)
         ends = np.stack([last, last]) + 1
-        if outermost is not None:
-            better = total > best
-            best[better] = total[better]
-            reach[:, better] = ends[:, better]
-            continue
-        apart = np.stack([side.argmax(axis=1) for side in sides])
-        peaks = np.stack([np.maximum(side[number, end], 0) for side, end in zip(sides, apart, strict=True)])
-        uneven = peaks.sum(axis=0) - np.float32(UNEVEN_COST)
-        ends = np.where(uneven > total, np.where(peaks > 0, apart + 1, 0), ends)
-        total = np.maximum(total, uneven)
+        if outermost is None:
+            apart = np.stack([side.argmax(axis=1) for side in sides])
+            peaks = np.stack([np.maximum(side[number, end], 0) for side, end in zip(sides, apart, strict=True)])
+            uneven = peaks.sum(axis=0) - np.float32(UNEVEN_COST)
+            ends = np.where(uneven > total, np.where(peaks > 0, apart + 1, 0), ends)
+            total = np.maximum(total, uneven)
         better = total > best
         best[better] = total[better]
         reach[:, better] = ends[:, better]
@@ -374,8 +370,9 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     finest = loudest_first[np.unique(family[loudest_first], return_index=True)[1]]
     spacings, centres = spacings[finest], centres[finest]
     scored = score(evidence, spacings, centres)
-    totals = _with_flashes(data, spacings, centres, scored)
-    all_totals = np.where(totals > 0, totals + _mirrored(data, spacings, centres), 0.0)
+    mirrored = _mirrored(data, spacings, centres)
+    totals = _with_flashes(data, spacings, centres, scored, mirrored)
+    all_totals = np.where(totals > 0, totals + mirrored, 0.0)
     best = coarsest(spacings, all_totals)
     low, high = int(scored[1][best]), int(scored[2][best])
     found = Candidate(float(spacings[best]), float(centres[best]), low, high, float(totals[best]))
@@ -389,11 +386,15 @@ _Scored = tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]
 
 
 def _with_flashes(
-    data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64], scored: _Scored
+    data: Periodogram,
+    spacings: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    scored: _Scored,
+    mirrored: NDArray[np.float64] | float = 0.0,
 ) -> NDArray[np.float64]:
     """What speaks for combs with their flashes, shape (combs,) [nats]; 0 where these do not bring one near the best."""
     scores, lows, highs = scored
-    all_scores = scores + _mirrored(data, spacings, centres)
+    all_scores = scores + mirrored
     share = REST_FLASH_SHARE if data.rest_half > 0 else FLASH_SHARE
     near = np.flatnonzero((1 + share) * all_scores >= MULTIPLE_SHARE * all_scores.max())
     flashes = flash_evidence(data, spacings[near], centres[near], lows[near], highs[near])
@@ -424,7 +425,7 @@ def _folded(
         The one chosen of them.
     """
     scores, lows, highs = score(data.contrast, spacings, centres, outermost_orders(data, spacings))
-    own = (scores > within + FOLDED_NATS) & (highs * spacings > 0.5) & (spacings > FINER * found.spacing)
+    own = (scores > within + FOLDED_NATS) & comes_back(highs, spacings) & (spacings > FINER * found.spacing)
     same = own & (np.abs(spacings / found.spacing - 1) * data.pulses < SAME_BINS)
     own = same if same.any() else own
     if not own.any():

@@ -13,6 +13,13 @@ FASTEST_TIP_MPS = 250.0
 FOLDED_TIMES, FOLDED_BINS = 4, 2.0
 
 
+def comes_back(
+    order: NDArray[np.intp] | int, spacing: NDArray[np.float64] | float
+) -> NDArray[np.bool_] | np.bool_ | bool:
+    """True where a line so many orders from the body, so far apart [cycles a sample], lies past the end of the span."""
+    return order * spacing > 0.5
+
+
 def fastest_tip(data: Periodogram) -> float:
     """How far from the body lines of the fastest tip are [cycles a sample]."""
     return 2 * FASTEST_TIP_MPS / (data.wavelength_m * data.prf_hz)

@@ -1,9 +1,7 @@
 """Which of a comb's multiples and fractions is the rotor's: several rotors' lines fill all places further out."""
 
-from collections.abc import Sequence
-
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 #: Where a place has so much evidence on average, lines fill its neighbourhood [nats]; noise has less than none.
 FILLED_NATS = 0.2
@@ -33,7 +31,7 @@ def over_neighbours(evidence: NDArray[np.float32], block: int) -> NDArray[np.flo
     return np.asarray(evidence - anywhere, np.float32)
 
 
-def coarsest(spacings: Sequence[float] | NDArray[np.float64], scores: Sequence[float] | NDArray[np.float64]) -> int:
+def coarsest(spacings: ArrayLike, scores: ArrayLike) -> int:
     """Which comb has the highest score, or lies at a multiple of that one's spacing and comes near its score.
 
     The lines that a fraction of the spacing adds, if they are there, speak as loudly as the others; of several rotors'
@@ -41,15 +39,16 @@ def coarsest(spacings: Sequence[float] | NDArray[np.float64], scores: Sequence[f
 
     Parameters
     ----------
-    spacings : sequence of float, or ndarray
+    spacings : array_like, shape (combs,)
         Of the combs, any unit.
-    scores : sequence of float, or ndarray
+    scores : array_like, shape (combs,)
         Their scores [nats].
     """
-    best = int(np.argmax(scores))
-    if scores[best] < MULTIPLE_FROM:
+    spacing, score = np.asarray(spacings), np.asarray(scores)
+    best = int(score.argmax())
+    if score[best] < MULTIPLE_FROM:
         return best
-    multiple = np.asarray(spacings) / spacings[best]
+    multiple = spacing / spacing[best]
     whole = np.abs(multiple / np.maximum(np.rint(multiple), 2) - 1) < MULTIPLE_OFF
-    as_good = whole & (np.asarray(scores) > MULTIPLE_SHARE * scores[best])
+    as_good = whole & (score > MULTIPLE_SHARE * score[best])
     return int(np.where(as_good, multiple, 0).argmax()) if as_good.any() else best

@@ -162,8 +162,10 @@ class Periodogram:
     @cached_property
     def _skirt_half(self) -> float:
         """How far the skirt of a static background reaches to both sides [cycles a sample], 0 where there is none."""
+        if self.rest_half == 0:
+            return 0.0
         size, first = len(self.level), int(self.rest_half * len(self.level)) + 1
-        octaves = int(np.log2(size / 2 / first)) if self.rest_half > 0 else 0
+        octaves = int(np.log2(size / 2 / first))
         both = np.minimum(self.level, np.roll(self.level[::-1], 1))[: size // 2]
         ends = first * 2 ** np.arange(octaves + 1)
         levels = [float(np.log(both[low:high]).mean()) for low, high in pairwise(ends)]
