@@ -18,3 +18,8 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("shared")
+
+
+def pytest_make_parametrize_id(config, val):
+    """Name bytes by their number: some hold the time (MATLAB's headers), and workers must collect the same names."""
+    return f"{len(val)} bytes" if isinstance(val, bytes) else None
