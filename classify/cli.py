@@ -1,7 +1,5 @@
-"""The command line. Exit codes: 0 done, 1 unexpected, 2 bad input, 130 interrupted; errors are one line on stderr."""
+"""The command line: what each command takes, and where its work is done."""
 
-import errno
-import io
 import json
 import os
 import sys
@@ -10,12 +8,13 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .bounds import LEAST_RECORDS
-from .errors import BadInput, Interrupted, one_line
+from .errors import BadInput, Interrupted
+from .exits import complain, exit_code, mend_streams
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -26,19 +25,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # else the units in [brackets] are taken for markup
 )
 
-# The parent of all usage errors has no public name that old and new versions of typer share.
-_UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])
-
-# As modules, or as the packages that hold them: an account of a training asks for their versions.
-_TRAIN_EXTRA = {"torch", "sklearn", "scikit-learn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2", "mpmath"}
-# A disk that is full, read-only or out of bounds is the user's to mend.
-_DISK_ERRORS = {
-    errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EFBIG, errno.ENOTDIR, errno.EISDIR,
-    errno.EEXIST, errno.ENAMETOOLONG, errno.ENOENT,
-}  # fmt: skip
-_TRACEBACK = "BLADEWING_TRACEBACK"
 _LONGEST_LINE = 10_000
-_NUMBERS = {"int_parsing": "be a whole number", "float_parsing": "be a number"}
 
 Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]
 
@@ -129,9 +116,9 @@ def predict(
     dwell_s = work.checked_dwell_s(dwell)
     classifier = Classifier.load(model, budget_us=budget_us, max_false_alarm=max_false_alarm, coverage=coverage)
     if budget_us is not None:  # it follows from a timing of this moment
-        _complain(f"the budget of {budget_us:g} us buys the model {classifier.name}", kind="note")
+        complain(f"the budget of {budget_us:g} us buys the model {classifier.name}", kind="note")
     if classifier.operating_point is not None:
-        _complain(work.terms(classifier.operating_point, by_sets=coverage is not None), kind="note")
+        complain(work.terms(classifier.operating_point, by_sets=coverage is not None), kind="note")
     said: Counter[str] = Counter()
     unreadable = 0
     for result in work.answers(
@@ -139,7 +126,7 @@ def predict(
     ):
         if isinstance(result, BadInput):
             unreadable += 1
-            _complain(str(result))
+            complain(str(result))
             continue
         said[result.track.label] += 1
         if as_json:
@@ -187,6 +174,7 @@ def measure(
 ) -> None:
     """Measure the rotor in each dwell, with error bars: body velocity, chopping, single rotors, band, blade."""
     from . import measure as work
+    from .measure_words import print_measured
 
     settings = work.Settings.checked(dwell_s=dwell, blades=blades, beta_deg=beta_deg)
     work.checked_plot(plot)
@@ -195,13 +183,13 @@ def measure(
     for result in work.measured(recordings, settings, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable):
         if isinstance(result, BadInput):
             unreadable += 1
-            _complain(str(result))
+            complain(str(result))
             continue
         if as_json:
             for line in result.json_objects():
                 print(json.dumps(line, allow_nan=False))
         else:
-            result.print(_console())
+            print_measured(result, _console())
         sys.stdout.flush()
         clearest = result.clearer(clearest)
     if plot is not None and clearest is not None:
@@ -339,18 +327,18 @@ def simulate(
         found = Scene.load(scene)
     except SceneError as error:
         for problem in error.problems[:-1]:
-            _complain(problem)
+            complain(problem)
         raise BadInput(error.problems[-1]) from None
     told = found.warnings()
     for warning in told:
-        _complain(f"{scene}: {warning}", kind="warning")
+        complain(f"{scene}: {warning}", kind="warning")
     plan = None if full else found.plan(seed, tolerance_db=tolerance_db)
     if explain:
         print(plan.explain() if plan else "full fidelity: nothing is left out", flush=True)
     if out is not None:
         rendering = render(found, seed, plan=plan)
         for warning in rendering.warnings[len(told) :]:  # what shows as it is drawn
-            _complain(f"{scene}: {warning}", kind="warning")
+            complain(f"{scene}: {warning}", kind="warning")
         written = write_rendering(out, rendering, found, seed)
         print("\n".join(str(path) for path in written), flush=True)
 
@@ -389,6 +377,15 @@ def _goes_on(kept: Path) -> Iterator[None]:
         raise Interrupted(f"what is done is kept in {kept}: the same command goes on") from None
 
 
+def _console() -> "Console":
+    """Where answers are printed: as wide as the terminal, and in a pipe or a file as wide as a line is."""
+    from rich.console import Console
+
+    columns = os.environ.get("COLUMNS", "")
+    unbounded = columns.strip("0") == "" if columns else not sys.stdout.isatty()  # no terminal has no columns
+    return Console(highlight=False, width=_LONGEST_LINE if unbounded else None)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
@@ -402,90 +399,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 done, 1 unexpected, 2 bad input, 130 interrupted.
     """
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by whoever calls: nobody reads them
-            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
-        elif isinstance(getattr(sys, name), io.TextIOWrapper):  # a name its encoding cannot hold is shown escaped
-            getattr(sys, name).reconfigure(errors="backslashreplace")
+    mend_streams()
     if arguments is None and not sys.warnoptions:
         warnings.simplefilter("ignore")  # a library's warning is for developers, unless one asks for it with -W
-    try:
-        code = typer.main.get_command(app).main(arguments, prog_name="bladewing", standalone_mode=False)
-        if code == 130:  # how typer tells of an interrupt
-            raise KeyboardInterrupt
-        return code if isinstance(code, int) else 0
-    except (KeyboardInterrupt, typer.Abort):
-        _complain("interrupted", kind="stopped")
-        return 130
-    except Interrupted as stop:
-        _complain(f"interrupted: {stop}", kind="stopped")
-        return 130
-    except BadInput as error:
-        _complain(str(error))
-        return 2
-    except _UsageError as error:
-        return _usage(error)
-    except ModuleNotFoundError as error:
-        if error.name not in _TRAIN_EXTRA:
-            return _unexpected(error)
-        cure = "pip install -c constraints.txt '.[train]' where bladewing's source lies"
-        _complain(f"{error.name} is not installed, this command needs it: {cure}")
-        return 2
-    except MemoryError:
-        _complain("more memory is needed than there is: give less at once (a shorter recording, fewer records)")
-        return 2
-    except OSError as error:
-        if error.errno not in _DISK_ERRORS:
-            return _unexpected(error)
-        name, cure = error.filename, "make room or give another place; what stood there is unchanged"
-        if not name and _output_is_full():
-            name, cure = "standard output", "what was to be printed is lost; files are written whole or not"
-        _complain(f"{f'{name}: ' if name else ''}{error.strerror}: {cure}")
-        return 2
-    except Exception as error:
-        return _unexpected(error)
-
-
-def _output_is_full() -> bool:
-    """Whether nothing more can be printed."""
-    try:
-        print(flush=True)
-    except OSError:
-        return True
-    return False
-
-
-def _usage(error: Exception) -> int:
-    message = getattr(error, "format_message", lambda: str(error))()
-    # typer takes numbers by pydantic, whose error knows the value
-    wrong: list[dict] = getattr(error.__cause__ or error.__context__, "errors", list)()
-    if wrong:
-        name = getattr(error, "param").opts[0]  # noqa: B009 - the class of the error has no public name
-        rule = _NUMBERS.get(wrong[0]["type"], wrong[0]["msg"].removeprefix("Input should "))
-        message = f"{name} is {wrong[0]['input']!r}: it must {rule}"
-    context = getattr(error, "ctx", None)
-    command = context.command_path if context is not None else "bladewing"
-    _complain(f"{' '.join(message.split())} (see {command} --help)")
-    return 2
-
-
-def _unexpected(error: Exception) -> int:
-    if os.environ.get(_TRACEBACK):
-        import traceback
-
-        traceback.print_exc()
-    _complain(f"unexpected {type(error).__name__}: {error} (set {_TRACEBACK}=1 to see where)")
-    return 1
-
-
-def _console() -> "Console":
-    """Where answers are printed: as wide as the terminal, and in a pipe or a file as wide as a line is."""
-    from rich.console import Console
-
-    columns = os.environ.get("COLUMNS", "")
-    unbounded = columns.strip("0") == "" if columns else not sys.stdout.isatty()  # no terminal has no columns
-    return Console(highlight=False, width=_LONGEST_LINE if unbounded else None)
-
-
-def _complain(message: str, kind: str = "error") -> None:
-    print(f"bladewing: {kind}: {one_line(message)}", file=sys.stderr, flush=True)
+    return exit_code(lambda: typer.main.get_command(app).main(arguments, prog_name="bladewing", standalone_mode=False))

@@ -1,28 +1,23 @@
-"""The work behind `bladewing measure`: recordings in, a table with error bars and one line of summary out."""
+"""The work behind `bladewing measure`: recordings in, the measurements of every dwell and of them together out."""
 
 import math
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
 from bladewing.features.measure import MOST_BLADES_GIVEN, beyond_radars, measure
 from bladewing.features.measurements import BODY, EACH_ROTOR, Measurements
-from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
-from bladewing.features.steady_comb import OVER_BODY
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
-from .errors import BadInput, one_line
+from .errors import BadInput
+from .measure_words import counted
 from .predict import checked_dwell_s, distinct
 from .progress import Progress
 from .recording import Recording, load_recording
-from .terminal import print_table
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 #: What a dwell's JSON object holds beside its times and the reason, in this order.
 VALUES = (
@@ -63,9 +58,6 @@ WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std", "acceleration_mps2", "acceleration
 
 #: No dwell knows the body better.
 LEAST_STD_MPS = 1e-6
-
-#: Where the middle half of so many combs and more reaches over this ratio, they are not the same in all dwells.
-LEAST_COMBS, UNSTEADY = 4, 1.25
 
 
 @dataclass(frozen=True)
@@ -208,116 +200,6 @@ class Measured:
         reason = f"no wingbeat: a rotor in {combs} of {len(self.iq)} dwells" if rotor else str(self.beat.reason) or None
         return beat | {"wingbeat_reason": reason}
 
-    def beat_sentence(self) -> str:
-        """Wingbeat and acceleration in one line; empty where there is no wingbeat."""
-        found = self.over_all()
-        if found.get("wingbeat_hz") is None:
-            return ""
-        beat = with_error(found["wingbeat_hz"], found["wingbeat_hz_std"])
-        pull = with_error(found["acceleration_mps2"], found["acceleration_mps2_std"])
-        return f"wingbeat {beat} Hz; body acceleration {pull} m/s^2"
-
-    def print(self, console: "Console") -> None:
-        """Write a table, one line a dwell, and the line of the recording."""
-        from rich.table import Table
-        from rich.text import Text
-
-        v = self.values
-        heads = ("start s", "body m/s", "chopping Hz", "rotors", "band Hz", "tip m/s")
-        table = Table(*heads, box=None, pad_edge=False)
-        for column in table.columns:
-            column.justify, column.no_wrap = "right", True
-        console.print(Text(one_line(self.recording.name), style="bold"), soft_wrap=True)
-        silent: dict[str, list[str]] = {}
-        for n in range(len(self.iq)):
-            reason = str(v.reason[n])
-            if reason:
-                silent.setdefault(reason.split(":")[0], []).append(reason)
-                continue
-            count = f"{v.rotor_count[n]:.0f}" if v.rotors_resolved[n] else f">={v.rotor_count[n]:.0f}"
-            table.add_row(
-                f"{self.start_s[n]:.3f}",
-                with_error(v.body_velocity_mps[n], v.body_velocity_mps_std[n]),
-                with_error(v.chopping_hz[n], v.chopping_hz_std[n]),
-                count,
-                with_error(v.bandwidth_hz[n], v.bandwidth_hz_std[n]),
-                with_error(v.tip_speed_mps[n], v.tip_speed_mps_std[n]),
-            )
-        if table.row_count:
-            print_table(console, table)
-        for short, reasons in silent.items():
-            detail = reasons[0][len(short) + 1 :].strip()
-            detail = detail and f"{': ' if len(set(reasons)) == 1 else ', e.g. '}{detail}"
-            console.print(Text(f"{counted(len(reasons))}: {short}{detail}"), soft_wrap=True)
-        for remark in self.remarks:
-            console.print(Text(remark), soft_wrap=True)
-        console.print(Text(self.sentence()), soft_wrap=True)
-        if beat := self.beat_sentence():
-            console.print(Text(beat), soft_wrap=True)
-
-    def sentence(self) -> str:
-        """The recording in one line: the answer an engineer wants."""
-        all_together = self.together()
-        velocity_mps, std_mps = (all_together[name] for name in BODY)
-        body = "" if velocity_mps is None else f"; body {signed(velocity_mps, std_mps)} m/s"
-        if not all_together["with_comb"]:
-            return f"no rotor in {counted(all_together['dwells'])}{body}"
-        clear = self.clearest()
-        v = self.values
-        rates = v.rotor_rates_hz[clear]
-        rates = rates[np.isfinite(rates)]
-        turns = v.chopping_hz[clear] / v.rotation_hz[clear]
-        bound = "at least " if v.length_is_lower_bound else ""
-        if np.isfinite(turns):
-            rpm = ", ".join(f"{60 * rate / turns:.0f}" for rate in rates)
-            error_cm = 100 * v.blade_length_m_std[clear]
-            blade = f", blade {bound}{with_error(100 * v.blade_length_m[clear], error_cm)} cm"
-            more = "" if v.rotors_resolved[clear] else " and perhaps more"
-            rotor = f"{turns:.0f}-blade rotors at {rpm} rpm{more}{'' if np.isnan(error_cm) else blade}"
-        else:
-            options = (
-                f"{c['blades']} x {c['rpm']:.0f} rpm"
-                + ("" if np.isnan(c["blade_length_m"]) else f" ({bound}{100 * c['blade_length_m']:.1f} cm)")
-                for c in v.alternatives((clear,))[:4]
-            )
-            rotor = "blades x rate: " + " or ".join(options)
-        where = f"comb in {all_together['with_comb']} of {counted(all_together['dwells'])}"
-        folded = str(v.band_reason[clear])
-        return f"{where}; {rotor}{body}{self.gear()}{self.wheel()}{self.unsteady()}{folded and '; ' + folded}"
-
-    def unsteady(self) -> str:
-        """Words of caution where the combs of the dwells are not one rotor's: most differ by more than it changes."""
-        chopping_hz = self.values.chopping_hz[np.isfinite(self.values.chopping_hz)]
-        low, high = np.quantile(chopping_hz, [0.25, 0.75])
-        if len(chopping_hz) < LEAST_COMBS or high < UNSTEADY * low:
-            return ""
-        return f"; the dwells do not agree: half of their combs lie within {low:.4g} to {high:.4g} Hz"
-
-    def wheel(self) -> str:
-        """Words of caution where the lines of most combs reach no further from the body than that moves; or ""."""
-        v = self.values
-        held = np.isfinite(v.chopping_hz)
-        edge_mps = v.bandwidth_hz[held] * SPEED_OF_LIGHT_MPS / self.recording.carrier_hz / 4
-        as_wheels = edge_mps <= OVER_BODY * np.abs(v.body_velocity_mps[held])
-        return "; as wheels would: the lines reach no further than the body moves" if as_wheels.mean() > 0.5 else ""
-
-    def gear(self) -> str:
-        """A helicopter's main and tail comb and their ratio in words, of the dwell with the smallest error; or ""."""
-        v = self.values
-        geared = np.isfinite(v.gear_ratio)
-        # a single dwell of many may be chance
-        if geared.sum() <= 0.5 * np.isfinite(v.chopping_hz).sum():
-            return ""
-        n = int(np.nanargmin(v.gear_ratio_std))
-        main, tail, ratio = (
-            with_error(getattr(v, name)[n], getattr(v, f"{name}_std")[n])
-            for name in ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
-        )
-        return (
-            f"; helicopter in {geared.sum()} of {len(geared)} dwells: chopping main {main} Hz, tail {tail} Hz, "
-            f"ratio {ratio} : 1 (the gear's where both have as many blades)"
-        )
-
     def clearest(self) -> int:
         """The dwell whose comb stands highest over the noise, of those as near to the median band as half of them are.
 
@@ -354,46 +236,6 @@ class Measured:
             write_whole(path, drawing)
         except OSError as error:
             raise BadInput(f"--plot {path}: {error.strerror or error}: name a file that can be written") from error
-
-
-def with_error(value: float, std: float) -> str:
-    """A value and its standard deviation, to the deviation's second digit.
-
-    Examples
-    --------
-    >>> with_error(116.6671, 0.0123)
-    '116.667 +- 0.012'
-    >>> with_error(7220.4, 61.2)
-    '7220 +- 61'
-    >>> with_error(6.1, 1e-7)
-    '6.10000 +- <0.00001'
-    """
-    if not (math.isfinite(value) and math.isfinite(std)):
-        return "-"
-    if std < 5e-6:
-        return f"{value:.5f} +- <0.00001"
-    digits = 0 if std >= 9.5 else min(5, 1 - math.floor(math.log10(std)))
-    return f"{value:.{digits}f} +- {std:.{digits}f}"
-
-
-def signed(velocity_mps: float, std_mps: float) -> str:
-    """A velocity with its sign and its standard deviation, to the hundredth where it is known to 1 m/s.
-
-    Examples
-    --------
-    >>> signed(-0.0001, 0.0002)
-    '+0.00 +- 0.01'
-    >>> signed(-98.5, 84.7)
-    '-98 +- 85'
-    """
-    if std_mps >= 1:
-        return with_error(velocity_mps, std_mps)
-    return f"{round(velocity_mps, 2) + 0.0:+.2f} +- {max(std_mps, 0.01):.2f}"  # not -0.00
-
-
-def counted(dwells: int) -> str:
-    """A number of dwells in words."""
-    return f"{dwells} dwell{'s' * (dwells != 1)}"
 
 
 def checked_plot(path: Path | None) -> None:

@@ -17,7 +17,7 @@ from bladewing.simulate.scene import Scene
 
 from .errors import BadInput
 from .files import result_folder, write_together
-from .measure import with_error
+from .measure_words import with_error
 from .table_measures import MEASURED_DB, SIMULATED_DB, Measured, measure, strongest_line_db, theory
 from .table_rotors import EXPLAINED, gear_rows, rotor_rows, velocity_rows
 

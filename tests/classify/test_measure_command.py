@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bladewing.classify.cli import main
-from bladewing.classify.measure import Measured, Settings, measured, with_error
+from bladewing.classify.measure import Measured, Settings, measured
+from bladewing.classify.measure_words import with_error
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 
 CARRIER_HZ, PRF_HZ, PULSES = 9.85e9, 35e3, 3000

@@ -1,0 +1,116 @@
+"""How a command ends. Exit codes: 0 done, 1 unexpected, 2 bad input, 130 interrupted; errors are one line on stderr."""
+
+import errno
+import io
+import os
+import sys
+from collections.abc import Callable
+from typing import cast
+
+import typer
+
+from .errors import BadInput, Interrupted, one_line
+
+# The parent of all usage errors has no public name that old and new versions of typer share.
+_UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])
+
+# As modules, or as the packages that hold them: an account of a training asks for their versions.
+_TRAIN_EXTRA = {"torch", "sklearn", "scikit-learn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2", "mpmath"}
+# A disk that is full, read-only or out of bounds is the user's to mend.
+_DISK_ERRORS = {
+    errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EFBIG, errno.ENOTDIR, errno.EISDIR,
+    errno.EEXIST, errno.ENAMETOOLONG, errno.ENOENT,
+}  # fmt: skip
+_TRACEBACK = "BLADEWING_TRACEBACK"
+_NUMBERS = {"int_parsing": "be a whole number", "float_parsing": "be a number"}
+
+
+def mend_streams() -> None:
+    """Make sure that what is printed goes somewhere, whatever characters it holds."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by whoever calls: nobody reads them
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
+        elif isinstance(getattr(sys, name), io.TextIOWrapper):  # a name its encoding cannot hold is shown escaped
+            getattr(sys, name).reconfigure(errors="backslashreplace")
+
+
+def exit_code(command: Callable[[], object]) -> int:
+    """Run a command; what goes wrong becomes one line on stderr and the exit code that stands for it.
+
+    Parameters
+    ----------
+    command
+        Answers the code it ends with, 0 where that is no number.
+    """
+    try:
+        code = command()
+        if code == 130:  # how typer tells of an interrupt
+            raise KeyboardInterrupt
+        return code if isinstance(code, int) else 0
+    except (KeyboardInterrupt, typer.Abort):
+        complain("interrupted", kind="stopped")
+        return 130
+    except Interrupted as stop:
+        complain(f"interrupted: {stop}", kind="stopped")
+        return 130
+    except BadInput as error:
+        complain(str(error))
+        return 2
+    except _UsageError as error:
+        return _usage(error)
+    except ModuleNotFoundError as error:
+        if error.name not in _TRAIN_EXTRA:
+            return _unexpected(error)
+        cure = "pip install -c constraints.txt '.[train]' where bladewing's source lies"
+        complain(f"{error.name} is not installed, this command needs it: {cure}")
+        return 2
+    except MemoryError:
+        complain("more memory is needed than there is: give less at once (a shorter recording, fewer records)")
+        return 2
+    except OSError as error:
+        if error.errno not in _DISK_ERRORS:
+            return _unexpected(error)
+        name, cure = error.filename, "make room or give another place; what stood there is unchanged"
+        if not name and _output_is_full():
+            name, cure = "standard output", "what was to be printed is lost; files are written whole or not"
+        complain(f"{f'{name}: ' if name else ''}{error.strerror}: {cure}")
+        return 2
+    except Exception as error:
+        return _unexpected(error)
+
+
+def complain(message: str, kind: str = "error") -> None:
+    """Say in one line on stderr what is wrong."""
+    print(f"bladewing: {kind}: {one_line(message)}", file=sys.stderr, flush=True)
+
+
+def _output_is_full() -> bool:
+    """Whether nothing more can be printed."""
+    try:
+        print(flush=True)
+    except OSError:
+        return True
+    return False
+
+
+def _usage(error: Exception) -> int:
+    message = getattr(error, "format_message", lambda: str(error))()
+    # typer takes numbers by pydantic, whose error knows the value
+    wrong: list[dict] = getattr(error.__cause__ or error.__context__, "errors", list)()
+    if wrong:
+        name = getattr(error, "param").opts[0]  # noqa: B009 - the class of the error has no public name
+        rule = _NUMBERS.get(wrong[0]["type"], wrong[0]["msg"].removeprefix("Input should "))
+        message = f"{name} is {wrong[0]['input']!r}: it must {rule}"
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context is not None else "bladewing"
+    complain(f"{' '.join(message.split())} (see {command} --help)")
+    return 2
+
+
+def _unexpected(error: Exception) -> int:
+    if os.environ.get(_TRACEBACK):
+        import traceback
+
+        traceback.print_exc()
+    complain(f"unexpected {type(error).__name__}: {error} (set {_TRACEBACK}=1 to see where)")
+    return 1
