@@ -11,7 +11,7 @@ from .chopping import CHOPPING_RANGE_HZ
 from .comb_centre import centred
 from .comb_fit import CombFit, fit_combs
 from .comb_search import FINE_STEPS, MIN_SPACING_BINS, SEARCHED_RATIO, best_candidate, heights, spacing_limits
-from .lines import LineSpace
+from .lines import LineSpace, squared
 from .periodogram import Periodogram
 
 #: Score that chance alone exceeds in under 1 % of the records: of white noise; where a line was taken out; where the
@@ -59,7 +59,7 @@ USUAL_HZ, USUAL_FRACTIONS, USUAL_SHARE = 60.0, (2, 3, 4, 5, 6, 7, 8), 0.85
 
 #: A comb is no rotor's where lines so many times as dense, slower than rotors chop, speak for so many times as much:
 #: a full-size helicopter's for twice as much, noise between a rotor's lines for less than those alone.
-SLOWER_FRACTIONS, SLOWER_SHARE = (2, 3, 4), 1.3
+SLOWER_FRACTIONS, SLOWER_SHARE, SLOWER_BINS = (2, 3, 4), 1.3, 1.5
 
 
 @dataclass(frozen=True)
@@ -142,6 +142,12 @@ def strong_multiple(
     return best
 
 
+def powers_over_noise(data: Periodogram, fit: CombFit, rest: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Power of each line of a comb over the noise [1], as they are beside what combs leave of the record."""
+    seen = fit.amplitudes + LineSpace(rest).at(fit.frequencies)[0]
+    return squared(seen) * data.pulses / data.level_of(rest)(fit.frequencies)
+
+
 def two_means_nats(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     """Log likelihood ratio of two means of exponentials against one, of powers of two kinds of lines."""
     means = (max(float(each.mean()), 1e-9) for each in (np.concatenate([one, other]), one, other))
@@ -209,7 +215,7 @@ def slower_spacing(data: Periodogram, fit: CombFit) -> float | None:
         As in `finer_spacing`.
     """
     spacings = fit.spacing / np.array([1, *SLOWER_FRACTIONS])
-    slower = (spacings * data.prf_hz < CHOPPING_RANGE_HZ[0]) & (spacings * data.pulses >= MIN_SPACING_BINS)
+    slower = (spacings * data.prf_hz < CHOPPING_RANGE_HZ[0]) & (spacings * data.pulses >= SLOWER_BINS)
     if not slower[1:].any() or fit.is_folded:  # what comes back from the other end of the span lies between as well
         return None
     slower[0] = True
@@ -286,8 +292,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
             f"no rotor: lines every {slower * data.prf_hz:.1f} Hz, "
             f"rotors chop at {CHOPPING_RANGE_HZ[0]:.0f} Hz and more"
         )
-    seen = fit.amplitudes + LineSpace(fitted[1]).at(fit.frequencies)[0]
-    power = np.abs(seen) ** 2 * data.pulses / data.level_of(fitted[1])(fit.frequencies)
+    power = powers_over_noise(data, fit, fitted[1])
     within = (fit.orders >= start.low) & (fit.orders <= start.high)
     per_turn = strong_multiple(fit.orders[within], power[within], blade_numbers(blades))
     for number in sorted({1, per_turn}):

@@ -38,6 +38,9 @@ LEAST_FLASHES, MANY_ORDERS = 5.5, 60
 #: A comb whose spacing is off by more than this, relative, from any multiple of another's is no part of that.
 FAR_OFF = 0.003
 
+#: Lines that reach so far from a body, in shares of its own speed, are a wheel's: spokes end a little within the rim.
+WHEEL = (0.8, 1.15)
+
 
 @dataclass(frozen=True)
 class Family:
@@ -93,6 +96,18 @@ def slower_than_rotors(data: Periodogram, edge: float, edge_std: float) -> str:
     edge_mps, edge_std_mps = (value * data.prf_hz * data.wavelength_m / 2 for value in (edge, edge_std))
     if edge_mps + edge_std_mps < LEAST_REACH_MPS:
         return f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
+    return ""
+
+
+def as_wheels(data: Periodogram, edge: float, velocity_mps: float) -> str:
+    """Why a line family of this edge [cycles a sample] about a body is a wheel's; empty where it may be a rotor's.
+
+    Seen from the body a wheel's rim is as fast as the body. A rotor's tips are 2.5 times as fast as it flies and more;
+    only of a propeller that flies at the radar, within a narrow range of angles, they seem to be as fast.
+    """
+    edge_mps = edge * data.prf_hz * data.wavelength_m / 2
+    if WHEEL[0] * abs(velocity_mps) < edge_mps < WHEEL[1] * abs(velocity_mps):
+        return f"no rotor: lines as wheels have: they end {edge_mps:.1f} m/s from a body at {velocity_mps:.1f} m/s"
     return ""
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .comb import Comb
+from .comb import Comb, powers_over_noise, strong_multiple
 from .comb_fit import MARGIN_ORDERS, CombFit, fit_combs
 from .comb_search import FINE_STEPS, Candidate, heights, score, spacing_limits
 from .comb_sums import running_sums
@@ -45,6 +45,10 @@ MEETING_BINS = 1.5
 #: Tips of main and tail rotor are about as fast: lines of either reach no further than so many times the other's edge.
 FURTHEST_TIP = 2.0
 
+#: By so much in power are lines of the second comb stronger that alone are its chopping frequency apart. Points at the
+#: tips of three blades make every second line five times stronger.
+UNLIKE_FACTOR = 7.0
+
 #: Candidates looked at closely.
 CLOSER = 4
 
@@ -63,17 +67,22 @@ class Gear:
         The other one.
     alone : Periodogram
         The record without the second comb.
+    per_turn : int
+        Every how many-th line of the other one is strong and tells its chopping frequency: unlike blades have lines at
+        every multiple of their rotation rate, and what else the first comb leaves may lie at a fraction of both.
     """
 
     first: Comb
     second: CombFit
     alone: Periodogram
+    per_turn: int = 1
 
     @property
     def rates(self) -> NDArray[np.float64]:
         """Chopping frequency of main and tail rotor and their standard deviations, shape (2, 2) [cycles a sample]."""
         one = (self.first.chopping, self.first.chopping_std)
-        return np.array(sorted((one, (self.second.spacing, self.second.spacing_std))))
+        other = (self.second.spacing * self.per_turn, self.second.spacing_std * self.per_turn)
+        return np.array(sorted((one, other)))
 
     @property
     def ratio(self) -> float:
@@ -154,7 +163,16 @@ def _second_comb(data: Periodogram, comb: Comb, furthest: float) -> tuple[Gear |
     outer = max(-best.low, best.high) * best.spacing
     if off * outer / tail * data.pulses < MEETING_BINS:
         return None, f"no second comb: {gear.ratio:.3f} to 1 is a whole ratio, as of unequal blades"
-    return gear, ""
+    return replace(gear, per_turn=_lines_per_turn(second.orders, powers_over_noise(data, second, samples))), ""
+
+
+def _lines_per_turn(orders: NDArray[np.intp], power: NDArray[np.float64]) -> int:
+    """Every how many-th line is strong: of four blades alike in pairs every second, then every second of those."""
+    more = strong_multiple(orders, power, range(2, MOST_GEAR + 1), UNLIKE_FACTOR)
+    if more == 1:
+        return 1
+    strong = orders % more == 0
+    return more * _lines_per_turn(orders[strong] // more, power[strong])
 
 
 def _left_over(data: Periodogram, comb: Comb) -> tuple[Periodogram, NDArray[np.bool_]]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .bandwidth import threshold_band_hz
 from .body_velocity import body_velocity, folded
 from .chopping import Chopping
-from .family import Family, find_family, slower_than_rotors, too_few_flashes
+from .family import Family, as_wheels, find_family, slower_than_rotors, too_few_flashes
 from .family_edge import SPAN, edge_around, edge_of_lines, span_of, surer_edge
 from .folding import FASTEST_TIP_MPS, fastest_tip
 from .measurements import BODY, EACH_ROTOR, Measurements
@@ -74,14 +74,16 @@ def measure_record(
         why = slower_than_rotors(family.data, *edge) or too_few_flashes(family)
     if family is None or why:
         return out | {"reason": why} | _named(BODY, body_velocity(data, spectrum, None))
-    out["reason"] = why
     if data.one_channel:  # about a body whose sides lie in one another nothing is even: its own line tells
         velocity = body_velocity(data, spectrum, None, blades=True)
     else:
         middle = family.rotors.fits[0] if len(family.rotors.rates) > 1 else family.comb.fit
         steady, open_std = family.rotors.resolved, family.comb.body_std
         velocity = body_velocity(family.data, spectrum, middle, steady=steady, open_std=open_std)
-    out |= _named(BODY, velocity) | _turning(family) | _geared(family)
+    out |= {"reason": as_wheels(family.data, edge[0], velocity[0])} | _named(BODY, velocity)
+    if out["reason"]:
+        return out
+    out |= _turning(family) | _geared(family)
     out |= _band(family, edge, beta_rad)
     out |= _blade(family, out, blades)
     return out | {"smearing_index": _index(family, spectrum, body, mask, out["chopping_hz"])}

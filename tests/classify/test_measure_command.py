@@ -270,14 +270,19 @@ def test_a_comb_that_ends_where_the_body_s_speed_does_is_called_a_wheel_s(tmp_pa
     times_s, wavelength_m = np.arange(PULSES) / PRF_HZ, 299_792_458.0 / CARRIER_HZ
     orders, rate_hz = np.arange(-16, 17), 80.0
     iq = np.exp(2j * np.pi * (orders * rate_hz * times_s[:, None] + rng.random(33))).sum(axis=1) / np.sqrt(33) + 4.0
-    for speed_mps, wheel in ((16 * rate_hz * wavelength_m / 2, True), (5.0, False)):
+    edge_mps = 16 * rate_hz * wavelength_m / 2
+    said = {}
+    for speed_mps in (edge_mps, 2 * edge_mps, 5.0):
         moved = iq * np.exp(-4j * np.pi * speed_mps * times_s / wavelength_m)
         noise = 0.1 * (rng.standard_normal(PULSES) + 1j * rng.standard_normal(PULSES))
         np.save(tmp_path / "comb.npy", (moved + noise).astype(np.complex64))
         assert main(["measure", str(tmp_path / "comb.npy"), *RADAR]) == 0
-        said = capsys.readouterr().out
-        assert "comb in 1 of 1 dwell; " in said
-        assert ("as wheels would" in said) == wheel
+        said[speed_mps] = capsys.readouterr().out
+    assert f"m/s from a body at {edge_mps:.1f} m/s" in said[edge_mps]
+    assert f"no rotor in 1 dwell; body +{edge_mps:.2f}" in said[edge_mps]
+    for speed_mps, within in ((2 * edge_mps, True), (5.0, False)):
+        assert "comb in 1 of 1 dwell; " in said[speed_mps]
+        assert ("the lines reach no further than the body moves" in said[speed_mps]) == within
 
 
 def test_a_value_is_written_to_the_second_digit_of_its_error():

@@ -122,6 +122,27 @@ def test_what_is_no_second_comb_has_a_reason_and_no_number(iq):
         assert np.isnan(getattr(found, f"{name}_std"))
 
 
+@pytest.mark.parametrize(("blades", "gear"), [(2, 5.7), (3, 5.43), (4, 5.39)])
+def test_tail_blades_that_are_not_quite_alike_chop_by_their_number(blades, gear):
+    """Their lines are at every multiple of the rotation rate, and what was told of the tail was a fraction, surely."""
+    main_hz, wavelength_m, told = 38.3, 299_792_458.0 / CARRIER_HZ, 0
+    times_s = np.arange(PULSES) / PRF_HZ
+    body = np.exp(-4j * np.pi * 6.0 * times_s / wavelength_m)
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        unlike = 1 + 0.15 * rng.standard_normal(blades)
+        angle = RotorMotion(main_hz * gear, rng.uniform(0, 6)).angle_rad(times_s)
+        tail = body * rotor_echo(angle, wavelength_m=wavelength_m, blade_length_m=0.07, blade_amplitudes=unlike)
+        main = rotors([main_hz], length_m=0.4, velocity_mps=6.0, body=10.0)
+        iq = 5 * (main + 0.5 * tail / np.sqrt(np.mean(np.abs(tail) ** 2))) + white(rng, PULSES)
+        found = measure(iq, **RADAR)
+        if np.isfinite(found.gear_ratio):
+            told += 1
+            truth = (2 * main_hz, blades * gear * main_hz, gear * blades / 2)
+            np.testing.assert_allclose(values(found), truth, rtol=1e-3)
+    assert told >= 2  # of four: else the weak lines are too few, and the fraction is no answer
+
+
 def test_the_reasons_of_no_comb_and_of_a_short_dwell():
     noise = white(np.random.default_rng(2), PULSES)
     assert measure(noise, **RADAR).gear_reason == "no comb"
@@ -171,14 +192,14 @@ def test_the_tail_does_not_move_the_tip_of_the_main_rotor(snr_db, tail_db, tail_
         assert abs(off) < 4 * found.tip_speed_mps_std
 
 
-@pytest.mark.parametrize("rotation_hz", [5.7, 6.6, 8.1])
-def test_a_helicopter_slower_than_rotors_chop_is_told_to_be(rotation_hz):
-    """Two blades of 5 m: every second line was given, surely."""
+@pytest.mark.parametrize(("rotation_hz", "pulses"), [(5.7, 8000), (6.6, 8000), (8.1, 8000), (6.2, 2400), (8.9, 2400)])
+def test_a_helicopter_slower_than_rotors_chop_is_told_to_be(rotation_hz, pulses):
+    """Two blades of 5 m: every second line was given, surely, in dwells that hardly part all of them as well."""
     rng = np.random.default_rng(int(10 * rotation_hz))
     radar = {"carrier_hz": 3.3e9, "prf_hz": 15e3}
-    times_s = np.arange(8000) / radar["prf_hz"]
+    times_s = np.arange(pulses) / radar["prf_hz"]
     echo = rotor_echo(RotorMotion(rotation_hz, 1.0).angle_rad(times_s), wavelength_m=0.0908, blade_length_m=5.0)
-    iq = 4 * echo / np.sqrt(np.mean(np.abs(echo) ** 2)) + 10 + white(rng, 8000)
+    iq = 4 * echo / np.sqrt(np.mean(np.abs(echo) ** 2)) + 10 + white(rng, pulses)
     found = measure(iq.astype(np.complex64), **radar)
     assert np.isnan(found.chopping_hz)
     assert f"lines every {2 * rotation_hz:.1f} Hz, rotors chop at 18 Hz and more" in str(found.reason)

@@ -126,6 +126,15 @@ def test_where_there_is_no_comb_there_is_a_reason_and_no_number(iq):
     assert found.alternatives() == []
 
 
+@pytest.mark.parametrize(("share", "wheel"), [(0.7, False), (0.95, True), (1.0, True), (1.3, False)])
+def test_lines_that_end_as_far_from_the_body_as_that_is_fast_are_a_wheel_s(share, wheel):
+    for velocity_mps in (18.0, -29.0):
+        length_m = share * abs(velocity_mps) / (2 * np.pi * 25.0)
+        found = measure(drone([25.0], snr_db=15.0, velocity_mps=velocity_mps, length_m=length_m, body=10.0), **RADAR)
+        assert ("as wheels have" in str(found.reason)) == np.isnan(found.chopping_hz) == wheel
+        assert abs(found.body_velocity_mps - velocity_mps) < 0.1
+
+
 @pytest.mark.parametrize(("chopping_hz", "mains"), [(149.3, False), (149.8, True), (150.3, True), (150.9, False)])
 def test_a_loud_rotor_a_little_off_the_mains_is_one(chopping_hz, mains):
     # a body whose lines would all lie on multiples of 50 Hz
