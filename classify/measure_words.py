@@ -121,7 +121,7 @@ def _gear(found: "Measured") -> str:
         for name in ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
     )
     return (
-        f"; helicopter in {geared.sum()} of {len(geared)} dwells: chopping main {main} Hz, tail {tail} Hz, "
+        f"; helicopter in {geared.sum()} of {counted(len(geared))}: chopping main {main} Hz, tail {tail} Hz, "
         f"ratio {ratio} : 1 (the gear's where both have as many blades)"
     )
 

@@ -179,7 +179,7 @@ def test_a_helicopter_shows_both_combs_in_words_json_and_plot(tmp_path, capsys):
     recording, plot = str(tmp_path / "heli.sigmf-meta"), tmp_path / "heli.svg"
     capsys.readouterr()
     assert main(["measure", recording, "--plot", str(plot)]) == 0
-    assert "helicopter in 1 of 1 dwells: chopping main 82.000" in capsys.readouterr().out
+    assert "helicopter in 1 of 1 dwell: chopping main 82.000" in capsys.readouterr().out
     assert main(["measure", recording, "--json"]) == 0
     dwell, closing = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert dwell["gear_ratio"] == pytest.approx(4.73, abs=6 * dwell["gear_ratio_std"])
