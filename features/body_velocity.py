@@ -82,8 +82,7 @@ def body_velocity(
         if offset * data.pulses > 1.0:
             # no background lies beside rest: a line there is as likely a slow body's
             slow = AT_REST_BINS < abs(own) * data.pulses <= data.rest_half * data.pulses
-            is_open = slow or not (steady or abs(own) <= data.rest_half or _has_line(data, fit.centre))
-            turns, std = fit.centre, float(np.hypot(fit.centre_std, offset * is_open))
+            turns, std = fit.centre, float(np.hypot(fit.centre_std, offset * slow))
         elif steady and fit.centre_std < std:
             turns, std = fit.centre, float(np.hypot(fit.centre_std, apart))
     scale = data.prf_hz * data.wavelength_m / 2
@@ -102,11 +101,6 @@ def _likeliest(data: Periodogram, spectrum: Spectrum, blades: bool) -> tuple[flo
     rest = data.rest_half if moving else 0.0
     at_rest = [place for place, other_db in lines if abs(place) < rest and other_db < level_db + WEAKEST_DB]
     return own, level_db, _rivals_std(spectrum, own, rest, at_rest)
-
-
-def _has_line(data: Periodogram, place: float) -> bool:
-    """True where one of the strong lines is at a place; of rotors not told apart it may not be the body's without."""
-    return any(abs(folded(line - place)) * data.pulses < 1.0 for line in data.centres)
 
 
 def folded(turns: float) -> float:

@@ -84,7 +84,7 @@ def measure_record(
     if out["reason"]:
         return out
     out |= _turning(family) | _geared(family)
-    out |= _band(family, edge, velocity[1], beta_rad)
+    out |= _band(family, edge, beta_rad)
     out |= _blade(family, out, blades)
     return out | {"smearing_index": _index(family, spectrum, body, mask, out["chopping_hz"])}
 
@@ -148,7 +148,7 @@ def _geared(family: Family) -> dict[str, Any]:
     }
 
 
-def _band(family: Family, edge: tuple[float, float], body_std_mps: float, beta_rad: float | None) -> dict[str, Any]:
+def _band(family: Family, edge: tuple[float, float], beta_rad: float | None) -> dict[str, Any]:
     """Doppler bandwidth and tip speed, or why there is none.
 
     Parameters
@@ -157,8 +157,6 @@ def _band(family: Family, edge: tuple[float, float], body_std_mps: float, beta_r
         What the lines come to.
     edge : (float, float)
         From `_edge`.
-    body_std_mps
-        Deviation of the body's velocity [m/s].
     beta_rad
         As in `measure`.
     """
@@ -177,8 +175,7 @@ def _band(family: Family, edge: tuple[float, float], body_std_mps: float, beta_r
     if why:
         away = std = np.nan
     # counted from a line beside the body's, the family is so much the wider on one side
-    open_std = family.comb.body_std if family.is_told_apart else max(family.comb.body_std, body_std_mps / mps)
-    std = float(np.hypot(std, open_std))
+    std = float(np.hypot(std, family.comb.body_std))
     cosine = 1.0 if beta_rad is None else float(np.cos(beta_rad))
     tip, tip_std = away * mps / cosine, std * mps / cosine
     if tip - EDGE_DEVIATIONS * tip_std > FASTEST_TIP_MPS:
