@@ -85,8 +85,7 @@ def body_velocity(
             turns, std = fit.centre, float(np.hypot(fit.centre_std, offset * slow))
         elif steady and fit.centre_std < std:
             turns, std = fit.centre, float(np.hypot(fit.centre_std, apart))
-    scale = data.prf_hz * data.wavelength_m / 2
-    return -folded(turns) * scale, float(np.hypot(std, open_std)) * scale
+    return -folded(turns) * data.span_mps, float(np.hypot(std, open_std)) * data.span_mps
 
 
 def _likeliest(data: Periodogram, spectrum: Spectrum, blades: bool) -> tuple[float, float, float]:

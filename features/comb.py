@@ -58,7 +58,8 @@ FRACTIONS, FRACTION_SHARE = (2, 3), 0.9
 USUAL_HZ, USUAL_FRACTIONS, USUAL_SHARE = 60.0, (2, 3, 4, 5, 6, 7, 8), 0.85
 
 #: A comb is no rotor's where lines so many times as dense, slower than rotors chop, speak for so many times as much:
-#: a full-size helicopter's for twice as much, noise between a rotor's lines for less than those alone.
+#: a full-size helicopter's for twice as much, noise between a rotor's lines for less than those alone. Asked where they
+#: are so many bins apart and more: fewer than a search takes, but these are about one that it found.
 SLOWER_FRACTIONS, SLOWER_SHARE, SLOWER_BINS = (2, 3, 4), 1.3, 1.5
 
 
@@ -276,7 +277,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
         return None, f"no comb: fewer than {LEAST_LINES} lines"
     fit = fitted[0][0]
-    reach_mps = max(start.high, -start.low) * fit.spacing * data.prf_hz * data.wavelength_m / 2
+    reach_mps = max(start.high, -start.low) * fit.spacing * data.span_mps
     if reach_mps < LEAST_REACH_MPS:
         return None, f"no rotor: lines reach {reach_mps:.1f} m/s, rotors {LEAST_REACH_MPS:.0f} m/s and more"
     finer = finer_spacing(data, fit)

@@ -17,6 +17,7 @@ from .lines import squared
 from .periodogram import Level, Periodogram, prepared
 from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
 from .spectrum import Spectrum
+from .steady_comb import OVER_BODY
 from .turning import DEGREES, bend, is_sure
 from .unresolved import judged, not_all
 from .weak_lines import by_rotation, without_weak_lines
@@ -39,7 +40,7 @@ LEAST_FLASHES, MANY_ORDERS = 5.5, 60
 FAR_OFF = 0.003
 
 #: Lines that reach so far from a body, in shares of its own speed, are a wheel's: spokes end a little within the rim.
-WHEEL = (0.8, 1.15)
+WHEEL = (0.8, OVER_BODY)
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ class Family:
 
 def slower_than_rotors(data: Periodogram, edge: float, edge_std: float) -> str:
     """Why a line family of this edge [cycles a sample] is no rotor's; empty where it may be one's."""
-    edge_mps, edge_std_mps = (value * data.prf_hz * data.wavelength_m / 2 for value in (edge, edge_std))
+    edge_mps, edge_std_mps = (value * data.span_mps for value in (edge, edge_std))
     if edge_mps + edge_std_mps < LEAST_REACH_MPS:
         return f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
     return ""
@@ -105,7 +106,7 @@ def as_wheels(data: Periodogram, edge: float, velocity_mps: float) -> str:
     Seen from the body a wheel's rim is as fast as the body. A rotor's tips are 2.5 times as fast as it flies and more;
     only of a propeller that flies at the radar, within a narrow range of angles, they seem to be as fast.
     """
-    edge_mps = edge * data.prf_hz * data.wavelength_m / 2
+    edge_mps = edge * data.span_mps
     if WHEEL[0] * abs(velocity_mps) < edge_mps < WHEEL[1] * abs(velocity_mps):
         return f"no rotor: lines as wheels have: they end {edge_mps:.1f} m/s from a body at {velocity_mps:.1f} m/s"
     return ""

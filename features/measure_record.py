@@ -161,7 +161,7 @@ def _band(family: Family, edge: tuple[float, float], beta_rad: float | None) -> 
         As in `measure`.
     """
     data, (away, std), span = family.data, edge, span_of(family.data, family.rotors.fits)
-    mps = data.prf_hz * data.wavelength_m / 2  # [m/s] for a cycle a sample
+    mps = data.span_mps
     furthest, why = FURTHEST_EDGE * span / SPAN, ""
     not_told = family.comb.fit.is_folded and not family.is_told_apart
     if data.one_channel:
@@ -216,7 +216,7 @@ def _index(family: Family, spectrum: Spectrum, body: Body, mask: NDArray[np.bool
     told = float(rates.std() / rates.mean()) if family.rotors.resolved else 0.0
     if told > WIDEST_INDEX:
         return told
-    centre_mps = np.float32(-folded(family.comb.fit.centre) * data.prf_hz * data.wavelength_m / 2)
+    centre_mps = np.float32(-folded(family.comb.fit.centre) * data.span_mps)
     energy = np.where(spectrum.level_db > 6.0, residual(spectrum, mask), np.float32(0))
     nothing = np.asarray(np.float32(np.nan))
     chopping = Chopping(np.asarray(np.float32(chopping_hz)), nothing, nothing)

@@ -120,6 +120,11 @@ class Periodogram:
         """Pulses of the record."""
         return len(self.samples)
 
+    @property
+    def span_mps(self) -> float:
+        """The unambiguous span: what a cycle a sample is as a velocity [m/s]."""
+        return self.prf_hz * self.wavelength_m / 2
+
     @cached_property
     def lines(self) -> LineSpace:
         """The samples, to be read at any frequency."""
