@@ -206,11 +206,12 @@ def _fills_span(
         From `span_of`.
     """
     outer = (away > SPAN_OUTER * span) | (away == away[-1])
-    excess, number = total - noise, bins[outer].sum()
-    deviation = float(np.sqrt((noise[outer] ** 2 / bins[outer]).sum()))
-    stands = float(excess[outer].sum()) > SPAN_DEVIATIONS * deviation
-    mean = float(excess.sum() / bins.sum())
-    return bool(away[-1] > span / 2 and stands and excess[outer].sum() / number > SPAN_SHARE * mean)
+    excess, about = total - noise, float(noise[outer].sum())
+    # a sum of so few exponentials is often far above its mean: Wilson and Hilferty's cube root is nearly normal
+    number = about**2 / float((noise[outer] ** 2 / bins[outer]).sum())
+    deviations = 3 * np.sqrt(number) * (np.cbrt(total[outer].sum() / about) - 1 + 1 / (9 * number))
+    mean, outer_mean = float(excess.sum() / bins.sum()), float(excess[outer].sum() / bins[outer].sum())
+    return bool(away[-1] > span / 2 and deviations > SPAN_DEVIATIONS and outer_mean > SPAN_SHARE * mean)
 
 
 def _amplitudes_at(fit: CombFit, orders: NDArray[np.intp]) -> NDArray[np.complex128]:

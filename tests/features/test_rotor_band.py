@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
+from bladewing.features.family_edge import SPAN, _fills_span
 from bladewing.features.line_likelihood import solved
 from bladewing.features.line_shapes import ROOTS, line_powers, spread_powers
 from bladewing.features.rotor_band import fit_edge
@@ -298,3 +299,16 @@ def test_a_point_at_the_tip_of_even_blades_shows_in_the_deviation():
         errors.append((found.tip_speed_mps - tip_mps) / found.tip_speed_mps_std)
     assert np.median(np.abs(off)) < 0.025
     assert np.sqrt(np.nanmean(np.square(errors))) < 3.0  # it was 5
+
+
+def test_noise_at_the_end_of_the_span_is_no_family_that_fills_it():
+    rng, draws = np.random.default_rng(4), 40_000
+    away, noise = SPAN * ORDER / len(ORDER), np.full(len(ORDER), 2.0)
+    level = np.where(ORDER <= 31, 16.0, 0.0)
+    total = rng.gamma(2.0, 1 + level, (draws, len(ORDER)))
+    filled = sum(_fills_span(away, one, noise, SIDES, SPAN) for one in total)
+    assert filled <= 5  # a normal law of the sums has sixteen
+    # and what reaches it is seen where it is weak: twice the noise
+    total += rng.gamma(2.0, 2.0, total.shape)
+    filled = sum(_fills_span(away, one, noise, SIDES, SPAN) for one in total[:1000])
+    assert filled > 900
