@@ -15,6 +15,13 @@ def _libraries() -> Any:
     return ThreadpoolController()
 
 
+def _give_up() -> None:
+    """Let any thread set the limit: by itself threadpoolctl hears the one alone that set the first."""
+    from threadpoolctl import OpenBLASController
+
+    OpenBLASController.clear_controlling_thread(force=True)
+
+
 class _OneThread:
     """Holds while anyone is inside: the first sets the limit, the last takes it away, in whichever order they leave."""
 
@@ -24,7 +31,9 @@ class _OneThread:
     def __enter__(self) -> None:
         with self._lock:
             if not self._inside:
-                self._limit = _libraries().limit(limits=1, user_api="blas")
+                libraries = _libraries()
+                _give_up()
+                self._limit = libraries.limit(limits=1, user_api="blas")
             self._inside += 1
 
     def __exit__(
@@ -33,7 +42,9 @@ class _OneThread:
         with self._lock:
             self._inside -= 1
             if not self._inside:
+                _give_up()
                 self._limit.restore_original_limits()  # type: ignore[attr-defined]
+                _give_up()
 
 
 #: Hold NumPy's and scipy's linear algebra to one thread within a `with`, for the whole process. With as many threads as

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from .blades import TILE_SAMPLES, Array32, Blades, Room
 from .grid import PhaseLaw, PulseGrid, Sine
 from .radar import Radar
-from .rotor import MOST_FLOAT32_POINTS, RotorMotion
+from .rotor import LARGEST_GAMMA, MOST_FLOAT32_POINTS, RotorMotion, needs_float64
 
 
 @dataclass(frozen=True)
@@ -79,11 +79,17 @@ def rotors_echo(
     Raises
     ------
     ValueError
-        If a blade is a row of more points than float32 can tell apart.
+        If a blade is a row of more points than float32 can tell apart, or too many wavelengths long for it.
     """
     most = max((rotor.points or 0 for rotor in rotors), default=0)
     if most > MOST_FLOAT32_POINTS:
         raise ValueError(f"points is {most}: it must be at most {MOST_FLOAT32_POINTS}: more take `rotor_echo`")
+    for number, rotor in enumerate(rotors):
+        if needs_float64(radar.wavelength_m, rotor.blade_length_m, rotor.beta_rad).any():
+            raise ValueError(
+                f"rotors[{number}].blade_length_m is {rotor.blade_length_m}: 4 pi length cos(beta) / wavelength must be "
+                f"at most {LARGEST_GAMMA:g}: longer blades take `rotor_echo`"
+            )
     shake = (vibration_rad, vibration_hz, vibration_phase_rad)
     grid, path = PulseGrid(radar), _path(radar, velocity_mps, acceleration_mps2, records, shake)
     turning = _turning([rotor.motion for rotor in rotors], records)

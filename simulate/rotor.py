@@ -134,23 +134,35 @@ def rotor_echo(
     )
     blades = Blades.of(lead, wavelength_m, blade_length_m, beta_rad, root_m, blade_amplitudes, edge_asymmetry, points)
     pulses = angle.shape[-1]
-    reach_m = np.max(np.asarray(blade_length_m) * np.abs(np.cos(beta_rad)), initial=0)
-    if 2 * TWO_PI / wavelength_m * reach_m > LARGEST_GAMMA or (points or 0) > MOST_FLOAT32_POINTS:
-        shapes = np.atleast_1d(blade_length_m), np.atleast_1d(beta_rad), np.atleast_1d(root_m)
-        echo = _double_echo(angle, wavelength_m, *shapes, blade_amplitudes, edge_asymmetry, points)
-        return echo.reshape(*lead, pulses)
     angle = np.broadcast_to(angle, (*lead, pulses)).reshape(-1, pulses)
     out = np.empty(angle.shape, np.complex64)
-    wide = max(1, min(pulses, TILE_SAMPLES))
-    high, room = TILE_SAMPLES // wide, Room(10 * TILE_SAMPLES)
-    for row, at in product(range(0, len(out), high), range(0, pulses, wide)):
-        rows, span = slice(row, row + high), slice(at, at + wide)
-        reduced = reduce_phase(angle[rows, span])
-        part = out[rows, span]
-        real, imag = np.empty_like(reduced), np.empty_like(reduced)
-        blades.sum(rows, reduced, room, real, imag)
-        part.real, part.imag = real, imag
+    tip, beta, root, asymmetry = (
+        np.broadcast_to(np.asarray(value, np.float64), lead).reshape(-1, 1)
+        for value in (blade_length_m, beta_rad, root_m, edge_asymmetry)
+    )
+    fine = (needs_float64(wavelength_m, tip, beta) | ((points or 0) > MOST_FLOAT32_POINTS))[:, 0]
+    if not fine.all():
+        wide = max(1, min(pulses, TILE_SAMPLES))
+        high, room = TILE_SAMPLES // wide, Room(10 * TILE_SAMPLES)
+        for row, at in product(range(0, len(out), high), range(0, pulses, wide)):
+            rows, span = slice(row, row + high), slice(at, at + wide)
+            reduced = reduce_phase(angle[rows, span])
+            part = out[rows, span]
+            real, imag = np.empty_like(reduced), np.empty_like(reduced)
+            blades.sum(rows, reduced, room, real, imag)
+            part.real, part.imag = real, imag
+    if fine.any():  # each record by what itself needs, whatever stands beside it
+        amplitudes = np.asarray(blade_amplitudes, np.float64)
+        number = amplitudes.shape[-1]
+        amplitudes = np.broadcast_to(amplitudes, (*lead, number)).reshape(len(out), number)
+        rows_of = (value[fine] for value in (tip, beta, root, asymmetry, amplitudes))
+        out[fine] = _double_echo(angle[fine], wavelength_m, *rows_of, points)
     return out.reshape(*lead, pulses)
+
+
+def needs_float64(wavelength_m: float, blade_length_m: ArrayLike, beta_rad: ArrayLike) -> NDArray[np.bool_]:
+    """True where a blade is so many wavelengths long that the rounding of a float32 angle shows."""
+    return np.asarray(2 * TWO_PI / wavelength_m * np.multiply(blade_length_m, np.abs(np.cos(beta_rad))) > LARGEST_GAMMA)
 
 
 def _double_echo(
@@ -159,22 +171,23 @@ def _double_echo(
     tip_m: NDArray[np.float64],
     beta_rad: NDArray[np.float64],
     root_m: NDArray[np.float64],
-    blade_amplitudes: ArrayLike,
-    edge_asymmetry: ArrayLike,
+    asymmetry: NDArray[np.float64],
+    amplitudes: NDArray[np.float64],
     points: int | None,
 ) -> NDArray[np.complex64]:
-    """The closed form blade by blade in float64, where float32 has no digits left: long blades, rows of many points."""
-    amplitudes = np.asarray(blade_amplitudes, np.float64)
+    """The closed form blade by blade in float64, where float32 has no digits left: long blades, rows of many points.
+
+    Angles are of shape (records, pulses), amplitudes (records, blades), all others (records, 1).
+    """
     blades = amplitudes.shape[-1]
-    asymmetry = np.asarray(edge_asymmetry, np.float64)[..., None]
     inner_m = row_m(root_m, tip_m, points)[-1] if points else root_m
     k = TWO_PI / wavelength_m * np.cos(beta_rad)
-    out: NDArray = np.zeros(1, np.complex128)
+    out = np.zeros(angle.shape, np.complex128)
     for number in range(blades):
         theta = angle + TWO_PI * number / blades
-        along = k[..., None] * np.cos(theta)
-        weight = amplitudes[..., number, None] * (1 + asymmetry * np.sin(theta))
-        half = (tip_m - inner_m)[..., None] * along
+        along = k * np.cos(theta)
+        weight = amplitudes[:, number, None] * (1 + asymmetry * np.sin(theta))
+        half = (tip_m - inner_m) * along
         share = diric(2 * half / max(points - 1, 1), points) if points else np.sinc(half / np.pi)
-        out = out + weight * share * np.exp(1j * (tip_m + inner_m)[..., None] * along)
+        out += weight * share * np.exp(1j * (tip_m + inner_m) * along)
     return out.astype(np.complex64)

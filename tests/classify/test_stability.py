@@ -93,14 +93,24 @@ def test_both_blade_paths_agree_where_they_meet():
         rotor_echo(angle, blade_length_m=length[0], blade_amplitudes=(1.0, 0.7, 0.9), **arguments) for length in lengths
     )
     np.testing.assert_allclose(below, beyond, atol=5e-3)
-    batch = rotor_echo(angle, blade_length_m=lengths[:, 0], blade_amplitudes=np.ones((2, 2)), **arguments)
-    for row, length in zip(batch, lengths[:, 0], strict=True):
-        np.testing.assert_allclose(row, rotor_echo(angle, blade_length_m=length, **arguments), atol=5e-3)
 
 
-def test_a_rotor_without_blades_has_no_echo():
-    assert not rotor_echo(np.linspace(0, 9, 50), wavelength_m=0.03, blade_length_m=0.2, blade_amplitudes=()).any()
-    assert rotor_echo(np.zeros((4, 50)), wavelength_m=0.03, blade_length_m=0.2, blade_amplitudes=()).shape == (4, 50)
+@pytest.mark.parametrize("points", [None, 7, 90])
+def test_a_blade_is_as_it_is_alone_whatever_length_stands_beside_it(points):
+    angle, long_m = np.linspace(0, 20, 4001), LARGEST_GAMMA * 0.003 / (4 * np.pi)
+    lengths = np.array([0.6, 2 * long_m, 0.3, 1.000001 * long_m])
+    arguments = {"wavelength_m": 0.003, "edge_asymmetry": 0.3, "points": points}
+    batch = rotor_echo(angle, blade_length_m=lengths, blade_amplitudes=np.array([[1.0, 0.7]] * 4), **arguments)
+    for row, length in zip(batch, lengths, strict=True):
+        alone = rotor_echo(angle, blade_length_m=length, blade_amplitudes=(1.0, 0.7), **arguments)
+        np.testing.assert_array_equal(row, alone)
+
+
+@pytest.mark.parametrize("length_m", [0.2, 500.0])
+def test_a_rotor_without_blades_has_no_echo(length_m):
+    blades = {"wavelength_m": 0.03, "blade_length_m": length_m, "blade_amplitudes": ()}
+    assert not rotor_echo(np.linspace(0, 9, 50), **blades).any()
+    assert rotor_echo(np.zeros((4, 50)), **blades).shape == (4, 50)
 
 
 def test_the_command_writes_the_table_whole(tmp_path, monkeypatch, capsys):

@@ -1,4 +1,5 @@
 import re
+from threading import Event, Thread
 
 import numpy as np
 import pytest
@@ -287,6 +288,41 @@ def test_who_leaves_first_does_not_give_the_others_threads_back():
         with one_thread:
             one_thread.__exit__(None, None, None)
             assert threads() == {1}
+        assert threads() == {2}
+
+
+def test_linear_algebra_has_one_thread_in_whichever_thread_asks_for_it():
+    with threadpool_limits(2, user_api="blas"):
+        with one_thread:
+            assert threads() == {1}
+        within = []
+
+        def enter():
+            with one_thread:
+                within.append(threads())
+
+        worker = Thread(target=enter)
+        worker.start()
+        worker.join()
+        assert (within, threads()) == ([{1}], {2})
+
+
+def test_the_last_thread_to_leave_gives_the_threads_back():
+    inside, leave = Event(), Event()
+
+    def hold():
+        with one_thread:
+            inside.set()
+            assert leave.wait(60)
+
+    with threadpool_limits(2, user_api="blas"):
+        with one_thread:
+            worker = Thread(target=hold)
+            worker.start()
+            assert inside.wait(60)
+        assert threads() == {1}
+        leave.set()
+        worker.join()
         assert threads() == {2}
 
 

@@ -99,6 +99,12 @@ def test_rows_of_more_points_than_float32_tells_apart_are_refused():
         rotors_echo(RADAR, [Rotor(RotorMotion(80.0, 0.0), blade_length_m=0.2, points=65)], 1)
 
 
+def test_blades_of_more_wavelengths_than_float32_tells_apart_are_refused():
+    rotors = [Rotor(RotorMotion(80.0, 0.0), blade_length_m=0.2), Rotor(RotorMotion(0.2, 0.0), blade_length_m=[1, 90])]
+    with pytest.raises(ValueError, match=r"rotors\[1\].blade_length_m is \[1, 90\]: .* at most 30000: longer blades"):
+        rotors_echo(RADAR, rotors, 2)
+
+
 def test_equal_blades_without_asymmetry_have_a_real_echo_at_a_real_hub():
     rotor = Rotor(RotorMotion(80.0, 0.3), blade_length_m=0.2, blade_amplitudes=(1.0, 1.0, 1.0, 1.0))
     echo = rotors_echo(RADAR, [rotor], 1)
