@@ -23,7 +23,6 @@ from .render_uav import (
     Fidelity,
     centre_range_m,
     rotor_angle_rad,
-    rotor_beta_rad,
     uav_echo,
     vibration_rad,
 )
@@ -106,7 +105,7 @@ class UavBounds:
 
     def _phase(self, rotor: RotorPart) -> float:
         """Largest phase of the tip [rad], the paper's Gamma."""
-        return self.wavenumber * rotor.blade_length_m * float(np.cos(rotor_beta_rad(self.part, rotor)))
+        return self.wavenumber * rotor.blade_length_m * float(np.cos(self.part.beta_rad(rotor)))
 
     def _moments(self, rotor: RotorPart) -> tuple[float, Callable[[int, Amplitude], Amplitude]]:
         """The root's share of a blade, and the envelope of its moments by order and phase."""
@@ -119,7 +118,7 @@ class UavBounds:
         for rotor in self.part.rotors:
             length, share, moment = rotor.blade_length_m, *self._moments(rotor)
             hub = hub_range_m(self.centre_m, rotor.offset_m, np.deg2rad(rotor.bearing_deg))
-            cos_beta = np.cos(rotor_beta_rad(self.part, rotor))
+            cos_beta = np.cos(self.part.beta_rad(rotor))
             for amplitude, theta in self._blades(rotor):
                 c = cos_beta * np.cos(theta)
                 sag = self.wavenumber * length**2 * (1 - c**2) / (2 * hub)
@@ -232,7 +231,7 @@ class UavBounds:
             if rotor.points or rotor.root_m == rotor.blade_length_m:
                 continue
             half = self.wavenumber * (rotor.blade_length_m - rotor.root_m) / 2
-            cos_beta = np.cos(rotor_beta_rad(self.part, rotor))
+            cos_beta = np.cos(self.part.beta_rad(rotor))
             nearness = rotor.blade_length_m / (self.centre_m.min() - rotor.offset_m)
             for amplitude, theta in self._blades(rotor):
                 cosine = np.abs(cos_beta * np.cos(theta))

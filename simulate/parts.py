@@ -125,6 +125,10 @@ class RotorPart(Part):
         """Amplitude of each blade over that of `flash_db`."""
         return self.blade_amplitudes or (1.0,) * self.blades
 
+    def fastest_hz(self, dwell_s: float) -> float:
+        """Rotation rate [Hz] that drift and wander within the dwell do not exceed, whatever its sense."""
+        return max(abs(self.rotation_hz), abs(self.rotation_hz + self.drift_hz_per_s * dwell_s)) + self.wander_hz
+
 
 class TargetPart(Part):
     """What every target has: a name, a switch, a range [m] and a radial motion (positive when the range grows)."""
@@ -140,12 +144,16 @@ class TargetPart(Part):
         """Distance of the farthest scatterer from the centre [m]."""
         return 0.0
 
-    def nearest_m(self, dwell_s: float) -> float:
-        """Smallest range of the centre within the dwell [m]."""
-        times = [0.0, dwell_s]
+    def nearest_m(self, dwell_s: float, drift_mps: float = 0.0) -> float:
+        """Smallest range of the centre within the dwell [m], of what moves so much faster than the part [m/s]."""
+        velocity, times = self.velocity_mps + drift_mps, [0.0, dwell_s]
         if self.acceleration_mps2 > 0:
-            times.append(min(max(-self.velocity_mps / self.acceleration_mps2, 0.0), dwell_s))
-        return min(self.range_m + t * (self.velocity_mps + 0.5 * self.acceleration_mps2 * t) for t in times)
+            times.append(min(max(-velocity / self.acceleration_mps2, 0.0), dwell_s))
+        return min(self.range_m + t * (velocity + 0.5 * self.acceleration_mps2 * t) for t in times)
+
+    def fastest_mps(self, dwell_s: float) -> float:
+        """Largest radial speed of the centre within the dwell [m/s]."""
+        return max(abs(self.velocity_mps), abs(self.velocity_mps + self.acceleration_mps2 * dwell_s))
 
 
 class UavPart(TargetPart):
@@ -181,6 +189,15 @@ class UavPart(TargetPart):
         """Distance of the farthest scatterer from the centre [m]."""
         return max([r.offset_m + r.blade_length_m for r in self.rotors] + [b.offset_m for b in self.body])
 
+    def beta_rad(self, rotor: RotorPart) -> float:
+        """Angle between the line of sight and a rotor's plane [rad]."""
+        return math.radians(self.beta_deg if rotor.beta_deg is None else rotor.beta_deg)
+
+    def fastest_tip_mps(self, rotor: RotorPart, dwell_s: float) -> float:
+        """Largest radial speed that a rotor's tips may show within the dwell [m/s]."""
+        tip_mps = 2 * math.pi * rotor.fastest_hz(dwell_s) * rotor.blade_length_m
+        return tip_mps * math.cos(self.beta_rad(rotor)) + self.fastest_mps(dwell_s)
+
 
 class BirdPart(TargetPart):
     """A bird, or a small flock of `members`: a `species` of the catalogue, or mass (and span, area).
@@ -213,8 +230,8 @@ class BirdPart(TargetPart):
 
     @property
     def reach_m(self) -> float:
-        """Half the span [m]."""
-        return float((self.span_m or wing_size(self.mass_kg)[0]) / 2)
+        """Half the span, and how far the body heaves [m]."""
+        return float((self.span_m or wing_size(self.mass_kg)[0]) / 2) + self.heave_m
 
     @model_validator(mode="before")
     @classmethod

@@ -16,12 +16,11 @@ import numpy as np
 
 from .bounds import UavBounds, bird_bound
 from .bounds_receiver import ReceiverBounds
-from .motion import TWO_PI
 from .parts import UavPart
 from .radar import Radar
 from .reception import pulse_times_s
 from .render_bird import BIRD_EFFECTS
-from .render_uav import UAV_EFFECTS, Fidelity, full_fidelity, rotor_beta_rad
+from .render_uav import UAV_EFFECTS, Fidelity, full_fidelity
 from .setting import Setting
 
 #: Without receiver noise, what is compared with: the digits of complex64, this far under the strongest target.
@@ -230,10 +229,7 @@ def _renderer(uav: UavPart, radar: Radar, points: int | None) -> str:
 
 def _aliasing(uav: UavPart, radar: Radar) -> str:
     """Whether the samples fold the blades' Doppler. They do so by themselves, at no cost: nothing is decided here."""
-    tips = [
-        TWO_PI * abs(rotor.rotation_hz) * rotor.blade_length_m * float(np.cos(rotor_beta_rad(uav, rotor)))
-        for rotor in uav.rotors
-    ]
-    fastest = max(tips, default=0.0) + abs(uav.velocity_mps) + abs(uav.acceleration_mps2) * radar.dwell_s
+    tips = [uav.fastest_tip_mps(rotor, radar.dwell_s) for rotor in uav.rotors]
+    fastest = max([uav.fastest_mps(radar.dwell_s), *tips])
     verdict = "none" if fastest <= radar.unambiguous_mps else "the samples fold it, as a radar's do"
     return f"{uav.name}: aliasing: {verdict}; it shows {fastest:.1f} m/s of {radar.unambiguous_mps:.1f} m/s unambiguous"

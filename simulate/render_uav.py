@@ -60,11 +60,6 @@ def rotor_angle_rad(rotor: RotorPart, times_s: NDArray[np.float64], wanders: boo
     return motion.angle_rad(times_s)
 
 
-def rotor_beta_rad(part: UavPart, rotor: RotorPart) -> float:
-    """Angle between the line of sight and this rotor's plane [rad]."""
-    return float(np.deg2rad(part.beta_deg if rotor.beta_deg is None else rotor.beta_deg))
-
-
 def uav_echo(part: UavPart, radar: Radar, times_s: NDArray[np.float64], how: Fidelity) -> NDArray[np.complex128]:
     """Echo of a UAV, its absolute range included.
 
@@ -92,7 +87,7 @@ def uav_echo(part: UavPart, radar: Radar, times_s: NDArray[np.float64], how: Fid
         hub = hub_range_m(centre, rotor.offset_m, np.deg2rad(rotor.bearing_deg), far_field=not near_hubs)
         angle = rotor_angle_rad(rotor, times_s, "wander" in how.effects)
         level = 10 ** (rotor.flash_db / 20) * np.exp(1j * np.deg2rad(rotor.hub_phase_deg))
-        beta = rotor_beta_rad(part, rotor)
+        beta = part.beta_rad(rotor)
         if how.points is None:
             blades = rotor_echo(
                 angle,

@@ -8,6 +8,7 @@ from .motion import TWO_PI
 from .parts import BirdPart, ClutterPart, RadarPart, ReceiverPart, TargetPart, UavPart
 from .radar import Radar
 from .receiver import EFFECT_OF, FAULT_CHANCE
+from .render_bird import members
 
 _SOUND_MPS = 340.0
 
@@ -67,7 +68,7 @@ class Setting(BaseModel):
     @model_validator(mode="after")
     def _ranges(self) -> "Setting":
         for part in (*self.uav, *self.bird):
-            nearest = part.nearest_m(self.radar.pulses / self.radar.prf_hz)
+            nearest = _nearest_m(part, self.radar.pulses / self.radar.prf_hz)
             if not nearest > part.reach_m:
                 raise ValueError(
                     f"{part.name}: range_m is {part.range_m}: within the dwell it comes to {nearest:.6g} m, which must "
@@ -113,12 +114,11 @@ class Setting(BaseModel):
         for part in self.uavs:
             for number, rotor in enumerate(part.rotors):
                 where = f"{part.name}: rotors[{number}]"
-                beta = math.radians(part.beta_deg if rotor.beta_deg is None else rotor.beta_deg)
-                tip = TWO_PI * abs(rotor.rotation_hz) * rotor.blade_length_m
-                fastest = tip * math.cos(beta) + abs(part.velocity_mps)
+                tip = TWO_PI * rotor.fastest_hz(radar.dwell_s) * rotor.blade_length_m
+                fastest = part.fastest_tip_mps(rotor, radar.dwell_s)
                 if tip > _SOUND_MPS:
                     said.append(f"{where}: its tips move at {tip:.1f} m/s, faster than sound")
-                if math.cos(beta) < 1e-9:
+                if math.cos(part.beta_rad(rotor)) < 1e-9:
                     said.append(f"{where}: seen along its axis (90 degrees) it shows no micro-Doppler")
                 elif fastest > radar.unambiguous_mps:
                     said.append(
@@ -127,8 +127,7 @@ class Setting(BaseModel):
                         f"{4 * fastest / radar.wavelength_m:.0f} Hz would not"
                     )
         for target in (*self.uavs, *self.birds):
-            ends = [target.velocity_mps, target.velocity_mps + target.acceleration_mps2 * radar.dwell_s]
-            fastest = max(abs(v) for v in ends)
+            fastest = target.fastest_mps(radar.dwell_s)
             if fastest > _SOUND_MPS:
                 said.append(f"{target.name}: it moves at {fastest:.4g} m/s, faster than sound")
             if fastest > radar.unambiguous_mps:
@@ -141,3 +140,10 @@ class Setting(BaseModel):
             if effect is not None and effect not in self.receiver.effects:
                 said.append(f'receiver.values: {name} changes nothing without "{effect}" among the effects')
         return said
+
+
+def _nearest_m(part: UavPart | BirdPart, dwell_s: float) -> float:
+    """Smallest range of a target's centre within the dwell, of a flock that of any member [m]."""
+    if isinstance(part, UavPart):
+        return part.nearest_m(dwell_s)
+    return min(part.nearest_m(dwell_s, bird.velocity_mps) + bird.place_m for bird in members(part))

@@ -150,6 +150,35 @@ def test_tips_beyond_the_unambiguous_velocity_alias_and_are_warned_of():
     np.testing.assert_allclose(ours, theirs, atol=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("motion", "rotor", "shown_mps"),
+    [
+        ({"velocity_mps": 3.0, "acceleration_mps2": 15.0}, {}, 33.0),
+        ({"velocity_mps": 3.0, "acceleration_mps2": -15.0}, {}, 27.0),
+        ({}, {"drift_hz_per_s": 20.0}, 0.0),
+        ({}, {"wander_hz": 40.0}, 0.0),
+    ],
+)
+def test_tips_that_alias_later_in_the_dwell_are_warned_of(motion, rotor, shown_mps):
+    rotor = {"blade_length_m": 0.15, "rotation_hz": 60.0, "flash_db": 0.0} | rotor
+    rate_hz = 60.0 + 2 * rotor.get("drift_hz_per_s", 0.0) + rotor.get("wander_hz", 0.0)
+    fastest = 2 * np.pi * rate_hz * 0.15 + shown_mps
+    for margin, warned in ((1.01, False), (0.99, True)):  # a dwell of 2 s
+        prf_hz = 4 * fastest * margin / (299_792_458.0 / 9.85e9)
+        radar = {"carrier_hz": 9.85e9, "prf_hz": prf_hz, "pulses": round(2 * prf_hz)}
+        built = Scene.build({"radar": radar, "uav": [{"name": "x", "rotors": [rotor], "range_m": 1e4, **motion}]})
+        assert any("they alias" in line for line in built.warnings()) == warned
+
+
+@pytest.mark.parametrize("bird", [{"members": 20, "flock_velocity_mps": 10.0}, {"heave_m": 8.0}])
+def test_no_bird_of_a_flock_comes_to_the_radar(bird):
+    radar, starling = {**RADAR, "pulses": round(2 * RADAR["prf_hz"])}, {"name": "x", "species": "starling"}
+    with pytest.raises(SceneError, match="within the dwell it comes to"):
+        Scene.build({"radar": radar, "bird": [{**starling, "range_m": 5.0, **bird}]})
+    Scene.build({"radar": radar, "bird": [{**starling, "range_m": 5.0}]})
+    Scene.build({"radar": radar, "bird": [{**starling, "range_m": 500.0, **bird}]})
+
+
 def test_a_prf_in_khz_is_warned_of():
     said = Scene.build({"radar": {**RADAR, "prf_hz": 25.0}}).warnings()
     assert said == ["radar.prf_hz is 25: in Hz, so that 25 kHz is 25e3"]
