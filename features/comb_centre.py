@@ -38,10 +38,14 @@ ENDS_GAP, MIDDLE_REACH = 2, 3
 #: What speaks for the order at rest at most where a background lies there, and more where no line that moves is as
 #: strong as a body's [nats]: a background is strong whatever hovers in it, and a line of the comb comes as near to it
 #: by chance, but many do hover. Where no line stands out that moves, the body hides in what was taken out there.
-REST, HOVERS = 8.0, 11.0
+REST, HOVERS = 14.0, 5.0
 
 #: A line is at rest so near to it [bins].
 AT_REST_BINS = 1.0
+
+#: A strong line is another target's where the comb counted from it speaks for less than this share of what it does
+#: counted from its own nearest line; lines nearer than this to one [bins] are as good as on it.
+OWN_SHARE, ON_COMB_BINS = 0.15, 0.5
 
 #: Before a static background only what stands so far out of its skirt is a line [times the local level].
 OUT_OF_SKIRT = 12.0
@@ -73,14 +77,12 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
     evidence = data.contrast
     best, most = found, -np.inf
     totals: dict[int, float] = {}
-    steps = found.spacing * (1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * data.pulses))
     bonuses, even = _bonuses(data, found)
     shifts = [round((centre - found.centre) / found.spacing) for centre in bonuses]
     # one comb for several rotors may pass a little beside the body's line: either place will do
     either = np.stack([list(bonuses), found.centre + found.spacing * np.array(shifts)], axis=1)
-    # only lines that were found to come back from the other end of the span lie past it
-    within = int(outermost_orders(data, found.spacing)) if found.is_folded else int(0.5 / found.spacing)
-    furthest = within * found.spacing if found.is_folded else 0.5
+    within, furthest = _furthest(data, found)
+    steps = _steps(data, found)
     scores, _ = even_scores(evidence, np.repeat(steps, either.size), np.tile(either.ravel(), len(steps)), furthest)
     scores = scores.reshape(len(steps), *either.shape).max(axis=2)
     for shift, (centre, bonus), own in zip(shifts, bonuses.items(), scores.T, strict=True):
@@ -110,6 +112,29 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
         _, (reach,) = even_scores(evidence, np.array([best.spacing]), np.array([best.centre]), furthest)
         best = replace(best, centre=best.centre - round(best.centre), low=-int(reach), high=int(reach))
     return best, float(np.sqrt((likely * away**2).sum() / likely.sum()))
+
+
+def _furthest(data: Periodogram, found: Candidate) -> tuple[int, float]:
+    """Outermost order that the body may have, and how far from it lines are looked for [cycles a sample]."""
+    # only lines that were found to come back from the other end of the span lie past it
+    within = int(outermost_orders(data, found.spacing)) if found.is_folded else int(0.5 / found.spacing)
+    return within, within * found.spacing if found.is_folded else 0.5
+
+
+def _steps(data: Periodogram, found: Candidate) -> NDArray[np.float64]:
+    """Spacings tried about that of a comb, rising [cycles a sample]."""
+    return np.asarray(found.spacing * (1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * data.pulses)))
+
+
+def _is_own(data: Periodogram, found: Candidate, line: float) -> bool:
+    """False for another target's line, about which the comb has no lines: it says nothing of the body's."""
+    nearest = found.centre + found.spacing * round((line - found.centre) / found.spacing)
+    if abs(line - nearest) * data.pulses < ON_COMB_BINS:
+        return True
+    steps, places = _steps(data, found), np.array([line, nearest])
+    scores, _ = even_scores(data.contrast, np.repeat(steps, 2), np.tile(places, len(steps)), _furthest(data, found)[1])
+    there, own = scores.reshape(-1, 2).max(axis=0)
+    return bool(there > OWN_SHARE * own)
 
 
 def _moves(data: Periodogram, centre: float) -> bool:
@@ -145,6 +170,8 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
     # a line beside rest is a slow body's own, and hides no other
     hides = abs(data.centres[0]) * data.pulses < AT_REST_BINS and not any(_moves(data, line) for line in data.centres)
     for centre, level_db in sorted(zip(data.centres, data.centres_db, strict=True), key=lambda line: -abs(line[0])):
+        if not _is_own(data, found, centre):
+            continue
         is_line = _stands_out(data, np.array([centre]), 10 ** (level_db / 10))[0]
         over_db = max(level_db - others_db, 0.0) if is_line else 0.0
         nats = STRONG_LINE * min(over_db / STRONG_OVER_DB, 1.0)

@@ -10,7 +10,7 @@ from .line_likelihood import BEND_STD, BENDS, PLAIN_BEND, OrderPowers, log_likel
 from .line_shapes import PROFILES, spread_powers
 
 #: Blades that a fit to an unknown number of them tries, and how likely they are beforehand.
-BLADES = {1: 0.1, 2: 0.65, 3: 0.25}
+BLADES = {1: 0.1, 2: 0.6, 3: 0.2, 4: 0.1}
 
 #: Lines so far below the family's level do not count: a share of its power, added to noise and lines alike. There is
 #: what strong lines leak, and what blades unlike the ideal ones put past the tip.
