@@ -87,8 +87,8 @@ def rotors_echo(
     for number, rotor in enumerate(rotors):
         if needs_float64(radar.wavelength_m, rotor.blade_length_m, rotor.beta_rad).any():
             raise ValueError(
-                f"rotors[{number}].blade_length_m is {rotor.blade_length_m}: 4 pi length cos(beta) / wavelength must be "
-                f"at most {LARGEST_GAMMA:g}: longer blades take `rotor_echo`"
+                f"rotors[{number}].blade_length_m is {rotor.blade_length_m!r}: 4 pi length cos(beta) / wavelength must "
+                f"be at most {LARGEST_GAMMA:g}: longer blades take `rotor_echo`"
             )
     shake = (vibration_rad, vibration_hz, vibration_phase_rad)
     grid, path = PulseGrid(radar), _path(radar, velocity_mps, acceleration_mps2, records, shake)

@@ -155,8 +155,8 @@ def rotor_echo(
         amplitudes = np.asarray(blade_amplitudes, np.float64)
         number = amplitudes.shape[-1]
         amplitudes = np.broadcast_to(amplitudes, (*lead, number)).reshape(len(out), number)
-        rows_of = (value[fine] for value in (tip, beta, root, asymmetry, amplitudes))
-        out[fine] = _double_echo(angle[fine], wavelength_m, *rows_of, points)
+        tip, beta, root, asymmetry, amplitudes = (value[fine] for value in (tip, beta, root, asymmetry, amplitudes))
+        out[fine] = _double_echo(angle[fine], wavelength_m, tip, beta, root, asymmetry, amplitudes, points)
     return out.reshape(*lead, pulses)
 
 

@@ -142,8 +142,8 @@ class Setting(BaseModel):
         return said
 
 
-def _nearest_m(part: UavPart | BirdPart, dwell_s: float) -> float:
+def _nearest_m(part: TargetPart, dwell_s: float) -> float:
     """Smallest range of a target's centre within the dwell, of a flock that of any member [m]."""
-    if isinstance(part, UavPart):
-        return part.nearest_m(dwell_s)
-    return min(part.nearest_m(dwell_s, bird.velocity_mps) + bird.place_m for bird in members(part))
+    if isinstance(part, BirdPart):
+        return min(part.nearest_m(dwell_s, bird.velocity_mps) + bird.place_m for bird in members(part))
+    return part.nearest_m(dwell_s)
