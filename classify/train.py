@@ -24,7 +24,7 @@ from .gather import TASK_RECORDS, Gathered, Sets, gather, gather_from, inputs_di
 from .inference import Classifier
 from .labels import CLASSES
 from .ladder import CASCADE
-from .model_file import COVERAGES, CURVE_KEY, KINDS_KEY, SETS_KEY
+from .model_file import COVERAGES, CURVE_KEY, FORMAT, KINDS_KEY, SETS_KEY
 from .parts import TRAIN_PARTS, Parts
 from .progress import Progress
 from .train_network import OnFraction, ScoresOf, Taught, epochs_of, train_net
@@ -240,7 +240,7 @@ def train_one(
     }
     metadata = {
         "product": "bladewing",
-        "format": "1",
+        "format": FORMAT,
         "name": name,
         "version": version("bladewing"),
         "classes": json.dumps(CLASSES),

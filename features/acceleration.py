@@ -144,11 +144,16 @@ def without_acceleration(
     Raises
     ------
     ValueError
-        If `iq` is not complex, or the frequencies are not positive.
+        If `iq` is not complex, the frequencies are not positive, or an acceleration is not finite.
     """
     samples = as_complex(iq)
     require_radar(carrier_hz, prf_hz)
     acceleration = np.asarray(acceleration_mps2, np.float64)[..., None]
+    if not np.isfinite(acceleration).all():
+        raise ValueError(
+            "acceleration_mps2 holds a value that is not finite, as `body_acceleration` gives where it finds none: "
+            "put 0 there"
+        )
     return _steadied(samples, acceleration, SPEED_OF_LIGHT_MPS / carrier_hz, prf_hz)
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from .measure_record import measure_record
 from .measurements import EACH_ROTOR, Measurements
 from .one_thread import one_thread
 from .rotors import MAX_ROTORS
-from .spectrum import Spectrum, doppler_spectrum, finite_complex
+from .spectrum import doppler_spectrum, finite_complex
 
 #: Radars that are measured [Hz]: beyond, a frequency was given in another unit.
 CARRIER_RANGE_HZ, PRF_RANGE_HZ = (1e8, 1e12), (1.0, 1e8)
@@ -82,8 +82,8 @@ def measure(
     keep_freed()
     with one_thread:
         for index in np.ndindex(some.shape[:-1]):
-            rows.append(measure_record(some[index], _record(spectrum, index), blades, beta_rad))
-            if on_record:
+            rows.append(measure_record(some[index], spectrum.rows(index), blades, beta_rad))
+            if on_record and samples.size:
                 on_record(len(rows))
     columns = {}
     for field in fields(Measurements):
@@ -92,13 +92,3 @@ def measure(
             extra = (MAX_ROTORS,) if field.name in EACH_ROTOR else ()
             columns[field.name] = values.reshape((*shape, *extra))
     return Measurements(**columns, length_is_lower_bound=beta_rad is None)
-
-
-def _record(spectrum: Spectrum, index: tuple[int, ...]) -> Spectrum:
-    return replace(
-        spectrum,
-        relative_power=spectrum.relative_power[index],
-        floor=spectrum.floor[index],
-        scale=spectrum.scale[index],
-        transform=spectrum.transform[index],
-    )

@@ -65,8 +65,8 @@ class Spectrum:
     scale: NDArray[np.float32]
     transform: NDArray[np.complex64]
 
-    def rows(self, rows: NDArray[np.intp]) -> "Spectrum":
-        """The spectra of some of the records, of shape (records, bins)."""
+    def rows(self, rows: NDArray[np.intp] | tuple[int, ...]) -> "Spectrum":
+        """The spectra of some of the records, of shape (records, bins), or of the one of such an index."""
         arrays = ("relative_power", "floor", "scale", "transform")
         return replace(self, **{name: getattr(self, name)[rows] for name in arrays})
 

@@ -151,8 +151,7 @@ def draw_records(
     ValueError
         If `purpose` or `kind` is unknown, or `count`, `seed` or `start` is negative.
     """
-    if purpose not in PURPOSES:
-        raise ValueError(f"purpose is {purpose!r}: it must be one of {', '.join(PURPOSES)}")
+    _require_purpose(purpose)
     if kind is not None and kind not in KIND_CLASS:
         raise ValueError(f"kind is {kind!r}: it must be one of {', '.join(KIND_CLASS)}")
     for name, value in (("count", count), ("seed", seed), ("start", start)):
@@ -170,6 +169,11 @@ def draw_records(
     return Records(radar, iq, labels, {"kind": kinds, **truth})
 
 
+def _require_purpose(purpose: str) -> None:
+    if purpose not in PURPOSES:
+        raise ValueError(f"purpose is {purpose!r}: it must be one of {', '.join(PURPOSES)}")
+
+
 def draw_radar(seed: int, purpose: str, group: int) -> Radar:
     """Draw the radar of one group of a stream: any carrier, PRF and dwell of the envelope.
 
@@ -183,7 +187,13 @@ def draw_radar(seed: int, purpose: str, group: int) -> Radar:
     Returns
     -------
     Radar
+
+    Raises
+    ------
+    ValueError
+        If `purpose` is unknown.
     """
+    _require_purpose(purpose)
     sequence = SeedSequence(seed, spawn_key=(PURPOSES[purpose], _RADAR_STREAM + group))
     u = Generator(Philox(sequence)).random(4)
     carrier = float(LAWS["carrier_hz"](u[0]))

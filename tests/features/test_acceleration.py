@@ -144,3 +144,9 @@ def test_a_smear_of_a_fraction_of_a_bin_to_some_is_taken_out_and_one_rotor_stays
         assert after.rotor_count == 1
         assert after.rotors_resolved
         assert after.chopping_hz == pytest.approx(2 * rates_hz[0], rel=1e-4)
+
+
+def test_no_acceleration_found_is_none_to_take_out():
+    iq = white(np.random.default_rng(2), 2, PULSES)
+    with pytest.raises(ValueError, match=r"acceleration_mps2 holds a value that is not finite.* put 0 there"):
+        without_acceleration(iq, np.array([np.nan, 1.0]), **RADAR)

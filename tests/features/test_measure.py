@@ -272,7 +272,9 @@ def test_bad_arguments_are_refused():
 
 
 def test_no_record_gives_no_measurement():
-    found = measure(np.zeros((2, 0, PULSES), np.complex64), **RADAR)
+    done = []
+    found = measure(np.zeros((2, 0, PULSES), np.complex64), **RADAR, on_record=done.append)
+    assert done == []
     assert (found.chopping_hz.shape, found.rotor_rates_hz.shape) == ((2, 0), (2, 0, MAX_ROTORS))
     assert found.reason.dtype.kind == "U"
 

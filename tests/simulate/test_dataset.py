@@ -162,3 +162,10 @@ def test_drawing_more_than_a_record_owns_is_an_error():
     draws.uniform(WIDTH)
     with pytest.raises(RuntimeError, match="WIDTH"):
         draws.uniform()
+
+
+def test_a_purpose_that_is_none_is_told_by_all_that_draw():
+    with pytest.raises(ValueError, match="purpose is 'tset': it must be one of train"):
+        draw_radar(1, "tset", 0)
+    with pytest.raises(ValueError, match="purpose is 'tset': it must be one of train"):
+        next(stream(1, "tset", 3))
