@@ -82,9 +82,8 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
     # one comb for several rotors may pass a little beside the body's line: either place will do
     either = np.stack([list(bonuses), found.centre + found.spacing * np.array(shifts)], axis=1)
     within, furthest = _furthest(data, found)
-    steps = _steps(data, found)
-    scores, _ = even_scores(evidence, np.repeat(steps, either.size), np.tile(either.ravel(), len(steps)), furthest)
-    scores = scores.reshape(len(steps), *either.shape).max(axis=2)
+    steps, scores = _scores_about(data, found, either)
+    scores = scores.max(axis=2)
     for shift, (centre, bonus), own in zip(shifts, bonuses.items(), scores.T, strict=True):
         index = int(own.argmax())
         total = float(own[index]) + bonus + even.get(shift, 0.0)
@@ -121,9 +120,17 @@ def _furthest(data: Periodogram, found: Candidate) -> tuple[int, float]:
     return within, within * found.spacing if found.is_folded else 0.5
 
 
-def _steps(data: Periodogram, found: Candidate) -> NDArray[np.float64]:
-    """Spacings tried about that of a comb, rising [cycles a sample]."""
-    return np.asarray(found.spacing * (1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * data.pulses)))
+def _scores_about(
+    data: Periodogram, found: Candidate, places: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Spacings tried about that of a comb [cycles a sample], and its score with each counted from each place [nats].
+
+    The scores are of shape (spacings, *places.shape).
+    """
+    steps = found.spacing * (1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * data.pulses))
+    tried = np.repeat(steps, places.size), np.tile(places.ravel(), len(steps))
+    scores, _ = even_scores(data.contrast, *tried, _furthest(data, found)[1])
+    return steps, scores.reshape(len(steps), *places.shape)
 
 
 def _is_own(data: Periodogram, found: Candidate, line: float) -> bool:
@@ -131,9 +138,7 @@ def _is_own(data: Periodogram, found: Candidate, line: float) -> bool:
     nearest = found.centre + found.spacing * round((line - found.centre) / found.spacing)
     if abs(line - nearest) * data.pulses < ON_COMB_BINS:
         return True
-    steps, places = _steps(data, found), np.array([line, nearest])
-    scores, _ = even_scores(data.contrast, np.repeat(steps, 2), np.tile(places, len(steps)), _furthest(data, found)[1])
-    there, own = scores.reshape(-1, 2).max(axis=0)
+    there, own = _scores_about(data, found, np.array([line, nearest]))[1].max(axis=0)
     return bool(there > OWN_SHARE * own)
 
 

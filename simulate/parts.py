@@ -125,9 +125,10 @@ class RotorPart(Part):
         """Amplitude of each blade over that of `flash_db`."""
         return self.blade_amplitudes or (1.0,) * self.blades
 
-    def fastest_hz(self, dwell_s: float) -> float:
-        """Rotation rate [Hz] that drift and wander within the dwell do not exceed, whatever its sense."""
-        return max(abs(self.rotation_hz), abs(self.rotation_hz + self.drift_hz_per_s * dwell_s)) + self.wander_hz
+    def tip_mps(self, dwell_s: float) -> float:
+        """Speed that its tips do not exceed within the dwell, drift and wander of the rate included [m/s]."""
+        drifted_hz = self.rotation_hz + self.drift_hz_per_s * dwell_s
+        return 2 * math.pi * (max(abs(self.rotation_hz), abs(drifted_hz)) + self.wander_hz) * self.blade_length_m
 
 
 class TargetPart(Part):
@@ -195,8 +196,7 @@ class UavPart(TargetPart):
 
     def fastest_tip_mps(self, rotor: RotorPart, dwell_s: float) -> float:
         """Largest radial speed that a rotor's tips may show within the dwell [m/s]."""
-        tip_mps = 2 * math.pi * rotor.fastest_hz(dwell_s) * rotor.blade_length_m
-        return tip_mps * math.cos(self.beta_rad(rotor)) + self.fastest_mps(dwell_s)
+        return rotor.tip_mps(dwell_s) * math.cos(self.beta_rad(rotor)) + self.fastest_mps(dwell_s)
 
 
 class BirdPart(TargetPart):

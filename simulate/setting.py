@@ -4,7 +4,6 @@ import math
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
-from .motion import TWO_PI
 from .parts import BirdPart, ClutterPart, RadarPart, ReceiverPart, TargetPart, UavPart
 from .radar import Radar
 from .receiver import EFFECT_OF, FAULT_CHANCE
@@ -114,7 +113,7 @@ class Setting(BaseModel):
         for part in self.uavs:
             for number, rotor in enumerate(part.rotors):
                 where = f"{part.name}: rotors[{number}]"
-                tip = TWO_PI * rotor.fastest_hz(radar.dwell_s) * rotor.blade_length_m
+                tip = rotor.tip_mps(radar.dwell_s)
                 fastest = part.fastest_tip_mps(rotor, radar.dwell_s)
                 if tip > _SOUND_MPS:
                     said.append(f"{where}: its tips move at {tip:.1f} m/s, faster than sound")

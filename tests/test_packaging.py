@@ -77,8 +77,10 @@ def test_no_folder_imports_what_flows_from_it():
     allowed = {"simulate": set(), "features": set(), "models": {"features"}, "classify": set(FOLDERS)}
     for folder in FOLDERS:
         for path in (ROOT / folder).rglob("*.py"):
-            package = ["bladewing", *path.parent.relative_to(ROOT).parts]
-            for node in ast.walk(ast.parse(path.read_text())):
+            text, package = path.read_text(), ["bladewing", *path.parent.relative_to(ROOT).parts]
+            for other in set(FOLDERS) - {folder} - allowed[folder]:
+                assert f"bladewing.{other}" not in text, f"{path} reaches into {other}"
+            for node in ast.walk(ast.parse(text)):
                 for name in imported(node, package):
                     other = name.split(".")[1] if name.startswith("bladewing.") else folder
                     assert other == folder or other in allowed[folder], f"{path} imports {name}"

@@ -99,7 +99,7 @@ def test_both_blade_paths_agree_where_they_meet():
 def test_a_blade_is_as_it_is_alone_whatever_length_stands_beside_it(points):
     angle, long_m = np.linspace(0, 20, 4001), LARGEST_GAMMA * 0.003 / (4 * np.pi)
     lengths = np.array([0.6, 2 * long_m, 0.3, 1.000001 * long_m])
-    arguments = {"wavelength_m": 0.003, "edge_asymmetry": 0.3, "points": points}
+    arguments = {"wavelength_m": 0.003, "root_m": 0.1, "edge_asymmetry": 0.3, "points": points}
     batch = rotor_echo(angle, blade_length_m=lengths, blade_amplitudes=np.array([[1.0, 0.7]] * 4), **arguments)
     for row, length in zip(batch, lengths, strict=True):
         alone = rotor_echo(angle, blade_length_m=length, blade_amplitudes=(1.0, 0.7), **arguments)
