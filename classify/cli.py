@@ -28,8 +28,17 @@ app = typer.Typer(
 _LONGEST_LINE = 10_000
 
 Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]
+Config = Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Settings; the options given here come first.")]
 
-# Options that every command over recordings takes.
+# What every command over recordings takes.
+Recordings = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="RECORDING",
+        help="SigMF (.sigmf-meta, .sigmf-data, their stem, or an archive .sigmf), .npy, .npz or .mat.",
+        show_default=False,
+    ),
+]
 DwellS = Annotated[float, typer.Option(metavar="SECONDS", help="Length of a dwell [s].")]
 MeasuredDwellS = Annotated[
     float,
@@ -70,14 +79,7 @@ def _before_any_command(
 
 @app.command()
 def predict(
-    recordings: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RECORDING",
-            help="SigMF (.sigmf-meta, .sigmf-data, their stem, or an archive .sigmf), .npy, .npz or .mat.",
-            show_default=False,
-        ),
-    ],
+    recordings: Recordings,
     model: ModelName = None,
     budget_us: Annotated[
         float | None,
@@ -143,16 +145,9 @@ def predict(
 
 @app.command()
 def measure(
-    recordings: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RECORDING",
-            help="SigMF (.sigmf-meta, .sigmf-data, their stem, or an archive .sigmf), .npy, .npz or .mat.",
-            show_default=False,
-        ),
-    ],
+    recordings: Recordings,
     blades: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Blades of a rotor, if known.", show_default=False)
+        int | None, typer.Option(metavar="N", help="Blades of a rotor, if known.", show_default=False)
     ] = None,
     beta_deg: Annotated[
         float | None,
@@ -201,9 +196,7 @@ def measure(
 @app.command()
 def train(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where the models and train.json go.")] = Path("out"),
-    config: Annotated[
-        Path | None, typer.Option(metavar="FILE.toml", help="Settings; the options given here come first.")
-    ] = None,
+    config: Config = None,
     records: Annotated[
         int | None,
         typer.Option(metavar="N", min=LEAST_RECORDS, help="Synthetic records to train on.", show_default=False),
@@ -230,10 +223,7 @@ def dataset(
         int, typer.Option(metavar="N", min=LEAST_RECORDS, help="Records to train on; the other sets follow from it.")
     ],
     seed: Seed = None,
-    config: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.toml", help="Settings of a training; the options given here come first."),
-    ] = None,
+    config: Config = None,
 ) -> None:
     """Write the records of a training to disk; interrupted, the same command goes on."""
     from .dataset import run_dataset
@@ -274,12 +264,8 @@ def report(
     models: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of .onnx files.", show_default="the shipped models")
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(metavar="S", min=0, help="Root seed of the test records.", show_default="0")
-    ] = None,
-    config: Annotated[
-        Path | None, typer.Option(metavar="FILE.toml", help="Settings; the options given here come first.")
-    ] = None,
+    seed: Seed = None,
+    config: Config = None,
 ) -> None:
     """Measure models on fresh synthetic records: what each choice costs; interrupted, the same command goes on."""
     from .parts import REPORT_PARTS

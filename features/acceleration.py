@@ -69,10 +69,10 @@ def body_acceleration(
     Raises
     ------
     ValueError
-        If `iq` is not complex or holds a value that is not finite, or the frequencies are not positive.
+        If `iq` is not complex, holds no pulse or a value that is not finite, or the frequencies are not positive.
     """
     samples = finite_complex(iq)
-    require_radar(carrier_hz, prf_hz)
+    carrier_hz, prf_hz = require_radar(carrier_hz, prf_hz)
     pulses = samples.shape[-1]
     flat = samples.reshape(-1, pulses)
     value, std, smeared = np.full(len(flat), np.nan), np.full(len(flat), np.nan), np.zeros(len(flat), bool)
@@ -144,10 +144,10 @@ def without_acceleration(
     Raises
     ------
     ValueError
-        If `iq` is not complex, the frequencies are not positive, or an acceleration is not finite.
+        If `iq` is not complex or holds no pulse, the frequencies are not positive, or an acceleration is not finite.
     """
     samples = as_complex(iq)
-    require_radar(carrier_hz, prf_hz)
+    carrier_hz, prf_hz = require_radar(carrier_hz, prf_hz)
     acceleration = np.asarray(acceleration_mps2, np.float64)[..., None]
     if not np.isfinite(acceleration).all():
         raise ValueError(

@@ -39,9 +39,9 @@ def by_recording(
     Raises
     ------
     ValueError
-        If the samples are not complex or not finite, or a frequency is not positive.
+        If the samples are not complex or not finite, there are none, or a frequency is not positive.
     """
-    require_radar(carrier_hz, prf_hz)
+    carrier_hz, prf_hz = require_radar(carrier_hz, prf_hz)
     samples = finite_complex(iq)
     lead, pulses = samples.shape[:-1], samples.shape[-1:]
     each = [samples[index] for index in np.ndindex(lead)] or [np.zeros(pulses, np.complex64)]

@@ -56,9 +56,7 @@ def model_inputs(
     unknown = wanted - INPUT_SHAPES.keys()
     if unknown:
         raise ValueError(f"model input {sorted(unknown)[0]!r} is unknown: it must be one of {', '.join(INPUT_SHAPES)}")
-    samples = as_complex(iq)
-    if samples.ndim < 1 or samples.shape[-1] < MIN_PULSES:
-        raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least {MIN_PULSES} pulses")
+    samples = as_complex(iq, MIN_PULSES)
     framed = "image" in wanted or "joint_features" in wanted
     flat = samples.reshape(-1, samples.shape[-1])
     blocks = [

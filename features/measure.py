@@ -74,7 +74,7 @@ def measure(
     if beta_rad is not None and not 0 <= beta_rad < np.pi / 2:
         raise ValueError(f"beta_rad is {beta_rad!r}: it must be at least 0 and below pi/2 [rad]")
     blades = None if blades is None else int(blades)
-    samples = finite_complex(iq)
+    samples = finite_complex(iq, least=2)
     shape = samples.shape[:-1]
     some = samples if samples.size else np.zeros((1, *samples.shape[-1:]), np.complex64)  # of none, fields of no length
     spectrum = doppler_spectrum(some, carrier_hz=carrier_hz, prf_hz=prf_hz)

@@ -10,29 +10,17 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .bandwidth import half_empty
-from .bodies import LINE_DB, line_among, other_body, slow_body, turns_of, within
+from .bodies import within
 from .clicks import without_clicks
 from .evidence import Evidence, line_evidence
 from .lines import LineSpace, squared
-from .notch import LOBE_BINS, NOTCH_MPS, Body, body_line
 from .octaves import over_neighbours
 from .slow_lines import remove_bands
-from .spectrum import NOISE_BANDWIDTH_BINS, Spectrum, doppler_spectrum
-
-#: Noise alone seldom has so strong a bin [dB] in the notch about velocity zero; a background's skirt has.
-SKIRT_DB = 9.0
-
-#: It shows right beside a hovering body's lobe, at so many bins; further out lie the first lines of rotors.
-SKIRT_BINS = LOBE_BINS + 2.5
+from .spectrum import Spectrum, doppler_spectrum
+from .strong_lines import strong_lines
 
 #: So many bins beside what was taken out the noise is thinner: it would lower the level of its block.
 THINNED_BINS = 4
-
-#: Half width taken out about the body line [m/s]. A body is steadier than the clutter about velocity zero.
-BODY_NOTCH_MPS = 0.5
-
-#: No wider band is taken out [bins], 3 m/s of 80 ms at 100 GHz: the sequences that span it fill memory.
-MOST_NOTCH_BINS = 160
 
 #: Transform length in units of the dwell: between two bins a line loses 0.2 dB.
 PADDING = 4
@@ -108,7 +96,7 @@ class Periodogram:
     @property
     def blocked(self) -> tuple[tuple[float, float], ...]:
         """Centre and half width [cycles a sample] of what was taken out, with a margin."""
-        return tuple((turn, (half + 2) / self.pulses) for turn, half in self.bands)
+        return _blocked(self.bands, self.pulses)
 
     @property
     def rest_half(self) -> float:
@@ -227,6 +215,11 @@ class Periodogram:
         return replace(self, samples=samples, amplitude=amplitude, power=power, level=level)
 
 
+def _blocked(bands: tuple[tuple[float, float], ...], pulses: int) -> tuple[tuple[float, float], ...]:
+    """Centre and half width [cycles a sample] of bands, given as `Periodogram` has them, with a margin."""
+    return tuple((turn, (half + 2) / pulses) for turn, half in bands)
+
+
 def _block(size: int, pulses: int) -> int:
     """Bins of a neighbourhood in a transform of that size."""
     return int(BLOCK_BINS * size / pulses)
@@ -325,62 +318,10 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
     """`prepare` for a record whose spectrum is known."""
     if not spectrum.floor > 0:
         return None
-    pulses = spectrum.pulses
-    bin_mps = spectrum.prf_hz / pulses * spectrum.wavelength_m / 2
-    widest = min(pulses / 16, MOST_NOTCH_BINS)  # a slow radar must keep something to look at
-
-    def half_bins(half_mps: float) -> float:
-        return float(np.ceil(2 * min(max(half_mps / bin_mps, 1.0), widest)) / 2)
-
-    def seen(line: Body) -> tuple[float, float]:
-        return turns_of(spectrum, line), float(line.level_db)
-
-    bands: list[tuple[float, float]] = []
-    centres: list[tuple[float, float]] = []
-    body = body_line(spectrum)
-    middle = spectrum.bins // 2
-    rest_db = float(spectrum.level_db[middle - 1 : middle + 2].max())
-    rest_half = half_bins(NOTCH_MPS)
-    offset = np.abs(spectrum.frequency_hz) * pulses / spectrum.prf_hz
-    # it falls with the offset: what stands further out alone is a rotor's line
-    skirt = (offset <= min(rest_half, SKIRT_BINS)) & (np.abs(np.arange(spectrum.bins) - body.index) > LOBE_BINS + 1)
-    # the only strong line, at rest, without a skirt: a body that hovers, not a background
-    hovers = (
-        abs(turns_of(spectrum, body)) * pulses <= rest_half
-        and 2 * rest_half > 3 * LOBE_BINS
-        and float(spectrum.level_db[skirt].max()) < SKIRT_DB
-        and float(spectrum.level_db[offset > rest_half].max()) < LINE_DB
-    )
-    if rest_db > LINE_DB and not hovers:
-        bands.append((0.0, rest_half))
-        # what stands at rest may be the background; the body is then the strongest line that moves
-        moving = offset > rest_half + 2 * NOISE_BANDWIDTH_BINS
-        # the strongest line of all, if it is as slow as that, has its own level; if not, it is the one that moves
-        slow = abs(turns_of(spectrum, body)) * pulses <= rest_half
-        line = body
-        if slow:
-            line = line_among(spectrum, moving, [0.0])
-        centres.append(seen(body) if slow else (0.0, rest_db))
-        if line.level_db > LINE_DB:
-            centres.append(seen(line))
-    else:
-        centres.append(seen(body))
-    other = other_body(spectrum, [turn for turn, _ in centres], max(rest_half if bands else 0.0, LOBE_BINS))
-    if other is not None:
-        centres.append(seen(other))
-    hidden = slow_body(spectrum, [turn for turn, _ in centres], offset <= rest_half) if bands else None
-    if hidden is not None:
-        centres.append(seen(hidden))
-    centres.sort(key=lambda c: -c[1])
-    bands += [
-        (turn, half_bins(BODY_NOTCH_MPS))
-        for turn, level in centres
-        if level > LINE_DB and (abs(turn) * pulses > rest_half or not bands)
-    ]
+    pulses, strong = spectrum.pulses, strong_lines(spectrum)
     samples = iq.astype(np.complex128) / np.sqrt(spectrum.floor)
-    samples = without_clicks(remove_bands(samples, bands))
-    blocked = tuple((turn, (half + 2) / pulses) for turn, half in bands)
-
+    samples = without_clicks(remove_bands(samples, strong.bands))
+    blocked = _blocked(strong.bands, pulses)
     size = fft.next_fast_len(PADDING * pulses)
     keep, full = _kept(size, blocked), _kept(size, blocked, THINNED_BINS / pulses)
     block = _block(size, pulses)
@@ -397,9 +338,9 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
         (amplitude / np.sqrt(level)).astype(np.complex64),
         whitened,
         level,
-        tuple(bands),
-        tuple(c for c, _ in centres),
-        tuple(level for _, level in centres),
+        strong.bands,
+        strong.centres,
+        strong.centres_db,
         spectrum.wavelength_m,
         spectrum.prf_hz,
         bool(half_empty(spectrum.relative_power)),

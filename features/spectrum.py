@@ -343,41 +343,45 @@ def quartile_rank(blocks: int) -> int:
     return round(_FLOOR_QUANTILE * (blocks - 1))
 
 
-def as_complex(iq: ArrayLike) -> NDArray[np.complex64]:
+def as_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
     """Samples as complex64; real ones would pass for a spectrum with two like sides, and a mask would be forgotten.
 
     Raises
     ------
     ValueError
-        If they are not complex, or some are masked.
+        If they are not complex, some are masked, or the last axis holds fewer than `least` pulses.
     """
     if np.ma.is_masked(iq):
         raise ValueError(f"iq holds masked samples: {FILL_IN}")
     samples = np.asarray(iq)
     if samples.dtype.kind != "c":
         raise ValueError(f"iq holds {samples.dtype}: its samples must be complex, I + jQ")
+    if samples.ndim < 1 or samples.shape[-1] < least:
+        pulses = f"{least} pulse{'s' * (least > 1)}"
+        raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least {pulses}")
     return samples.astype(np.complex64, copy=False)
 
 
-def finite_complex(iq: ArrayLike) -> NDArray[np.complex64]:
+def finite_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
     """Samples as complex64, all of them finite.
 
     Raises
     ------
     ValueError
-        If they are not complex or not finite, or some are masked.
+        If they are not complex or not finite, some are masked, or the last axis holds fewer than `least` pulses.
     """
-    samples = as_complex(iq)
+    samples = as_complex(iq, least)
     if not np.isfinite(samples).all():
         raise ValueError(NOT_FINITE)
     return samples
 
 
-def require_radar(carrier_hz: float, prf_hz: float) -> None:
-    """Refuse frequencies that are none [Hz]."""
+def require_radar(carrier_hz: float, prf_hz: float) -> tuple[float, float]:
+    """Both frequencies [Hz] in float64, as phases need them; what is none is refused."""
     for name, value in (("carrier_hz", carrier_hz), ("prf_hz", prf_hz)):
         if not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
+    return float(carrier_hz), float(prf_hz)
 
 
 def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spectrum:
@@ -400,10 +404,8 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spec
     ValueError
         If `iq` is not complex or not finite, it has fewer than 2 pulses, or the frequencies are not positive.
     """
-    samples = as_complex(iq)
-    if samples.ndim < 1 or samples.shape[-1] < 2:
-        raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least 2 pulses")
-    require_radar(carrier_hz, prf_hz)
+    samples = as_complex(iq, least=2)
+    carrier_hz, prf_hz = require_radar(carrier_hz, prf_hz)
     scale = safe_scale(samples)
     transform = centred_transform(scaled(samples, scale))
     power = power_of(transform)
@@ -411,4 +413,4 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spec
     floor = np.maximum(floor, sums(power) * (LEAST_FLOOR / np.float32(power.shape[-1])))
     natural = floor / np.square(scale[..., 0], dtype=np.float64)
     relative = np.multiply(power, per_floor(floor)[..., None], out=power)
-    return Spectrum(relative, natural, float(carrier_hz), float(prf_hz), samples.shape[-1], scale, transform)
+    return Spectrum(relative, natural, carrier_hz, prf_hz, samples.shape[-1], scale, transform)

@@ -8,7 +8,7 @@ from scipy import fft
 
 from .chopping import CHOPPING_RANGE_HZ
 from .notch import NOTCH_MPS, parabola_offset
-from .spectrum import SPEED_OF_LIGHT_MPS
+from .spectrum import SPEED_OF_LIGHT_MPS, as_complex, require_radar
 
 #: Window length [s] and overlap [1] of the paper's Fig. 21: 20, 80 and 200 samples at 20 kHz, 50 to 90 %.
 PAPER_SETTINGS = ((1e-3, 0.9), (4e-3, 0.9), (4e-3, 0.5), (10e-3, 0.9))
@@ -107,18 +107,19 @@ def stft(
     Raises
     ------
     ValueError
-        See `stft_shape`.
+        See `stft_shape`; or `iq` is not complex or holds no pulse, or a frequency is not positive.
 
     Notes
     -----
     The same numbers as `scipy.signal.ShortTimeFFT`, which loops over the frames and over no batch.
     """
-    samples = np.asarray(iq, np.complex64)
+    samples = as_complex(iq)
+    carrier_hz, prf_hz = require_radar(carrier_hz, prf_hz)
     window, hop = _window(samples.shape[-1], prf_hz, window_s, overlap)
     cut = np.lib.stride_tricks.sliding_window_view(samples, window, axis=-1)[..., ::hop, :]
     taper = (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(window) / window)).astype(np.float32)
     spectra = fft.fftshift(fft.fft(cut * taper, axis=-1), axes=-1)
-    return Stft(spectra.real**2 + spectra.imag**2, float(carrier_hz), float(prf_hz), hop)
+    return Stft(spectra.real**2 + spectra.imag**2, carrier_hz, prf_hz, hop)
 
 
 def _window(pulses: int, prf_hz: float, window_s: float, overlap: float) -> tuple[int, int]:

@@ -28,6 +28,10 @@ class Radar:
     ------
     ValueError
         If a value is not finite or outside its range.
+
+    Notes
+    -----
+    Numbers of any type are kept as float64 and int: phases need all digits.
     """
 
     carrier_hz: float
@@ -39,8 +43,10 @@ class Radar:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
-        if not isinstance(self.pulses, Integral) or self.pulses < 1:
+            object.__setattr__(self, name, float(value))
+        if isinstance(self.pulses, bool) or not isinstance(self.pulses, Integral) or self.pulses < 1:
             raise ValueError(f"pulses is {self.pulses!r}: it must be a whole number of at least 1")
+        object.__setattr__(self, "pulses", int(self.pulses))
 
     @property
     def wavelength_m(self) -> float:

@@ -221,7 +221,7 @@ def test_a_dwell_smeared_by_acceleration_is_measured(folder, tmp_path, capsys):
     ("options", "said"),
     [
         (["--beta-deg", "90"], "--beta-deg is 90"),
-        (["--blades", "0"], "blades"),
+        (["--blades", "0"], "--blades is 0: it must be a whole number of 1 to 64"),
         (["--blades", "2.5"], "--blades is '2.5': it must be a whole number"),
         (["--beta-deg", "x"], "--beta-deg is 'x': it must be a number"),
         (["--blades", "1000000000000"], "--blades is 1000000000000: it must be a whole number of 1 to 64"),

@@ -10,9 +10,10 @@ from bladewing.features.comb_fit import fit_combs
 from bladewing.features.flashes import flash_nats
 from bladewing.features.lines import LineSpace, line_products, sum_of_lines
 from bladewing.features.one_thread import one_thread
-from bladewing.features.periodogram import MOST_NOTCH_BINS, prepare
+from bladewing.features.periodogram import prepare
 from bladewing.features.rotors import MAX_ROTORS
 from bladewing.features.slow_lines import notched_products, remove_bands, slepian
+from bladewing.features.strong_lines import MOST_NOTCH_BINS
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 from bladewing.simulate.catalogue import AIRFRAMES
 from scipy.signal import hilbert

@@ -35,7 +35,7 @@ def test_the_power_is_that_of_scipys_stft():
 
 @pytest.mark.parametrize(("window_s", "overlap"), PAPER_SETTINGS)
 def test_the_storage_is_known_beforehand(window_s, overlap):
-    frames = stft(np.ones((2, PULSES)), **RADAR, window_s=window_s, overlap=overlap)
+    frames = stft(np.ones((2, PULSES), complex), **RADAR, window_s=window_s, overlap=overlap)
     assert frames.power.shape == (2, *stft_shape(PULSES, PRF_HZ, window_s, overlap))
     assert frames.power.nbytes == 2 * 4 * np.prod(stft_shape(PULSES, PRF_HZ, window_s, overlap))
 

@@ -22,9 +22,17 @@ def test_paper_radar_has_the_dwell_and_the_span_of_table_i():
         ("pulses", 0),
         ("pulses", 1.5),
         ("pulses", 64.0),
+        ("pulses", True),
     ],
 )
 def test_impossible_radars_are_refused_by_name(field, value):
     good = {"carrier_hz": 1e10, "prf_hz": 1e4, "pulses": 100}
     with pytest.raises(ValueError, match=field):
         Radar(**(good | {field: value}))
+
+
+def test_numbers_of_single_precision_do_not_make_the_radar_one():
+    """Phases of a range of kilometres need all digits of the wavelength."""
+    radar = Radar(np.float32(9.984e9), np.float32(35e3), np.int16(3000))
+    assert radar == Radar(float(np.float32(9.984e9)), 35e3, 3000)
+    assert (type(radar.wavelength_m), type(radar.dwell_s), type(radar.pulses)) == (float, float, int)
