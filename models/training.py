@@ -171,25 +171,8 @@ def train_network(
     # the stubs do not know this argument; channels last, a step takes a fifth less time on a CPU
     net.to(place, memory_format=torch.channels_last)  # type: ignore[call-overload]
     tensors = {name: _tensor(inputs[name]).to(place) for name in net.input_shapes}
-    said, classes_said = None, None
-    if teacher is not None:
-        said = torch.as_tensor(teacher, dtype=torch.float32)
-        classes_said = said @ nn.functional.one_hot(torch.tensor(net.kinds)).float()
-    truth = _target(y, classes_said, place)
-    kind_truth = None if kinds is None else _target(kinds, said, place)
-    matrices = [weights for weights in net.parameters() if weights.ndim > 1]
-    others = [weights for weights in net.parameters() if weights.ndim <= 1]
-    optimisers = (
-        Muon(matrices, lr=learning_rate, weight_decay=weight_decay),
-        torch.optim.Adam(others, lr=ADAM * learning_rate),
-    )
-    planned = max(3, epochs * steps)
-    rise = max(RISE, 2 / planned)  # a rise of one step has no length
-    schedules = tuple(
-        OneCycleLR(optimiser, optimiser.defaults["lr"], planned, pct_start=rise, cycle_momentum=False)
-        for optimiser in optimisers
-    )
-    criterion = nn.CrossEntropyLoss(label_smoothing=label_smoothing)
+    loss_of = _Loss(net, y, kinds, teacher, label_smoothing, place)
+    optimisers, schedules = _scheduled(net, max(3, epochs * steps), learning_rate, weight_decay)
     rng = torch.Generator().manual_seed(seed)
     work = Work(net, optimisers, schedules, rng)
     if snapshot is not None:
@@ -205,10 +188,7 @@ def train_network(
                 part = augment(part, rng)
             with torch.autocast(place.type, torch.bfloat16, enabled=bfloat16):
                 kind_scores = net.kind_scores(*(part[name] for name in net.input_shapes))
-            kind_scores = kind_scores.float()
-            loss = criterion(net.class_scores(kind_scores), truth[rows])
-            if kind_truth is not None:
-                loss = loss + criterion(kind_scores, kind_truth[rows])
+            loss = loss_of(kind_scores.float(), rows)
             net.zero_grad(set_to_none=True)
             loss.backward()
             rate = optimisers[0].param_groups[0]["lr"]
@@ -216,13 +196,10 @@ def train_network(
                 optimiser.step()
                 schedule.step()
             total += loss.detach()
-        scores = torch.from_numpy(network_scores(net, validation[0]))
-        labels = torch.as_tensor(validation[1], dtype=torch.int64)
         metrics = {
             "learning_rate": float(rate),
             "train_loss": float(total) / steps,
-            "validation_loss": float(nn.functional.cross_entropy(scores, labels)),
-            "validation_accuracy": float((scores.argmax(1) == labels).float().mean()),
+            **_validated(net, *validation),
             "seconds": time.perf_counter() - started,
         }
         work.add(metrics)
@@ -271,12 +248,65 @@ def network_scores(net: EvidenceNet, inputs: Inputs, batch: int = 1024) -> NDArr
     return torch.cat(scores).numpy()
 
 
+class _Loss:
+    """What a network is to say of the training records, their classes and, where it is told them, their kinds."""
+
+    def __init__(
+        self,
+        net: EvidenceNet,
+        y: NDArray[np.integer],
+        kinds: NDArray[np.integer] | None,
+        teacher: NDArray[np.floating] | None,
+        label_smoothing: float,
+        place: torch.device,
+    ) -> None:
+        self._net, self._criterion = net, nn.CrossEntropyLoss(label_smoothing=label_smoothing)
+        said, classes_said = None, None
+        if teacher is not None:
+            said = torch.as_tensor(teacher, dtype=torch.float32)
+            classes_said = said @ nn.functional.one_hot(torch.tensor(net.kinds)).float()
+        self._classes = _target(y, classes_said, place)
+        self._kinds = None if kinds is None else _target(kinds, said, place)
+
+    def __call__(self, kind_scores: Tensor, rows: Tensor) -> Tensor:
+        loss = self._criterion(self._net.class_scores(kind_scores), self._classes[rows])
+        return loss if self._kinds is None else loss + self._criterion(kind_scores, self._kinds[rows])
+
+
 def _target(labels: NDArray[np.integer], said: Tensor | None, place: torch.device) -> Tensor:
     """Labels, or with what a teacher says their mean with that."""
     truth = torch.as_tensor(labels, dtype=torch.int64)
     if said is not None:
         truth = TAUGHT * said + (1 - TAUGHT) * nn.functional.one_hot(truth, said.shape[1])
     return truth.to(place)
+
+
+def _scheduled(
+    net: EvidenceNet, planned: int, learning_rate: float, weight_decay: float
+) -> tuple[tuple[torch.optim.Optimizer, ...], tuple[OneCycleLR, ...]]:
+    """Muon for matrices and kernels, Adam for all else, and their rates over so many steps."""
+    matrices = [weights for weights in net.parameters() if weights.ndim > 1]
+    others = [weights for weights in net.parameters() if weights.ndim <= 1]
+    optimisers = (
+        Muon(matrices, lr=learning_rate, weight_decay=weight_decay),
+        torch.optim.Adam(others, lr=ADAM * learning_rate),
+    )
+    rise = max(RISE, 2 / planned)  # a rise of one step has no length
+    schedules = tuple(
+        OneCycleLR(optimiser, optimiser.defaults["lr"], planned, pct_start=rise, cycle_momentum=False)
+        for optimiser in optimisers
+    )
+    return optimisers, schedules
+
+
+def _validated(net: EvidenceNet, inputs: Inputs, y: NDArray[np.integer]) -> dict[str, float]:
+    """Loss and accuracy on records that are not learned from."""
+    scores = torch.from_numpy(network_scores(net, inputs))
+    labels = torch.as_tensor(y, dtype=torch.int64)
+    return {
+        "validation_loss": float(nn.functional.cross_entropy(scores, labels)),
+        "validation_accuracy": float((scores.argmax(1) == labels).float().mean()),
+    }
 
 
 def _tensor(values: NDArray[np.floating]) -> Tensor:

@@ -15,6 +15,9 @@ from .motion import TWO_PI
 from .radar import Radar
 from .target import Normals, Target
 
+#: Width of the line of ripples [m/s].
+BRAGG_WIDTH_MPS = 0.1
+
 
 def billingsley(wind_mph: ArrayLike, carrier_hz: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Billingsley's spectrum of wind-blown ground: P(v) = a/(a+1) delta(v) + 1/(a+1) (b/2) exp(-b |v|).
@@ -194,9 +197,9 @@ def draw_clutter(draws: Draws, radar: Radar, kind: str, normals: Normals) -> Tar
     mean, width = draws.value("sea_velocity_mps"), draws.value("sea_width_mps")
     psd = _gaussian(v, mean, width, radar)
     # The Bragg lines of receding and advancing ripples, and a burst of fast scatterers from a breaking wave.
-    bragg = bragg_mps(radar.wavelength_m)
-    for speed in (bragg, -bragg):
-        psd = psd + 0.3 * draws.uniform()[:, None] * _gaussian(v, np.full(len(draws), speed), 0.1 + 0 * width, radar)
+    for speed in bragg_mps(radar.wavelength_m) * np.array([1, -1]):
+        line = _gaussian(v, np.full(len(draws), speed), np.full(len(draws), BRAGG_WIDTH_MPS), radar)
+        psd = psd + 0.3 * draws.uniform()[:, None] * line
     breaking = np.where(draws.chance(0.35), draws.uniform(), 0.0)
     psd = psd + breaking[:, None] * _gaussian(v, mean * (1 + 2 * draws.uniform()), 2 * width, radar)
     shape = draws.value("texture_shape")

@@ -1,8 +1,18 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from bladewing.simulate import Radar
-from bladewing.simulate.clutter import _texture, billingsley, bragg_mps, draw_ground, process_velocities, shaped_noise
-from bladewing.simulate.laws import WIDTH, Draws
+from bladewing.simulate import Radar, clutter
+from bladewing.simulate.clutter import (
+    _texture,
+    billingsley,
+    bragg_mps,
+    draw_clutter,
+    draw_ground,
+    process_velocities,
+    shaped_noise,
+)
+from bladewing.simulate.laws import LAWS, WIDTH, Draws
 from bladewing.simulate.receiver import NormalsOf
 
 RADAR = Radar(9.85e9, 2e3, 500)
@@ -105,3 +115,31 @@ def test_ripples_are_driven_by_gravity_at_long_waves_and_by_tension_at_short_one
     assert min(speeds) == pytest.approx(0.231, abs=0.002)
     assert np.linspace(0.003, 0.3, 3000)[int(np.argmin(speeds))] == pytest.approx(0.0342, rel=0.03)
     assert bragg_mps(299792458 / 94e9) == pytest.approx(0.54, abs=0.01)
+
+
+def test_the_sea_is_its_own_line_those_of_its_ripples_and_at_times_breaking_waves(monkeypatch):
+    """Fixed at 1 m/s and narrow, each line stands apart: shares of the power at each are what was drawn."""
+    shapes = []
+    monkeypatch.setattr(clutter, "shaped_noise", lambda *given: shapes.append(given[2]) or np.zeros(1, np.complex64))
+    for name, value in {"sea_velocity_mps": 1.0, "sea_width_mps": 0.02}.items():
+        monkeypatch.setitem(LAWS, name, replace(LAWS[name], low=value, high=value))
+    count, radar = 2000, Radar(9.85e9, 1e3, 1500)
+    draws = Draws(np.random.default_rng(4).random((count, WIDTH)))
+    draw_clutter(draws, radar, "sea", normals(1))
+    (psd,) = shapes
+    v, ripple = process_velocities(radar), bragg_mps(radar.wavelength_m)
+    own = psd[:, abs(v - 1) < 0.08].sum(axis=1)
+    for sign in (-1, 1):  # of up to 0.3 of the sea's own power, each as much as it likes
+        share = psd[:, abs(v - sign * ripple) < ripple].sum(axis=1)
+        assert share.max() < 0.305
+        assert share.mean() == pytest.approx(0.15, abs=4 * 0.3 / np.sqrt(12 * count))
+    # waves break in 35 of 100, as strong as the sea at most, at one to three times its speed
+    breaking = psd[:, v > 1.1].sum(axis=1)
+    seen = breaking > 0.02
+    assert seen.mean() == pytest.approx(0.35 * 0.95 * 0.98, abs=0.05)
+    assert breaking.max() < 1.001
+    assert breaking[seen].mean() == pytest.approx(0.51, abs=4 * 0.3 / np.sqrt(seen.sum()))
+    fastest = v[np.where(psd > 1e-3, v, 0).argmax(axis=1)][seen]
+    assert 2.8 < fastest.max() < 3.0 + 4 * 0.04
+    assert np.mean(fastest) == pytest.approx(2.15, abs=0.1)
+    assert np.all(own > 0.99)

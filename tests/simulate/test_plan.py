@@ -380,3 +380,27 @@ def test_the_plan_counts_the_points_of_rows_and_those_that_stand_for_lines():
         assert found is not None
         if found.groups():
             assert int(found[2]) == 28 + 4 * int(found[1])
+
+
+@pytest.mark.parametrize("louder_db", [0.0, 25.0])
+def test_without_noise_a_plan_holds_all_against_the_digits_of_the_strongest_part(louder_db):
+    """Complex64 has 140 dB: what lies further under the body, 30 dB here, no rendering holds."""
+    scene = Scene.load("type1")
+    (part,) = scene.uav
+    body, rotor = part.body[0], part.rotors[0]
+    part = part.model_copy(
+        update={
+            "body": (body.model_copy(update={"level_db": body.level_db + louder_db}),),
+            "rotors": (rotor.model_copy(update={"flash_db": rotor.flash_db + louder_db}),),
+            "acceleration_mps2": 1.0,
+        }
+    )
+    noisy = Scene.build({**dict(scene), "uav": [part]})
+    silent = Scene.build({**dict(scene), "uav": [part], "off": ["noise"]})
+    for one, other in zip(noisy.plan().decisions, silent.plan().decisions, strict=True):
+        assert other.bound_db == pytest.approx(one.bound_db + 140 - 30 - louder_db, abs=1e-6)
+    assert sum(np.isfinite(decision.bound_db) for decision in silent.plan().decisions) >= 2
+    everything = silent.plan(tolerance_db=500.0)
+    assert not any(decision.kept for decision in everything.decisions)
+    assert "nothing is left out" not in everything.explain()
+    assert "nothing is left out" in noisy.plan(tolerance_db=-500.0).explain()
