@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bounds import open_zip, require_size
-from .errors import BadInput
+from .errors import BadInput, unreadable
 from .mat_file import require_sound
 
 ARRAY_SUFFIXES = (".npy", ".npz", ".mat")
@@ -89,7 +89,7 @@ def read_array(path: Path, variable: str | None = None) -> NDArray[np.generic]:
     except OSError as error:
         if error.errno is None:  # not the system's: the readers' word for a file that ends too early
             raise BadInput(_damaged(path, error)) from None
-        raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
+        raise unreadable(path, error) from None
     return _choose(arrays, variable, path)
 
 

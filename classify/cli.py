@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -28,13 +28,21 @@ app = typer.Typer(
 _LONGEST_LINE = 10_000
 
 Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]
-Config = Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Settings; the options given here come first.")]
+
+
+def _path_option(metavar: str, what: str, **more: Any) -> Any:
+    """An option that is a path; whether it can be read says who reads it, better than typer does."""
+    return typer.Option(metavar=metavar, readable=False, help=what, **more)
+
+
+Config = Annotated[Path | None, _path_option("FILE.toml", "Settings; the options given here come first.")]
 
 # What every command over recordings takes.
 Recordings = Annotated[
     list[Path],
     typer.Argument(
         metavar="RECORDING",
+        readable=False,
         help="SigMF (.sigmf-meta, .sigmf-data, their stem, or an archive .sigmf), .npy, .npz or .mat.",
         show_default=False,
     ),
@@ -160,7 +168,7 @@ def measure(
     dwell: MeasuredDwellS = 0.08,
     plot: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.svg", help="Draw the clearest dwell: spectrum, comb, band and notch."),
+        _path_option("FILE.svg", "Draw the clearest dwell: spectrum, comb, band and notch."),
     ] = None,
     carrier_hz: CarrierHz = None,
     prf_hz: PrfHz = None,
@@ -195,7 +203,7 @@ def measure(
 
 @app.command()
 def train(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the models and train.json go.")] = Path("out"),
+    out: Annotated[Path, _path_option("DIR", "Where the models and train.json go.")] = Path("out"),
     config: Config = None,
     records: Annotated[
         int | None,
@@ -205,7 +213,7 @@ def train(
     quick: Annotated[bool, typer.Option("--quick", help="Few records and epochs: a try, not a model to use.")] = False,
     data: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Read the records from what `bladewing dataset` wrote, instead of drawing."),
+        _path_option("DIR", "Read the records from what `bladewing dataset` wrote, instead of drawing."),
     ] = None,
 ) -> None:
     """Train all models on synthetic records and write them as ONNX; interrupted, the same command goes on."""
@@ -218,7 +226,9 @@ def train(
 
 @app.command()
 def dataset(
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the data set: new, or to be gone on with.")],
+    out: Annotated[
+        Path, typer.Argument(metavar="OUT", readable=False, help="Folder of the data set: new, or to be gone on with.")
+    ],
     records: Annotated[
         int, typer.Option(metavar="N", min=LEAST_RECORDS, help="Records to train on; the other sets follow from it.")
     ],
@@ -234,7 +244,9 @@ def dataset(
 
 @app.command()
 def export(
-    out: Annotated[Path, typer.Argument(metavar="OUT.onnx", help="The graph to write.", show_default=False)],
+    out: Annotated[
+        Path, typer.Argument(metavar="OUT.onnx", readable=False, help="The graph to write.", show_default=False)
+    ],
     carrier_hz: Annotated[float, typer.Option(metavar="F", help="Carrier [Hz].", show_default=False)],
     prf_hz: Annotated[float, typer.Option(metavar="F", help="PRF [Hz].", show_default=False)],
     pulses: Annotated[int, typer.Option(metavar="N", min=1, help="Pulses of a record.", show_default=False)],
@@ -259,10 +271,10 @@ def export(
 
 @app.command()
 def report(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where report.html and report.json go.")] = Path("out"),
+    out: Annotated[Path, _path_option("DIR", "Where report.html and report.json go.")] = Path("out"),
     quick: Annotated[bool, typer.Option("--quick", help="Fewer records and shorter timings.")] = False,
     models: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of .onnx files.", show_default="the shipped models")
+        Path | None, _path_option("DIR", "Folder of .onnx files.", show_default="the shipped models")
     ] = None,
     seed: Seed = None,
     config: Config = None,
@@ -281,9 +293,7 @@ def simulate(
         str,
         typer.Argument(metavar="SCENE.toml", help="A scene file, or the name of a shipped scene.", show_default=False),
     ],
-    out: Annotated[
-        Path | None, typer.Option(metavar="NAME", help="The recording: NAME.sigmf-data and NAME.sigmf-meta.")
-    ] = None,
+    out: Annotated[Path | None, _path_option("NAME", "The recording: NAME.sigmf-data and NAME.sigmf-meta.")] = None,
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Root of all randomness.")] = 0,
     explain: Annotated[
         bool,
@@ -319,19 +329,18 @@ def simulate(
     for warning in told:
         complain(f"{scene}: {warning}", kind="warning")
     plan = None if full else found.plan(seed, tolerance_db=tolerance_db)
-    if explain:
-        print(plan.explain() if plan else "full fidelity: nothing is left out", flush=True)
+    said = [plan.explain() if plan else "full fidelity: nothing is left out"] if explain else []
     if out is not None:
         rendering = render(found, seed, plan=plan)
         for warning in rendering.warnings[len(told) :]:  # what shows as it is drawn
             complain(f"{scene}: {warning}", kind="warning")
-        written = write_rendering(out, rendering, found, seed)
-        print("\n".join(str(path) for path in written), flush=True)
+        said += [str(path) for path in write_rendering(out, rendering, found, seed)]
+    print("\n".join(said), flush=True)  # at the end: whoever reads the first line alone has the recording as well
 
 
 @app.command()
 def stability(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where stability.json, .md and .html go.")] = Path("out"),
+    out: Annotated[Path, _path_option("DIR", "Where stability.json, .md and .html go.")] = Path("out"),
     quick: Annotated[bool, typer.Option("--quick", help="Leave out what takes minutes.")] = False,
 ) -> None:
     """Take every stage to its extremes: errors against a more precise oracle, and the guard that acts there."""
@@ -342,7 +351,7 @@ def stability(
 
 @app.command()
 def tables(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where tables.md and tables.json go.")] = Path("out"),
+    out: Annotated[Path, _path_option("DIR", "Where tables.md and tables.json go.")] = Path("out"),
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Root of the scenes' noise.")] = 0,
 ) -> None:
     """Make the paper's tables again: its theory and measurements beside those of this product."""

@@ -20,7 +20,7 @@ from typing import Any
 from bladewing.simulate import Radar, draw_records, stream
 from bladewing.simulate.dataset import KIND_CLASS, RADAR_GROUP, Records, draw_radar
 
-from .errors import BadInput
+from .errors import BadInput, unreadable
 from .files import clear_litter, only_writer, read_bounded, settle, write_whole
 from .gather import in_order
 from .progress import Progress
@@ -294,7 +294,7 @@ def _read_manifest(folder: Path) -> tuple[Plan, dict[str, Contents], str] | None
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
-        raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
+        raise unreadable(path, error) from None
     except (ValueError, RecursionError) as error:
         raise BadInput(f"{path}: not the manifest of a data set: {error or 'nested too deep'}") from None
     try:

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 NEAR_STEPS, NEAR_SHARE = 2.1, 0.5
 
 #: They are so many, and not chance, likelier than this: of two channels 25 places lie so near, each about as likely as
-#: 0, of one channel 5, so that it takes six of one. Samples that are hardly ever alike have no such places.
+#: 0, of one channel 5, so that it takes six of one. Samples that are hardly ever alike have no such places: one 0 is a
+#: lost pulse.
 LEAST_LOST, CHANCE, PLACES, PLACES_OF_ONE, ALIKE = 3, 1e-4, 25, 5, 0.01
 
 #: More zeros in a row are silence, which is no comb, and too long to be filled in.
@@ -50,7 +51,7 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     lost = none.copy()
     lost[~there] = np.repeat(runs, runs) <= MOST_IN_A_ROW
     zeros = int(lost.sum())
-    if zeros < LEAST_LOST or not there.any():
+    if not zeros or not there.any():
         return none
     held = np.sort(size[there])
     steps = np.diff(held)
@@ -65,7 +66,8 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     near = int(np.searchsorted(held, nearly, side="right"))
     places = PLACES if iq.real.any() and iq.imag.any() else PLACES_OF_ONE
     stepless = 1 - (len(steps) + 1) / len(held) < ALIKE
-    return lost if zeros > NEAR_SHARE * near and (stepless or _chance(zeros, near, 1 / places) < CHANCE) else none
+    no_chance = stepless or (zeros >= LEAST_LOST and _chance(zeros, near, 1 / places) < CHANCE)
+    return lost if zeros > NEAR_SHARE * near and no_chance else none
 
 
 def _chance(zeros: int, near: int, share: float) -> float:

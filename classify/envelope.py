@@ -96,7 +96,7 @@ class Envelope:
                     )
             return (
                 f"carrier {carrier_hz / 1e9:g} GHz is outside {self.carrier_min_hz / 1e9:g} to "
-                f"{self.carrier_max_hz / 1e9:g} GHz, the bands this model was trained for: use or train another model"
+                f"{self.carrier_max_hz / 1e9:g} GHz, the bands that models are trained for: of others nothing is known"
             )
         if prf_hz < self.prf_min_hz:
             in_khz = self.prf_min_hz <= prf_hz * 1e3 <= self.prf_max_hz

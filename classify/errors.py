@@ -14,6 +14,11 @@ class BadInput(ValueError):  # noqa: N818 - it is the user's input that is bad
         super().__init__(one_line(message))
 
 
+def unreadable(path: object, error: OSError, cure: str = "name a file that can be read") -> BadInput:
+    """What the system says of a file that it did not read; it knows which of several it was."""
+    return BadInput(f"{error.filename or path}: cannot be read: {error.strerror or error}: {cure}")
+
+
 class Interrupted(Exception):  # noqa: N818 - no error: the user stopped it
     """A long run was stopped by Ctrl-C, and goes on from what it has kept."""
 

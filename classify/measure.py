@@ -3,7 +3,7 @@
 import math
 import os
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
 from bladewing.features.measure import MOST_BLADES_GIVEN, beyond_radars, measure
 from bladewing.features.measurements import BODY, EACH_ROTOR, Measurements
+from bladewing.features.one_channel import made_analytic
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
 from .errors import BadInput
@@ -244,7 +245,7 @@ def checked_plot(path: Path | None) -> None:
     Raises
     ------
     BadInput
-        It is no .svg file, or there is no such folder.
+        It is no .svg file, or none can be written there.
     """
     if path is None:
         return
@@ -252,6 +253,9 @@ def checked_plot(path: Path | None) -> None:
         raise BadInput(f"--plot {path}: the drawing is SVG: name a file that ends in .svg")
     if not path.parent.is_dir():
         raise BadInput(f"--plot {path}: there is no folder {path.parent}: name a file in an existing folder")
+    if path.is_dir() or not os.access(path.parent, os.W_OK):
+        what = "is a directory" if path.is_dir() else f"nothing can be written into {path.parent}"
+        raise BadInput(f"--plot {path}: {what}: name a file that can be written")
 
 
 def measure_recording(recording: Recording, settings: Settings, progress: Progress | None = None) -> Measured:
@@ -275,6 +279,8 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
         raise BadInput(f"{recording.name}: 1 pulse: a measurement needs at least 2")
     if beyond := beyond_radars(recording.carrier_hz, recording.prf_hz):
         raise BadInput(f"{recording.name}: {beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3")
+    # as a whole: dwells made so would each have ends of their own
+    given, recording = recording, replace(recording, iq=made_analytic(recording.iq))
     iq = recording.dwells(settings.dwell_s, least=2)
     count, pulses = iq.shape
     radar = {"carrier_hz": recording.carrier_hz, "prf_hz": recording.prf_hz}
@@ -286,7 +292,7 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     long = len(recording.iq) >= LEAST_S * recording.prf_hz
     beat = wingbeat(recording.iq, **radar) if long else None
     stop_s = start_s + pulses / recording.prf_hz
-    remarks = recording.remarks(settings.dwell_s, iq)
+    remarks = given.remarks(settings.dwell_s, iq, measured=True)
     return Measured(recording, iq, start_s, stop_s, values, acceleration, acceleration_std, beat, remarks)
 
 

@@ -6,12 +6,13 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from bladewing.features.one_channel import one_channel
 from numpy.typing import NDArray
 
 from .arrays import ARRAY_SUFFIXES, read_array
 from .clipping import clipped_values
 from .dropouts import filled, longest_silence, lost_pulses
-from .errors import BadInput
+from .errors import BadInput, unreadable
 from .samples import complex_samples, positive
 from .sigmf_file import find_sigmf, read_sigmf
 
@@ -34,6 +35,11 @@ class Recording:
         Time of the first sample [s]; above 0 where a SigMF file says that it goes on from an earlier one.
     filled_in
         How many pulses were lost, and are filled in from those beside them.
+
+    Raises
+    ------
+    BadInput
+        The samples are no complex numbers, not finite, none or of several cells, or a frequency is not above 0.
     """
 
     name: str
@@ -42,6 +48,14 @@ class Recording:
     prf_hz: float
     start_s: float = 0.0
     filled_in: int = 0
+
+    def __post_init__(self) -> None:
+        iq = complex_samples(self.iq, self.name)
+        if iq.ndim != 1 or not len(iq):
+            raise BadInput(f"{self.name}: samples of shape {iq.shape}: give those of one range cell, (pulses,)")
+        object.__setattr__(self, "iq", iq)
+        for name in ("carrier_hz", "prf_hz"):
+            object.__setattr__(self, name, positive(getattr(self, name), f"{self.name}: {name}"))
 
     def dwells(self, dwell_s: float, least: int = 1) -> NDArray[np.complex64]:
         """Cut the recording into dwells that follow one another; a rest shorter than a dwell is left out.
@@ -95,13 +109,16 @@ class Recording:
         left_out_s = self.left_out_s(dwells)
         return f"the last {left_out_s:.2g} s, shorter than a dwell, are left out" if left_out_s else ""
 
-    def remarks(self, dwell_s: float, dwells: NDArray[np.complex64]) -> tuple[str, ...]:
-        """What is to be known of the recording beside its answer: `cut_sentence`, and what ails its samples."""
+    def remarks(self, dwell_s: float, dwells: NDArray[np.complex64], *, measured: bool = False) -> tuple[str, ...]:
+        """What is to be known of the recording beside its answer: `cut_sentence`, and what ails its samples.
+
+        What that means is another thing for what was `measured` than for labels.
+        """
         said = [self.cut_sentence(dwell_s, dwells)]
         if self.clipped:
             said.append(
                 f"clipped: {self.clipped} values of I and Q stand at the converter's largest, which makes lines that "
-                "are no target's, so that no comb that stays is counted: lower the gain"
+                f"are no target's, so that {'tips may come out too fast' if measured else _UNCOUNTED}: lower the gain"
             )
         if self.filled_in:
             said.append(
@@ -119,13 +136,19 @@ class Recording:
                 f"silence: {silent} pulses in a row are exactly 0 from {self.start_s + start / self.prf_hz:.6g} s on, "
                 "too many to be filled in: what is said of dwells in which they lie is of less than a dwell"
             )
-        if self.iq.real.any() != self.iq.imag.any():
+        if one_channel(self.iq):
+            what = "Q is 0 in every pulse" if not self.iq.imag.any() else "I is 0 in every pulse"
+            what = what if not (self.iq.real.any() and self.iq.imag.any()) else "Q is the same as I"
             said.append(
-                f"one channel: {'Q' if self.iq.real.any() else 'I'} is 0 in every pulse, so that both sides of the "
-                "spectrum are one and noise may pass for a comb: record I and Q, or make it analytic "
-                "(scipy.signal.hilbert)"
+                f"one channel: {what}, so that both sides of the spectrum are one and "
+                + ("no band is told: record I and Q" if measured else _MISTAKEN)
             )
         return tuple(sentence for sentence in said if sentence)
+
+
+#: What clipped and single channels do to labels.
+_UNCOUNTED = "no comb that stays is counted"
+_MISTAKEN = "noise may pass for a comb: record I and Q, or make it analytic (scipy.signal.hilbert)"
 
 
 def load_recording(
@@ -153,7 +176,7 @@ def load_recording(
         The file is missing, damaged or cut short, holds no finite complex samples of one range cell, or lacks the
         carrier or the PRF, or contradicts the ones given. Nothing is ever unpickled.
     """
-    name = os.fspath(path)
+    name = os.fspath(path).encode("utf-8", "backslashreplace").decode()  # or JSON that holds it would be no UTF-8
     found = find_recording(path)
     if found.suffix.lower() in ARRAY_SUFFIXES:
         samples, file_carrier_hz, file_prf_hz, first = read_array(found, variable), None, None, 0
@@ -202,7 +225,7 @@ def find_recording(path: str | os.PathLike[str]) -> Path:
         if not given.exists():
             raise BadInput(f"{path}: no such file, and no {given.name}.sigmf-meta beside it")
     except OSError as error:
-        raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
+        raise unreadable(path, error) from None
     if given.suffix.lower() not in ARRAY_SUFFIXES:
         raise BadInput(f"{path}: not a kind of recording known here: give SigMF, {', '.join(ARRAY_SUFFIXES)}")
     return given

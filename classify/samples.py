@@ -1,6 +1,7 @@
 """What every array of IQ samples must be, wherever it comes from."""
 
 import math
+from numbers import Real
 
 import numpy as np
 from bladewing.features.spectrum import FILL_IN
@@ -8,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import BadInput
 
-_TRUTHS, _NUMBERS = (bool, np.bool_), (int, float, np.integer, np.floating)
 _COMPLEX64 = np.dtype(np.complex64)
 
 
@@ -30,7 +30,10 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
     if np.ma.is_masked(values):
         hidden = np.ma.count_masked(values)
         raise BadInput(f"{name}: {hidden} samples are masked: every sample counts: {FILL_IN}")
-    given = np.asarray(values)
+    try:
+        given = np.asarray(values)
+    except ValueError:
+        raise BadInput(f"{name}: rows of unequal length: every record must have as many pulses") from None
     if given.dtype.names is not None:
         fields = list(given.dtype.names)
         one, other = fields if len(fields) == 2 else ("re", "im")
@@ -75,7 +78,9 @@ def positive(value: object, name: str) -> float:
     BadInput
         It is not; `name` (with its unit) says what.
     """
-    if isinstance(value, _TRUTHS) or not isinstance(value, _NUMBERS):
+    if isinstance(value, np.ndarray) and value.ndim == 0:  # as an .npz file gives it
+        value = value.item()
+    if isinstance(value, bool) or not isinstance(value, Real):
         raise BadInput(f"{name} is {value!r}: it must be a number above 0")
     try:
         number = float(value)

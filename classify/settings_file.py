@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from .bounds import MOST_TEXT_BYTES
-from .errors import BadInput
+from .errors import BadInput, unreadable
 from .files import read_bounded
 
 Settings = TypeVar("Settings", bound=BaseModel)
@@ -78,6 +78,6 @@ def _read(file: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(read_bounded(file, MOST_TEXT_BYTES).decode("utf-8-sig"))  # some editors begin with a mark
     except OSError as error:
-        raise BadInput(f"{file}: cannot be read: {error.strerror}: give the path of a TOML file") from None
+        raise unreadable(file, error, "give the path of a TOML file") from None
     except (ValueError, RecursionError) as error:  # too large, not UTF-8, not TOML, or nested beyond reason
         raise BadInput(f"{file}: not TOML: {error}") from None

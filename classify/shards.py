@@ -17,7 +17,7 @@ from bladewing.simulate import CLASSES, Radar
 from bladewing.simulate.dataset import KIND_CLASS, TRUTH_UNITS, Records
 from numpy.typing import NDArray
 
-from .errors import BadInput
+from .errors import BadInput, unreadable
 from .files import read_bounded, write_whole
 
 #: Samples, one behind the other.
@@ -167,7 +167,7 @@ def _read(folder: Path, name: str, contents: Contents) -> tuple[NDArray[np.compl
         except FileNotFoundError:
             raise BadInput(f"{path}: missing: write the data set again, or copy it whole") from None
         except OSError as error:
-            raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
+            raise unreadable(path, error) from None
         except ValueError as error:
             raise BadInput(f"{path}: altered or damaged: {error}: write it again") from None
         if hashlib.sha256(content).hexdigest() != sha256:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bounds import MOST_TEXT_BYTES, open_zip, require_size, unpacked
-from .errors import BadInput
+from .errors import BadInput, unreadable
 from .files import read_bounded, settle
 from .samples import positive
 
@@ -109,7 +109,7 @@ def read_sigmf(path: Path) -> SigmfSamples:
         try:
             return _read_pair(path) if path.name.endswith(_META) else _read_archive(path)
         except OSError as error:
-            raise BadInput(f"{path}: cannot be read: {error.strerror or error}") from None
+            raise unreadable(path, error) from None
 
 
 def _read_pair(path: Path) -> SigmfSamples:
@@ -218,7 +218,7 @@ def _check_structure(metadata: Any, path: Path) -> None:
     if match is None:
         raise BadInput(
             f"{path}: core:datatype is {datatype!r}: it must be the SigMF type of the samples, such as 'cf32_le' "
-            "(c for complex; f, i or u; 8, 16, 32 or 64 bits; _le or _be)"
+            "(c for complex; f of 32 or 64 bits, i or u of 8, 16, 32 or 64; _le or _be)"
         )
     if match[1] == "r":
         raise BadInput(

@@ -10,7 +10,6 @@ from .notch import parabola_offset
 from .spectrum import (
     LEAST_PART,
     SPEED_OF_LIGHT_MPS,
-    as_complex,
     finite_complex,
     largest_part,
     require_radar,
@@ -144,9 +143,10 @@ def without_acceleration(
     Raises
     ------
     ValueError
-        If `iq` is not complex or holds no pulse, the frequencies are not positive, or an acceleration is not finite.
+        If `iq` is not complex, holds no pulse or a value that is not finite, the frequencies are not positive, or an
+        acceleration is not finite.
     """
-    samples = as_complex(iq)
+    samples = finite_complex(iq)
     carrier_hz, prf_hz = require_radar(carrier_hz, prf_hz)
     acceleration = np.asarray(acceleration_mps2, np.float64)[..., None]
     if not np.isfinite(acceleration).all():

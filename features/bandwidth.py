@@ -10,9 +10,6 @@ from .spectrum import Spectrum, ones, sums
 #: Share of the residual energy left out on each side of the energy band.
 TAIL_SHARE = 0.025
 
-#: A side of the spectrum so far below the noise of the other is empty; one bin in so many does not count at either end.
-EMPTY_SHARE, ENDS = 1e-2, 50
-
 #: Bins summed together before the energy is followed bin by bin, where it matters.
 _BLOCK = 32
 _WITHIN_BLOCK = np.arange(_BLOCK)
@@ -56,29 +53,6 @@ def threshold_band_hz(
     low = frequency[over.argmax(axis=-1)]
     high = frequency[spectrum.bins - 1 - over[..., ::-1].argmax(axis=-1)]
     return low * some, high * some
-
-
-def half_empty(relative_power: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """True where one side of the spectrum holds nothing: one channel, made analytic, has both sides folded onto one.
-
-    Parameters
-    ----------
-    relative_power : ndarray of float32, shape (..., bins)
-        Centred power spectra, any unit.
-
-    Returns
-    -------
-    ndarray of bool, shape (...)
-        All of one side, but for its ends, lies `EMPTY_SHARE` under what three quarters of the other's bins are over:
-        noise, also where a fast body's lines are all there.
-    """
-    bins = relative_power.shape[-1]
-    middle, end = bins // 2, max(bins // ENDS, 4)
-    if middle <= 2 * end:
-        return np.zeros(relative_power.shape[:-1], bool)
-    sides = relative_power[..., end : middle - end], relative_power[..., middle + end : bins - end]
-    noise = np.max([np.quantile(side, 0.25, axis=-1) for side in sides], axis=0)
-    return np.asarray(np.min([side.max(axis=-1) for side in sides], axis=0) < EMPTY_SHARE * noise)
 
 
 def energy_band_mps(

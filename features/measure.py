@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from .allocator import keep_freed
 from .measure_record import measure_record
 from .measurements import EACH_ROTOR, Measurements
+from .one_channel import made_analytic
 from .one_thread import one_thread
 from .rotors import MAX_ROTORS
 from .spectrum import doppler_spectrum, finite_complex
@@ -43,7 +44,8 @@ def measure(
     Parameters
     ----------
     iq : array_like of complex, shape (..., pulses)
-        Slow-time samples of one range cell, any gain.
+        Slow-time samples of one range cell, any gain. Of one channel, I without Q, what both sides of the spectrum
+        share is measured, and no band.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz], within `CARRIER_RANGE_HZ` and `PRF_RANGE_HZ`.
     blades : int, optional
@@ -74,7 +76,7 @@ def measure(
     if beta_rad is not None and not 0 <= beta_rad < np.pi / 2:
         raise ValueError(f"beta_rad is {beta_rad!r}: it must be at least 0 and below pi/2 [rad]")
     blades = None if blades is None else int(blades)
-    samples = finite_complex(iq, least=2)
+    samples = made_analytic(finite_complex(iq, least=2))
     shape = samples.shape[:-1]
     some = samples if samples.size else np.zeros((1, *samples.shape[-1:]), np.complex64)  # of none, fields of no length
     spectrum = doppler_spectrum(some, carrier_hz=carrier_hz, prf_hz=prf_hz)

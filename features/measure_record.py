@@ -180,7 +180,7 @@ def _band(family: Family, edge: tuple[float, float], beta_rad: float | None) -> 
     tip, tip_std = away * mps / cosine, std * mps / cosine
     if tip - EDGE_DEVIATIONS * tip_std > FASTEST_TIP_MPS:
         why = (
-            f"no tip speed: beta of {np.rad2deg(beta_rad or 0.0):.4g} deg makes it {tip:.0f} m/s, faster than any "
+            f"no tip speed: beta of {np.rad2deg(beta_rad or 0.0):.7g} deg makes it {tip:.0f} m/s, faster than any "
             "blade's tip: give another angle, or none"
         )
         tip = tip_std = np.nan

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .bandwidth import half_empty
 from .bodies import within
 from .clicks import without_clicks
 from .evidence import Evidence, line_evidence
 from .lines import LineSpace, squared
 from .octaves import over_neighbours
+from .one_channel import half_empty
 from .slow_lines import remove_bands
 from .spectrum import Spectrum, doppler_spectrum
 from .strong_lines import strong_lines

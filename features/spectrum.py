@@ -282,14 +282,15 @@ def per_floor(floor: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def safe_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """`unit_scale`, or 1 for all records where none needs it: it changes no digit, and to scale is a pass more."""
+    """`unit_scale` of the records that need it, 1 of the others: it changes no digit, and to scale is a pass more."""
     parts = np.ascontiguousarray(iq).view(np.float32)
     with np.errstate(over="ignore", under="ignore"):
         energy = np.vecdot(parts, parts)
     least, most = _SAFE_ENERGY
-    if np.count_nonzero((energy > least) & (energy < most)) == energy.size:
+    safe = (energy > least) & (energy < most)
+    if np.count_nonzero(safe) == energy.size:
         return ones(energy.size).reshape(*energy.shape, 1)
-    return unit_scale(iq)
+    return np.where(safe[..., None], np.float32(1), unit_scale(iq))
 
 
 def noise_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -382,6 +383,12 @@ def require_radar(carrier_hz: float, prf_hz: float) -> tuple[float, float]:
         if not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
     return float(carrier_hz), float(prf_hz)
+
+
+def noise_shows(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
+    """True where there is noise between the lines, of samples (..., pulses): more than `LEAST_FLOOR`, shape (...)."""
+    power = power_of(centred_transform(scaled(iq, unit_scale(iq))))
+    return np.asarray(noise_floor(power) > sums(power) * (LEAST_FLOOR / np.float32(power.shape[-1])), np.bool_)
 
 
 def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spectrum:

@@ -151,12 +151,9 @@ def draw_records(
     ValueError
         If `purpose` or `kind` is unknown, or `count`, `seed` or `start` is negative.
     """
-    _require_purpose(purpose)
+    _require(purpose, count=count, seed=seed, start=start)
     if kind is not None and kind not in KIND_CLASS:
         raise ValueError(f"kind is {kind!r}: it must be one of {', '.join(KIND_CLASS)}")
-    for name, value in (("count", count), ("seed", seed), ("start", start)):
-        if value < 0:
-            raise ValueError(f"{name} is {value}: it must not be negative")
     iq = np.empty((count, radar.pulses), np.complex64)
     kinds = np.empty(count, dtype="<U16")
     truth = {name: np.full(count, np.nan) for name in TRUTH_UNITS}
@@ -169,9 +166,13 @@ def draw_records(
     return Records(radar, iq, labels, {"kind": kinds, **truth})
 
 
-def _require_purpose(purpose: str) -> None:
+def _require(purpose: str, **numbers: int) -> None:
+    """A purpose that is one, and numbers that are not negative."""
     if purpose not in PURPOSES:
         raise ValueError(f"purpose is {purpose!r}: it must be one of {', '.join(PURPOSES)}")
+    for name, value in numbers.items():
+        if value < 0:
+            raise ValueError(f"{name} is {value}: it must not be negative")
 
 
 def draw_radar(seed: int, purpose: str, group: int) -> Radar:
@@ -191,9 +192,9 @@ def draw_radar(seed: int, purpose: str, group: int) -> Radar:
     Raises
     ------
     ValueError
-        If `purpose` is unknown.
+        If `purpose` is unknown, or `seed` or `group` is negative.
     """
-    _require_purpose(purpose)
+    _require(purpose, seed=seed, group=group)
     sequence = SeedSequence(seed, spawn_key=(PURPOSES[purpose], _RADAR_STREAM + group))
     u = Generator(Philox(sequence)).random(4)
     carrier = float(LAWS["carrier_hz"](u[0]))
@@ -218,7 +219,13 @@ def stream(seed: int, purpose: str, count: int, *, start: int = 0) -> Iterator[R
     ------
     Records
         One radar's share of the records, in order.
+
+    Raises
+    ------
+    ValueError
+        At the first record asked for, if `purpose` is unknown or a number is negative.
     """
+    _require(purpose, count=count, seed=seed, start=start)
     at, stop = start, start + count
     while at < stop:
         group = at // RADAR_GROUP

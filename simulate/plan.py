@@ -80,7 +80,9 @@ class Decision:
         if self.bound_db == -np.inf:
             return f"{self.part}: {what}: not in this scene"
         verdict = "kept" if self.kept else f"left out ({instead})"
-        return f"{self.part}: {what}: {verdict}; leaving it out changes at most {self.bound_db:+.1f} dB re noise"
+        line = f"{self.part}: {what}: {verdict}; leaving it out changes at most {self.bound_db:+.1f} dB re noise"
+        anew = self.effect == "converter" and self.kept
+        return f"{line}; what it rounds anew of a changed record is counted nowhere" if anew else line
 
 
 @dataclass(frozen=True)

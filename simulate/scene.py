@@ -68,10 +68,10 @@ class Scene(Setting):
         SceneError
             It cannot be read, is not TOML, or a field is wrong.
         """
-        name = os.fspath(path)
+        name = os.fspath(path) or repr("")
         file: Any = Path(path)
         try:
-            if not file.exists() and name in shipped():
+            if not file.is_file() and name in shipped():
                 file = files("bladewing.simulate") / "scenes" / f"{name}.toml"
             if isinstance(file, Path) and file.exists() and not (file.is_file() and file.stat().st_size <= _MOST_BYTES):
                 raise ValueError(f"it must be a file of at most {_MOST_BYTES} bytes")

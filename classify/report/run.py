@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ..bounds import MOST_MODEL_BYTES, MOST_TEXT_BYTES
 from ..dataset import simulator_digest
-from ..errors import BadInput
+from ..errors import BadInput, unreadable
 from ..files import read_bounded, result_folder, settle, write_together
 from ..gather import inputs_digest
 from ..inference import Classifier
@@ -264,7 +264,7 @@ def training_account(folder: Path | None) -> dict[str, Any] | None:
     except (ValueError, RecursionError) as error:
         raise BadInput(f"{file}: not JSON: {error}: remove it or train again") from None
     except OSError as error:
-        raise BadInput(f"{file}: cannot be read: {error.strerror}: remove it or train again") from None
+        raise unreadable(file, error, "remove it or train again") from None
     try:
         _training(found)
         _cascade({}, found)

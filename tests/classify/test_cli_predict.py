@@ -227,6 +227,25 @@ def test_the_summary_counts_the_unreadable(run, sigmf_pair, tmp_path):
     assert out.splitlines()[-1] == "2 recordings: 1 uav, 1 unreadable"
 
 
+def test_a_recording_that_may_not_be_read_does_not_stop_the_others(run, sigmf_pair, tmp_path, monkeypatch):
+    locked = tmp_path / "locked.npy"
+    for file in (locked, locked.with_name("other.npy")):
+        np.save(file, np.exp(0.3j * np.arange(2000)))
+    real = open
+
+    def refusing(path, *given, **more):
+        if path == locked:
+            raise PermissionError(13, "Permission denied", str(path))
+        return real(path, *given, **more)
+
+    monkeypatch.setattr("builtins.open", refusing)
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != locked)
+    code, out, err = run(locked, locked.with_name("other.npy"), "--carrier-hz", 10e9, "--prf-hz", 20e3)
+    assert (code, out.splitlines()[-1].split(":")[0]) == (2, "2 recordings")
+    assert err.count("\n") == 1
+    assert "locked.npy: cannot be read: Permission denied" in err
+
+
 def test_names_are_never_taken_for_markup_or_escape_codes(run, sigmf_pair):
     code, out, err = run(sigmf_pair("[bold]x\x1b[31m"))
     assert (code, err) == (0, "")

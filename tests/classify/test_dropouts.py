@@ -64,6 +64,17 @@ def test_nothing_at_all_and_nothing_lost_are_no_dropouts() -> None:
     assert not lost_pulses(np.zeros(0, np.complex64)).any()
 
 
+@pytest.mark.parametrize("lost", [[700], [0], [100, 1500], [40, 41]])
+def test_one_lost_pulse_is_enough_where_samples_have_no_steps(lost: list[int]) -> None:
+    """It stands 60 dB beside a strong line as noise that hides all blades."""
+    pulse = np.arange(2000)
+    iq = (1000 * np.exp(2j * np.pi * 0.003 * pulse) + noise(np.random.default_rng(2), 2000)).astype(np.complex64)
+    iq[lost] = 0
+    assert np.flatnonzero(lost_pulses(iq)).tolist() == lost
+    stepped = np.round(iq)
+    assert not lost_pulses(stepped.astype(np.complex64)).any() or len(lost) > 2
+
+
 def test_a_silence_is_no_lost_pulses() -> None:
     iq = noise(np.random.default_rng(5))
     iq[1000:2000] = 0
@@ -96,6 +107,10 @@ def test_a_recording_tells_of_a_channel_that_is_missing() -> None:
         recording = Recording("walk", part.astype(np.complex64), 24e9, 1e4)
         (said,) = recording.remarks(0.1, recording.dwells(0.1))
         assert said.startswith(f"one channel: {name} is 0 in every pulse")
+        (said,) = recording.remarks(0.1, recording.dwells(0.1), measured=True)
+        assert said.endswith("no band is told: record I and Q")
+    alike = Recording("walk", (iq.real * (1 - 1j)).astype(np.complex64), 24e9, 1e4)
+    assert alike.remarks(0.1, alike.dwells(0.1))[0].startswith("one channel: Q is the same as I")
     assert not Recording("walk", iq, 24e9, 1e4).remarks(0.1, iq.reshape(2, -1))
 
 
@@ -169,3 +184,5 @@ def test_of_a_recording_that_clips_no_comb_that_stays_is_counted(tmp_path) -> No
     assert "comb" not in given.shown  # of 80 Hz, four times the line's own
     assert set(given.dwells.labels) == {"unknown"}
     assert "no comb that stays is counted" in given.remarks[0]
+    recording = load_recording(tmp_path / "clipped.npy", carrier_hz=9.85e9, prf_hz=25e3)
+    assert "tips may come out too fast" in recording.remarks(0.08, recording.dwells(0.08), measured=True)[0]

@@ -16,10 +16,10 @@ C_MPS = 299_792_458.0
     [
         (9.39e9, 1e3, 1000, "unambiguous velocity 8.0 m/s is below 10 m/s (wavelength x PRF / 4): "
                             "raise the PRF to 1253 Hz or more"),
-        (1.2e9, 10e3, 1000, "carrier 1.2 GHz is outside 2 to 100 GHz, the bands this model was trained for: "
-                            "use or train another model"),
-        (101e9, 100e3, 1000, "carrier 101 GHz is outside 2 to 100 GHz, the bands this model was trained for: "
-                             "use or train another model"),
+        (1.2e9, 10e3, 1000, "carrier 1.2 GHz is outside 2 to 100 GHz, the bands that models are trained for: "
+                            "of others nothing is known"),
+        (101e9, 100e3, 1000, "carrier 101 GHz is outside 2 to 100 GHz, the bands that models are trained for: "
+                             "of others nothing is known"),
         (24.125, 10e3, 1000, "carrier 24.125 Hz is no radar's: give 24.125 GHz as 24.125e9"),
         (9850.0, 10e3, 1000, "carrier 9850 Hz is no radar's: give 9850 MHz as 9850e6"),
         (3e9, 25.0, 1000, "PRF 25 Hz is below 1000 Hz: give 25 kHz as 25e3, or raise the PRF to 1000 Hz or more"),

@@ -1,6 +1,7 @@
 import json
 import os
 from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -186,6 +187,7 @@ def test_a_record_of_zeros_is_unknown_and_leaves_the_others_alone(always_uav):
     [
         (np.ones(200), r"iq: real samples \(float64\): IQ must be complex"),
         ([1, 2, 3], r"iq: real samples \(int64\)"),
+        ([[1j], [1j, 2j]], "iq: rows of unequal length: every record must have as many pulses"),
         (np.r_[noise(99), np.nan], r"iq: sample 99 is .*nan.*must be finite"),
         (np.stack([noise(70), np.r_[noise(69), np.inf]]), r"iq: sample \(1, 69\) is .*inf"),
         (np.complex64(1), r"iq has shape \(\): it must be \(..., pulses\)"),
@@ -332,3 +334,12 @@ def test_samples_without_digits_are_unknown_with_the_reason(uav_model, gain):
     answer = Classifier.load(uav_model).predict(noise(200, (2,)).astype(complex) * gain, **RADAR)
     assert set(answer.labels) == {"unknown"}
     assert all("no digits left in float32" in reason for reason in answer.reasons)
+
+
+def test_frequencies_and_threads_may_be_numbers_of_any_kind(always_uav):
+    """As `.npz` files and pandas give them."""
+    for carrier_hz, prf_hz in ((np.array(9.85e9), np.array(20_000)), (Fraction(9_850_000_000), np.float32(20e3))):
+        assert np.all(always_uav.predict(noise(200), carrier_hz=carrier_hz, prf_hz=prf_hz).labels == "uav")
+    with pytest.raises(BadInput, match=r"carrier_hz is .*above 0"):
+        always_uav.predict(noise(200), carrier_hz=np.array([9.85e9]), prf_hz=20e3)
+    assert Classifier.load(threads=np.int64(1)).classes == always_uav.classes

@@ -1,4 +1,5 @@
 import json
+import os
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -289,3 +290,15 @@ def test_a_value_is_written_to_the_second_digit_of_its_error():
     assert with_error(0.123456, 0.0456) == "0.123 +- 0.046"
     assert with_error(12345.6, 789) == "12346 +- 789"
     assert with_error(1.0, float("nan")) == "-"
+
+
+def test_a_drawing_that_cannot_be_written_is_told_before_anything_is_measured(folder, tmp_path, capsys, monkeypatch):
+    (tmp_path / "taken.svg").mkdir()
+    assert main(["measure", str(folder / "drone.npy"), *RADAR, "--plot", str(tmp_path / "taken.svg")]) == 2
+    out, error = capsys.readouterr()
+    assert (out, error.count("\n")) == ("", 1)
+    assert "taken.svg: is a directory: name a file that can be written" in error
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert main(["measure", str(folder / "drone.npy"), *RADAR, "--plot", str(tmp_path / "new.svg")]) == 2
+    out, error = capsys.readouterr()
+    assert (out, "nothing can be written into" in error) == ("", True)

@@ -1,12 +1,13 @@
 """What every kind of recording must satisfy, and the carrier and the PRF. SigMF and arrays have files of their own."""
 
+import os
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from bladewing.classify.errors import BadInput
-from bladewing.classify.recording import find_recording, load_recording
+from bladewing.classify.errors import BadInput, unreadable
+from bladewing.classify.recording import Recording, find_recording, load_recording
 
 CARRIER_HZ, PRF_HZ = 10e9, 20e3
 RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
@@ -140,3 +141,39 @@ def test_all_names_of_a_sigmf_recording_stand_for_one(sigmf_pair):
     iq = [load_recording(name).iq for name in names]
     np.testing.assert_array_equal(iq[0], iq[1])
     np.testing.assert_array_equal(iq[0], iq[2])
+
+
+@pytest.mark.parametrize(
+    ("iq", "frequencies", "said"),
+    [
+        (noise(50, (1,)), {}, r"walk: samples of shape \(1, 50\): give those of one range cell"),
+        (noise(0), {}, r"walk: samples of shape \(0,\)"),
+        (noise(50).real, {}, "walk: real samples"),
+        (noise(50), {"prf_hz": -1.0}, "walk: prf_hz is -1"),
+        (noise(50), {"carrier_hz": "x"}, "walk: carrier_hz is 'x'"),
+    ],
+)
+def test_a_recording_of_ones_own_is_looked_at_as_a_files_is(iq, frequencies, said):
+    with pytest.raises(BadInput, match=said):
+        Recording("walk", iq, **(RADAR | frequencies))
+
+
+def test_samples_of_a_recording_of_ones_own_may_be_a_list():
+    recording = Recording("walk", noise(50).tolist(), np.float32(10e9), 20_000)
+    assert (recording.iq.dtype, type(recording.carrier_hz)) == (np.complex64, float)
+
+
+def test_a_file_that_the_system_does_not_give_is_named_itself():
+    """Of a SigMF recording one of two may be locked."""
+    locked = PermissionError(13, "Permission denied", "walk.sigmf-data")
+    said = "walk.sigmf-data: cannot be read: Permission denied: name a file that can be read"
+    assert str(unreadable("walk.sigmf-meta", locked)) == said
+    assert str(unreadable("walk", OSError("gone"), "look again")) == "walk: cannot be read: gone: look again"
+
+
+def test_a_name_that_is_no_text_can_be_written_as_text(tmp_path):
+    path = os.fsencode(tmp_path) + b"/drone\xff.npy"
+    with open(path, "wb") as file:
+        np.save(file, noise(100))
+    name = load_recording(os.fsdecode(path), **RADAR).name
+    assert name.encode().endswith(rb"/drone\udcff.npy")

@@ -136,4 +136,6 @@ def test_a_record_is_the_same_whatever_stands_beside_it(gain):
     alone = doppler_spectrum(iq[0], **RADAR)
     beside = doppler_spectrum(np.stack([iq[0], iq[1] * np.float32(gain)]), **RADAR)
     np.testing.assert_array_equal(beside.relative_power[0], alone.relative_power)
+    np.testing.assert_array_equal(beside.transform[0], alone.transform)
+    assert beside.scale[0] == alone.scale
     np.testing.assert_array_equal(beside.floor[0], alone.floor)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
-from bladewing.features.bandwidth import half_empty
 from bladewing.features.measure_record import ONE_CHANNEL
+from bladewing.features.one_channel import half_empty, made_analytic, one_channel
 from scipy.signal import hilbert
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, white
@@ -60,6 +60,34 @@ def test_one_channel_made_analytic_has_no_band(velocity_mps):
     assert found.chopping_hz == pytest.approx(114.6, rel=0.01)
     # nothing is even about the body any more: its own line tells, whose side is anyone's guess
     assert np.abs(found.body_velocity_mps) == pytest.approx(abs(velocity_mps), abs=0.05)
+
+
+@pytest.mark.parametrize("velocity_mps", [-8.0, 5.0])
+@pytest.mark.parametrize("channel", [1.0, 1j, 1 - 1j], ids=["I alone", "Q alone", "I and Q alike"])
+@pytest.mark.parametrize("gain", [1e-18, 1.0, 1e18])
+def test_one_channel_is_measured_as_if_made_analytic(velocity_mps, channel, gain):
+    """A body at -15 m/s came out at rest, the band a half too wide, tips with a deviation of 1 %."""
+    both = 3 * rotors([57.3], velocity_mps=velocity_mps) + white(np.random.default_rng(3), PULSES)
+    given = np.stack([gain * channel * both.real, both])
+    found = measure(given, **RADAR, blades=2)
+    assert one_channel(given.astype(np.complex64)).tolist() == [True, False]
+    assert found.band_reason.tolist() == [ONE_CHANNEL, ""]
+    assert np.isnan([found.bandwidth_hz[0], found.tip_speed_mps[0]]).all()
+    assert np.abs(found.body_velocity_mps[0]) == pytest.approx(abs(velocity_mps), abs=0.05)
+    assert found.chopping_hz[0] == pytest.approx(114.6, rel=0.01)
+    made = measure(hilbert(both.real), **RADAR, blades=2)
+    assert found.chopping_hz[0] == pytest.approx(float(made.chopping_hz), rel=1e-6)
+
+
+def test_what_stands_still_is_no_single_channel():
+    """A strong line at rest, or one so slow that it hardly turns, is nearly a straight one in I and Q, not quite."""
+    noise, slow = white(np.random.default_rng(5), PULSES), np.exp(2j * np.pi * 1e-6 * np.arange(PULSES))
+    two_blades = rotors([57.3]).real
+    records = [1000 + noise, 1000 * slow + noise, 1e4 * slow, np.exp(0.7j) * two_blades, 0 * noise]
+    assert not one_channel(np.array(records, np.complex64)).any()
+    records = np.array([*records, two_blades], np.complex64)
+    assert one_channel(records)[-1]  # but without any noise: nobody recorded that
+    assert made_analytic(records) is records
 
 
 @pytest.mark.parametrize("velocity_mps", [0.3, 2.0, 4.0, -5.0, 9.0])

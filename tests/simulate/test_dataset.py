@@ -164,6 +164,14 @@ def test_drawing_more_than_a_record_owns_is_an_error():
         draws.uniform()
 
 
+@pytest.mark.parametrize("wrong", [{"count": -1}, {"seed": -1}, {"start": -1}])
+def test_a_stream_of_less_than_nothing_is_refused(wrong):
+    with pytest.raises(ValueError, match=f"{next(iter(wrong))} is -1: it must not be negative"):
+        next(stream(**({"seed": 1, "purpose": "train", "count": 1} | wrong)))
+    with pytest.raises(ValueError, match="group is -1: it must not be negative"):
+        draw_radar(1, "train", -1)
+
+
 def test_a_purpose_that_is_none_is_told_by_all_that_draw():
     with pytest.raises(ValueError, match="purpose is 'tset': it must be one of train"):
         draw_radar(1, "tset", 0)

@@ -404,3 +404,8 @@ def test_without_noise_a_plan_holds_all_against_the_digits_of_the_strongest_part
     assert not any(decision.kept for decision in everything.decisions)
     assert "nothing is left out" not in everything.explain()
     assert "nothing is left out" in noisy.plan(tolerance_db=-500.0).explain()
+
+
+def test_a_plan_says_that_what_a_converter_rounds_anew_is_not_counted():
+    assert "rounds anew of a changed record is counted nowhere" in Scene.load("gulls_and_drone").plan().explain()
+    assert "rounds anew" not in Scene.load("type1").plan().explain()

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -83,6 +84,14 @@ def test_a_bad_scene_gets_one_line_with_field_value_and_rule(values, said):
 def test_what_is_not_a_finite_number_is_refused(field, value):
     with pytest.raises(SceneError, match=rf"uav\[0\]\.{field} is "):
         Scene.build(scene(uav=[uav(**{field: value})]))
+
+
+def test_a_folder_hides_no_shipped_scene(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "quadcopter").mkdir()
+    assert Scene.load("quadcopter") == Scene.load(Path("quadcopter"))
+    with pytest.raises(SceneError, match="'': is a directory: give a TOML file, or a shipped scene"):
+        Scene.load("")
 
 
 def test_every_problem_has_its_line():

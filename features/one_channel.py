@@ -1,0 +1,60 @@
+"""Records of a single real channel: both sides of the spectrum are one, and a body's two sides lie in one another."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .spectrum import noise_shows
+
+#: A side of the spectrum so far below the noise of the other is empty; one bin in so many does not count at either end.
+EMPTY_SHARE, ENDS = 1e-2, 50
+
+
+def one_channel(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
+    """True where I or Q is 0 in every pulse, or both are the same but for a sign: of (..., pulses), shape (...).
+
+    To the bit: two equal blades at rest without any noise are a straight line in I and Q as well, of any direction.
+    """
+    real, imaginary = iq.real, iq.imag
+    alike = (real == imaginary).all(axis=-1) | (real == -imaginary).all(axis=-1)
+    one, other = real.any(axis=-1), imaginary.any(axis=-1)
+    return np.asarray(np.where(alike, one, one != other), np.bool_)
+
+
+def made_analytic(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
+    """Records of one channel without the other side of their spectrum, all others as they are: same shape.
+
+    What holds no noise at all was never recorded: two equal blades at rest give such a record, of which I is all.
+    """
+    one = one_channel(iq)
+    if one.any():
+        one[one] = noise_shows(iq[one])
+    if not one.any():
+        return iq
+    from scipy.signal import hilbert  # here, because hardly any record needs it, and it takes a while
+
+    made, some = iq.copy(), iq[one]
+    made[one] = hilbert(np.where(some.real.any(axis=-1, keepdims=True), some.real, some.imag))
+    return made
+
+
+def half_empty(relative_power: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """True where one side of the spectrum holds nothing: one channel, made analytic, has both sides folded onto one.
+
+    Parameters
+    ----------
+    relative_power : ndarray of float32, shape (..., bins)
+        Centred power spectra, any unit.
+
+    Returns
+    -------
+    ndarray of bool, shape (...)
+        All of one side, but for its ends, lies `EMPTY_SHARE` under what three quarters of the other's bins are over:
+        noise, also where a fast body's lines are all there.
+    """
+    bins = relative_power.shape[-1]
+    middle, end = bins // 2, max(bins // ENDS, 4)
+    if middle <= 2 * end:
+        return np.zeros(relative_power.shape[:-1], bool)
+    sides = relative_power[..., end : middle - end], relative_power[..., middle + end : bins - end]
+    noise = np.max([np.quantile(side, 0.25, axis=-1) for side in sides], axis=0)
+    return np.asarray(np.min([side.max(axis=-1) for side in sides], axis=0) < EMPTY_SHARE * noise)
