@@ -106,3 +106,21 @@ def test_gliders_begin_to_flap_as_often_as_they_end():
     assert begins.sum() > 10
     assert ends.sum() > 10
     assert 0.4 < begins.sum() / ends.sum() < 2.5
+
+
+def test_a_flying_bird_rises_and_sinks_at_its_wingbeat_as_its_elevation_shows_it():
+    """Up to 2 % of its span, of which the sine of the elevation, -10 to 50 degrees, lies along the line of sight."""
+    radar, records = Radar(9.85e9, 5e3, 5000), 200
+    target = draw_bird(Draws(np.random.default_rng(6).random((records, WIDTH))), radar, "flapping_bird")
+    path = -np.unwrap(np.angle(target.body.astype(complex)), axis=-1) * radar.wavelength_m / (4 * np.pi)
+    times = radar.times_s[None, :]
+    turns = 2 * np.pi * target.truth["wingbeat_hz"][:, None] * times
+    ratio = []
+    for own, turn, span in zip(path, turns, target.truth["span_m"], strict=True):
+        laws = np.stack([np.ones(radar.pulses), times[0], times[0] ** 2, np.cos(turn), np.sin(turn)], axis=1)
+        found, *_ = np.linalg.lstsq(laws, own, rcond=None)
+        np.testing.assert_allclose(laws @ found, own, atol=1e-5)
+        ratio.append(np.hypot(*found[3:]) / (0.02 * span))
+    assert max(ratio) < np.sin(np.deg2rad(50)) + 1e-3
+    mean = ((1 - np.cos(np.deg2rad(50))) + (1 - np.cos(np.deg2rad(10)))) / np.deg2rad(60) / 2
+    assert np.mean(ratio) == pytest.approx(mean, abs=4 * np.std(ratio) / np.sqrt(records))

@@ -571,3 +571,30 @@ def test_every_parameter_that_a_receiver_draws_has_an_effect_of_its_own():
     warned = received(list(FAULT_CHANCE), **{name: law.low for name, law in LAWS.items()}).warnings
     unused = {line.split(": ")[1].split()[0] for line in warned}
     assert LAWS.keys() - unused == EFFECT_OF.keys() | {"phase_rad"}
+
+
+def test_flicker_has_its_density_at_a_hundredth_of_the_prf_and_falls_with_the_frequency():
+    values = {"flicker_db": 12.0}
+    iq = np.array([empty(effects=["flicker"], values=values).render(seed).iq for seed in range(30)])
+    density = np.mean(np.abs(np.fft.fft(iq * np.hanning(5000), axis=-1)) ** 2, axis=0) / np.sum(np.hanning(5000) ** 2)
+    for share, level_db in ((0.01, 12.0), (0.1, 2.0)):
+        for near in (np.arange(45, 56) * share / 0.01, -np.arange(45, 56) * share / 0.01):
+            mean_db = 10 * np.log10(density[near.astype(int)].mean())
+            assert mean_db == pytest.approx(level_db, abs=1.2)  # 0.4 dB, of 330 values half alike
+
+
+def test_spoilt_pulses_have_the_level_asked_for_and_any_phase():
+    iq = np.array([empty(effects=["impulses"], values={"impulse_db": 20.0}).render(seed).iq for seed in range(60)])
+    spoilt = iq[iq != 0]
+    assert len(spoilt) > 100
+    assert np.mean(np.isclose(np.abs(spoilt), 10.0, rtol=1e-5)) > 0.98  # two may fall on one pulse
+    turns = np.exp(1j * np.angle(spoilt))
+    assert abs(turns.mean()) < 4 / np.sqrt(2 * len(spoilt))
+
+
+def test_a_shaken_airframe_turns_its_echo_at_the_rate_of_the_shaking():
+    shaken = uav(rotors=[], vibration_rad=0.4, vibration_hz=75.0)
+    iq = Scene.build({"radar": RADAR, "uav": [shaken], "receiver": {"noise": False}}).render(full=True).iq
+    turned = np.unwrap(np.angle(iq * iq[0].conj()))
+    expected = 0.4 * np.sin(2 * np.pi * 75.0 * np.arange(1000) / 25e3)
+    np.testing.assert_allclose(turned - turned.mean(), expected - expected.mean(), atol=1e-4)
