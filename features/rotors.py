@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bodies import LINE_DB
-from .comb import Comb, strong_multiple
+from .comb import MOST_BLADES, Comb, strong_multiple
 from .comb_fit import CombFit, fit_combs
 from .comb_search import even_scores
 from .flashes import flash_nats
@@ -28,6 +28,10 @@ RATE_SPREAD, FURTHEST_SPREAD, INNER_ORDERS = 0.05, (-0.25, 0.33), 10
 #: to so many orders, which other rotors' lines have not filled yet, have this share of their power and so many times
 #: that of noise, all but so large a share of them.
 HALF_ORDERS, HALF_SHARE, HALF_POWER, HALF_QUANTILE = 6, 0.05, 4.0, 0.3
+
+#: Unlike blades' lines have between those of a comb this share of its lines' power and more than so many times that of
+#: noise, all but as many of them: half and more where they passed for a rotor's, beside one's a fiftieth.
+BETWEEN_SHARE, BETWEEN_POWER = 0.25, 1.0
 
 #: A comb may be every second to fifth line of a rotor whose rate is one of these times its own.
 RATIOS = np.array([2 / 3, 3 / 4, 4 / 5, 5 / 4, 4 / 3])
@@ -98,18 +102,39 @@ class Rotors:
     next_rate: float
 
 
+def _low_power(rest: Periodogram, places: NDArray[np.float64], fits: Sequence[CombFit]) -> float:
+    """Power that most places have which are not beside a line that is known; 0 where few are not."""
+    known = np.concatenate([fit.frequencies for fit in fits])
+    near = np.abs(places[:, None] - known).min(axis=1) * rest.pulses
+    places = places[rest.usable(places) & (near > NEAR_BINS)]
+    return float(np.quantile(rest.at(places), HALF_QUANTILE)) if len(places) >= LEAST_BETWEEN else 0.0
+
+
 def _is_twice(rest: Periodogram, centre: float, rate: float, fits: Sequence[CombFit]) -> bool:
     """True where a comb has its inner lines at halves of its rate too, which then is twice a rotor's."""
-    known = np.concatenate([fit.frequencies for fit in fits])
-
-    def low(orders: NDArray[np.floating]) -> float:
-        places = centre + rate * orders
-        near = np.abs(places[:, None] - known).min(axis=1) * rest.pulses
-        places = places[rest.usable(places) & (near > NEAR_BINS)]
-        return float(np.quantile(rest.at(places), HALF_QUANTILE)) if len(places) >= LEAST_BETWEEN else 0.0
-
     order = np.arange(-HALF_ORDERS, HALF_ORDERS, dtype=float)
-    return low(order + 0.5) > max(HALF_SHARE * low(order), HALF_POWER)
+    own, half = (_low_power(rest, centre + rate * tried, fits) for tried in (order, order + 0.5))
+    return half > max(HALF_SHARE * own, HALF_POWER)
+
+
+def _is_between(rest: Periodogram, centre: float, rate: float, fits: Sequence[CombFit]) -> bool:
+    """True where a comb's lines are some of those that a known rotor's unlike blades have at its rotation rate.
+
+    These stand at every multiple of that rate, a rotor's own only at its own multiples. Rotors like the known one, not
+    found yet, have them too: rates are compared as those are sought.
+    """
+    for known in (fit.spacing for fit in fits):
+        for parts in range(2, MOST_BLADES + 1):
+            times = round(rate / known * parts)
+            if np.gcd(times, parts) > 1 or abs(rate * parts / (times * known) - 1) > RATE_SPREAD:
+                continue
+            order = np.arange(-HALF_ORDERS * parts, HALF_ORDERS * parts + 1)
+            order = order[order % parts != 0]
+            is_own = order % times == 0
+            own, other = (_low_power(rest, centre + rate / times * order[some], fits) for some in (is_own, ~is_own))
+            if own > 0 and other > max(BETWEEN_SHARE * own, BETWEEN_POWER):
+                return True
+    return False
 
 
 def _holds_another(fit: CombFit, pulses: int) -> bool:
@@ -262,6 +287,8 @@ class Separation:
         """Take a rate in, if it is a rotor's."""
         if one.is_apart and _is_twice(self.rest, self.centre, one.rate, self.fits):
             one = replace(one, rate=one.rate / 2, reach=2 * one.reach)
+        if one.is_apart and _is_between(self.rest, self.centre, one.rate, self.fits):
+            return _NO_ROTOR
         rate, reach = one.rate, one.reach
         same = [abs(rate - known) < self.resolution for known in self.rates]
         if any(same):  # lines of a rotor that is known, perhaps past those that were fitted
