@@ -16,7 +16,7 @@ from .folding import FASTEST_TIP_MPS, fastest_tip
 from .measurements import BODY, EACH_ROTOR, Measurements
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .periodogram import prepared
-from .rotors import MAX_ROTORS
+from .rotors import MAX_ROTORS, hidden_shift
 from .smearing import wide_smearing_index
 from .spectrum import LEAST_PART, Spectrum, largest_part
 
@@ -113,7 +113,8 @@ def _turning(family: Family) -> dict[str, Any]:
     chopping, std = comb.chopping * prf_hz, comb.chopping_std * prf_hz
     if count > 1:  # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
         chopping = float(rotors.rates.mean()) * prf_hz
-        std = float(np.sqrt((rotors.stds**2).sum())) / count * prf_hz
+        # of two rotors nearer than the dwell tells apart one alone was counted
+        std = float(np.hypot(np.sqrt((rotors.stds**2).sum()) / count, hidden_shift(rotors.fits))) * prf_hz
     if not rotors.resolved:  # the mean lies anywhere within what the unresolved rates span
         std = float(np.hypot(std, rotors.spread * prf_hz / np.sqrt(12)))
     drifts, drift_stds = family.drifts * (rotors.rates if count > 1 else comb.chopping) * prf_hz**2

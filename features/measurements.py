@@ -24,8 +24,9 @@ class Measurements:
     body_velocity_mps, body_velocity_mps_std : ndarray
         Radial velocity of the body [m/s], positive when the range grows.
     chopping_hz, chopping_hz_std : ndarray
-        Chopping frequency, blades x rotation rate [Hz]; of several rotors, that of their mean rate. Where the rate
-        changes within the dwell, that of the even turn that comes nearest.
+        Chopping frequency, blades x rotation rate [Hz]; of several rotors, that of their mean rate, which a rotor so
+        strong that it may be two moves by its deviation. Where the rate changes within the dwell, that of the even
+        turn that comes nearest.
     chopping_drift_hz_per_s, chopping_drift_hz_per_s_std : ndarray
         Its even change within the dwell [Hz/s]; of several rotors that of their mean, NaN where they are not resolved.
         Neither velocity nor an even acceleration of the body passes for it.

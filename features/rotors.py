@@ -55,6 +55,11 @@ LEAST_SHARE, DOUBTFUL_SHARE = 0.1, 0.5
 #: A comb weaker than this share of the strongest is what a rate that changed within the dwell leaves behind.
 LEAST_POWER_SHARE = 0.12
 
+#: A comb of so many times the power of the weakest one may be that many rotors, nearer to one another than the dwell
+#: tells apart: where four of a kind were told apart their powers are within 1.7 in 94 of 100 records, where two passed
+#: for one they were not in 92.
+TWO_POWER = 1.7
+
 #: Steps of the joint fit each time a rotor is added, and once all are found: only then their deviations matter. And at
 #: most where what they leave would be called unresolved: strong lines not fitted to the end leave some of themselves.
 JOINT_STEPS, LAST_STEPS, FURTHER_STEPS = 2, 1, 4
@@ -151,6 +156,15 @@ def powers_of(fits: Sequence[CombFit]) -> list[float]:
     """
     common = min(int(np.abs(fit.orders).max()) for fit in fits)
     return [float(np.median(squared(fit.amplitudes[np.abs(fit.orders) <= common]))) for fit in fits]
+
+
+def hidden_shift(fits: Sequence[CombFit]) -> float:
+    """How far the mean of combs' rates is off, if those that may be several rotors are [cycles a sample]."""
+    common = min(int(np.abs(fit.orders).max()) for fit in fits)
+    powers = np.array([squared(fit.amplitudes[np.abs(fit.orders) <= common]).mean() for fit in fits])
+    times = np.minimum(powers / powers.min(), MAX_ROTORS)
+    rates = np.array([fit.spacing for fit in fits])
+    return float(np.average(rates, weights=np.where(times > TWO_POWER, np.rint(times), 1)) - rates.mean())
 
 
 def _meet(fits: Sequence[CombFit], resolution: float) -> bool:
