@@ -135,6 +135,7 @@ class Classifier:
     ) -> None:
         if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 1:
             raise BadInput(f"threads is {threads!r}: it must be a whole number of 1 or more")
+        threads = int(threads)
         max_false_alarm, coverage = _rule(max_false_alarm, coverage)
         try:
             verify(onnx_bytes)  # before anything of the file is opened, and so is what it says of itself
@@ -142,7 +143,7 @@ class Classifier:
         except ValueError as error:
             raise BadInput(f"{source}: {error}") from None
         self.envelope, self.accept = checked_metadata(self.metadata, source)
-        self._session = open_session(onnx_bytes, source, int(threads))
+        self._session = open_session(onnx_bytes, source, threads)
         keep_freed()
         if dict(self._session.get_modelmeta().custom_metadata_map) != dict(self.metadata):
             raise BadInput(f"{source}: damaged metadata: onnxruntime reads others: train it again")

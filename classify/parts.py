@@ -8,8 +8,8 @@ import json
 import shutil
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import BadInput
-from .files import read_bounded, write_whole
+from .files import only_writer, read_bounded, write_whole
 
 #: Folders of what is finished so far, beside the results while a training or a report is not done.
 TRAIN_PARTS, REPORT_PARTS = "train-parts", "report-parts"
@@ -44,6 +44,27 @@ class Parts:
     def begun(self) -> bool:
         """Whether an earlier run of the same left anything."""
         return self._folder.is_dir()
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Keep other runs out that would leave their results in the same place, while this one lasts.
+
+        Raises
+        ------
+        BadInput
+            One is at work there.
+        """
+        self._all.mkdir(parents=True, exist_ok=True)
+        try:
+            with ExitStack() as held:
+                try:
+                    held.enter_context(only_writer(self._all, wait=False))
+                except BlockingIOError:
+                    busy = f"{self._all.parent}: another run is at work there"
+                    raise BadInput(f"{busy}: let it finish, or give another folder") from None
+                yield
+        finally:
+            self._clear()
 
     def have(self, name: str) -> bool:
         """Whether a part was finished before."""
@@ -102,6 +123,10 @@ class Parts:
     def forget(self) -> None:
         """Remove all parts of this run, whose result stands; those of others stay."""
         shutil.rmtree(self._folder, ignore_errors=True)
+        self._clear()
+
+    def _clear(self) -> None:
+        """Remove the folder of all runs, if nothing is in it."""
         with suppress(OSError):
             self._all.rmdir()
 

@@ -91,6 +91,19 @@ def run_training(
             "versions": versions,
         },
     )
+    with parts.alone():
+        return _train_all(out, settings, stored, parts, {"simulator_sha256": simulator, "versions": versions}, progress)
+
+
+def _train_all(
+    out: Path,
+    settings: TrainingConfig,
+    stored: DataSet | None,
+    parts: Parts,
+    made_by: dict[str, Any],
+    progress: bool,
+) -> dict[str, Any]:
+    """Draw or read the records, train every model on them, and write these with their account."""
     # Threads that spin while they wait make training several times slower beside another busy process.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     started = time.perf_counter()
@@ -101,8 +114,8 @@ def run_training(
     with Progress(visible=progress) as bars:
         if resumed:
             bars.say(f"Going on with what an interrupted run left in {out / TRAIN_PARTS}")
-        if simulator != simulator_digest():
-            bars.say(f"{data}: written by another simulator or on another machine: a drawn set would differ")
+        if stored is not None and made_by["simulator_sha256"] != simulator_digest():
+            bars.say(f"{stored.folder}: written by another simulator or on another machine: a drawn set would differ")
         sets = _gather(settings, stored, bars, parts)
         gathered_s = time.perf_counter() - started
         files: dict[str, bytes] = {}
@@ -130,9 +143,8 @@ def run_training(
         "false_alarm": settings.false_alarm,
         "models": models,
         CASCADE: cascade,
-        "simulator_sha256": simulator,
         "schema_sha256": schema_hash(),
-        "versions": versions,
+        **made_by,
     }
     files[ACCOUNT] = (json.dumps(account, indent=1, allow_nan=False) + "\n").encode()
     _alone(out, settings)  # nor has another run finished here meanwhile

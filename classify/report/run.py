@@ -328,7 +328,7 @@ def run_report(
     stability = worst_of_each(out)
     parts = Parts(out / REPORT_PARTS, _of(settings, found, account))
     started, clock, resumed = datetime.now(UTC), time.perf_counter(), parts.begun
-    with Progress(visible=progress) as bars:
+    with parts.alone(), Progress(visible=progress) as bars:
         body = measure(found, settings, parts=parts, progress=bars, account=account)
         made = {
             "date": started.isoformat(timespec="seconds"),

@@ -119,3 +119,16 @@ def test_a_damaged_measurement_is_one_line(tmp_path: Path) -> None:
     file.write_text("[1")
     with pytest.raises(BadInput, match=r"one\.json: not what this run kept"):
         parts.take("one", lambda: [1])
+
+
+def test_two_runs_do_not_work_for_the_same_place(tmp_path):
+    one, other = (Parts(tmp_path / "parts", {"seed": seed}) for seed in (1, 2))
+    with one.alone():
+        one.take("a", lambda: 1)
+        with pytest.raises(BadInput, match="another run is at work there: let it finish"), other.alone():
+            raise AssertionError
+        assert one.have("a")
+    with other.alone():  # what was kept is there for the one that goes on
+        assert one.have("a")
+        one.forget()
+    assert list(tmp_path.iterdir()) == []
