@@ -155,7 +155,7 @@ def predict(
 def measure(
     recordings: Recordings,
     blades: Annotated[
-        int | None, typer.Option(metavar="N", help="Blades of a rotor, if known.", show_default=False)
+        int | None, typer.Option(metavar="N", help="Blades of a rotor, 1 to 64, if known.", show_default=False)
     ] = None,
     beta_deg: Annotated[
         float | None,
@@ -233,7 +233,9 @@ def dataset(
         int, typer.Option(metavar="N", min=LEAST_RECORDS, help="Records to train on; the other sets follow from it.")
     ],
     seed: Seed = None,
-    config: Config = None,
+    config: Annotated[
+        Path | None, _path_option("FILE.toml", "Settings of a training; the options given here come first.")
+    ] = None,
 ) -> None:
     """Write the records of a training to disk; interrupted, the same command goes on."""
     from .dataset import run_dataset
@@ -276,7 +278,9 @@ def report(
     models: Annotated[
         Path | None, _path_option("DIR", "Folder of .onnx files.", show_default="the shipped models")
     ] = None,
-    seed: Seed = None,
+    seed: Annotated[
+        int | None, typer.Option(metavar="S", min=0, help="Root seed of the test records.", show_default="0")
+    ] = None,
     config: Config = None,
 ) -> None:
     """Measure models on fresh synthetic records: what each choice costs; interrupted, the same command goes on."""
@@ -330,12 +334,15 @@ def simulate(
         complain(f"{scene}: {warning}", kind="warning")
     plan = None if full else found.plan(seed, tolerance_db=tolerance_db)
     said = [plan.explain() if plan else "full fidelity: nothing is left out"] if explain else []
-    if out is not None:
-        rendering = render(found, seed, plan=plan)
-        for warning in rendering.warnings[len(told) :]:  # what shows as it is drawn
-            complain(f"{scene}: {warning}", kind="warning")
-        said += [str(path) for path in write_rendering(out, rendering, found, seed)]
-    print("\n".join(said), flush=True)  # at the end: whoever reads the first line alone has the recording as well
+    try:
+        if out is not None:
+            rendering = render(found, seed, plan=plan)
+            for warning in rendering.warnings[len(told) :]:  # what shows as it is drawn
+                complain(f"{scene}: {warning}", kind="warning")
+            said += [str(path) for path in write_rendering(out, rendering, found, seed)]
+    finally:  # whoever reads the first line alone has the recording as well
+        if said:
+            print("\n".join(said), flush=True)
 
 
 @app.command()

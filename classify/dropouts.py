@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 NEAR_STEPS, NEAR_SHARE = 2.1, 0.5
 
 #: They are so many, and not chance, likelier than this: of two channels 25 places lie so near, each about as likely as
-#: 0, of one channel 5, so that it takes six of one. Samples that are hardly ever alike have no such places: one 0 is a
-#: lost pulse.
-LEAST_LOST, CHANCE, PLACES, PLACES_OF_ONE, ALIKE = 3, 1e-4, 25, 5, 0.01
+#: 0, of one channel 5, so that it takes six of one. Samples that are hardly ever alike, of so many or
+#: more, have no such places: one 0 among them is a lost pulse, but at an end, where a window or a beginning may be 0.
+LEAST_LOST, CHANCE, PLACES, PLACES_OF_ONE, ALIKE, ENOUGH = 3, 1e-4, 25, 5, 0.01, 100
 
 #: More zeros in a row are silence, which is no comb, and too long to be filled in.
 MOST_IN_A_ROW = 32
@@ -66,7 +66,10 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     near = int(np.searchsorted(held, nearly, side="right"))
     places = PLACES if iq.real.any() and iq.imag.any() else PLACES_OF_ONE
     stepless = 1 - (len(steps) + 1) / len(held) < ALIKE
-    no_chance = stepless or (zeros >= LEAST_LOST and _chance(zeros, near, 1 / places) < CHANCE)
+    if zeros < LEAST_LOST:
+        no_chance = stepless and len(held) >= ENOUGH and not lost[[0, -1]].any()
+    else:
+        no_chance = stepless or _chance(zeros, near, 1 / places) < CHANCE
     return lost if zeros > NEAR_SHARE * near and no_chance else none
 
 

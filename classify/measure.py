@@ -253,8 +253,9 @@ def checked_plot(path: Path | None) -> None:
         raise BadInput(f"--plot {path}: the drawing is SVG: name a file that ends in .svg")
     if not path.parent.is_dir():
         raise BadInput(f"--plot {path}: there is no folder {path.parent}: name a file in an existing folder")
-    if path.is_dir() or not os.access(path.parent, os.W_OK):
-        what = "is a directory" if path.is_dir() else f"nothing can be written into {path.parent}"
+    taken = os.path.isdir(path)  # of a locked folder it is False, where `Path` raises
+    if taken or not os.access(path.parent, os.W_OK):
+        what = "is a directory" if taken else f"nothing can be written into {path.parent}"
         raise BadInput(f"--plot {path}: {what}: name a file that can be written")
 
 
@@ -279,9 +280,10 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
         raise BadInput(f"{recording.name}: 1 pulse: a measurement needs at least 2")
     if beyond := beyond_radars(recording.carrier_hz, recording.prf_hz):
         raise BadInput(f"{recording.name}: {beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3")
-    # as a whole: dwells made so would each have ends of their own
-    given, recording = recording, replace(recording, iq=made_analytic(recording.iq))
-    iq = recording.dwells(settings.dwell_s, least=2)
+    silent = ~recording.dwells(settings.dwell_s, least=2).any(axis=-1, keepdims=True)
+    # as a whole: dwells made so would each have ends of their own; but what is silent stays so
+    whole = replace(recording, iq=made_analytic(recording.iq))
+    iq = np.where(silent, np.complex64(0), whole.dwells(settings.dwell_s, least=2))
     count, pulses = iq.shape
     radar = {"carrier_hz": recording.carrier_hz, "prf_hz": recording.prf_hz}
     acceleration, acceleration_std, smeared = body_acceleration(iq, **radar)
@@ -290,9 +292,9 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
         values = measure(iq, **radar, blades=settings.blades, beta_rad=settings.beta_rad, on_record=on_record)
     start_s = recording.start_s + np.arange(count) * pulses / recording.prf_hz
     long = len(recording.iq) >= LEAST_S * recording.prf_hz
-    beat = wingbeat(recording.iq, **radar) if long else None
+    beat = wingbeat(whole.iq, **radar) if long else None
     stop_s = start_s + pulses / recording.prf_hz
-    remarks = given.remarks(settings.dwell_s, iq, measured=True)
+    remarks = recording.remarks(settings.dwell_s, iq, measured=True)
     return Measured(recording, iq, start_s, stop_s, values, acceleration, acceleration_std, beat, remarks)
 
 

@@ -137,17 +137,16 @@ class Recording:
                 "too many to be filled in: what is said of dwells in which they lie is of less than a dwell"
             )
         if one_channel(self.iq):
-            what = "Q is 0 in every pulse" if not self.iq.imag.any() else "I is 0 in every pulse"
-            what = what if not (self.iq.real.any() and self.iq.imag.any()) else "Q is the same as I"
-            said.append(
-                f"one channel: {what}, so that both sides of the spectrum are one and "
-                + ("no band is told: record I and Q" if measured else _MISTAKEN)
-            )
+            none = [name for name, part in (("I", self.iq.real), ("Q", self.iq.imag)) if not part.any()]
+            what = f"{none[0]} is 0 in every pulse" if none else "I and Q are the same but for a sign"
+            so = _NOT_TOLD if measured else _MISTAKEN
+            said.append(f"one channel: {what}, so that both sides of the spectrum are one and {so}")
         return tuple(sentence for sentence in said if sentence)
 
 
 #: What clipped and single channels do to labels.
 _UNCOUNTED = "no comb that stays is counted"
+_NOT_TOLD = "neither tips nor the sign of a velocity can be believed: record I and Q"
 _MISTAKEN = "noise may pass for a comb: record I and Q, or make it analytic (scipy.signal.hilbert)"
 
 

@@ -44,8 +44,8 @@ def measure(
     Parameters
     ----------
     iq : array_like of complex, shape (..., pulses)
-        Slow-time samples of one range cell, any gain. Of one channel, I without Q, what both sides of the spectrum
-        share is measured, and no band.
+        Slow-time samples of one range cell, any gain. Of one channel, I without Q, that holds noise, what both sides of
+        the spectrum share is measured, and no band.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz], within `CARRIER_RANGE_HZ` and `PRF_RANGE_HZ`.
     blades : int, optional

@@ -8,6 +8,12 @@ from .spectrum import noise_shows
 #: A side of the spectrum so far below the noise of the other is empty; one bin in so many does not count at either end.
 EMPTY_SHARE, ENDS = 1e-2, 50
 
+#: A record is continued by so many of its pulses, mirrored, before its other side is taken away.
+MIRRORED = 2048
+
+#: So many pulses tell whether there is noise.
+NOISE_PULSES = 65_536
+
 
 def one_channel(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     """True where I or Q is 0 in every pulse, or both are the same but for a sign: of (..., pulses), shape (...).
@@ -27,13 +33,19 @@ def made_analytic(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
     """
     one = one_channel(iq)
     if one.any():
-        one[one] = noise_shows(iq[one])
+        one[one] = noise_shows(iq[one, :NOISE_PULSES])
     if not one.any():
         return iq
     from scipy.signal import hilbert  # here, because hardly any record needs it, and it takes a while
 
     made, some = iq.copy(), iq[one]
-    made[one] = hilbert(np.where(some.real.any(axis=-1, keepdims=True), some.real, some.imag))
+    channel = np.where(some.real.any(axis=-1, keepdims=True), some.real, some.imag)
+    # the transform goes round: what jumps from the end to the beginning would spread over all of the record
+    beyond = min(channel.shape[-1] - 1, MIRRORED)
+    around = np.pad(channel, ((0, 0), (beyond, beyond)), mode="reflect").astype(np.float64)
+    both = hilbert(around)[:, beyond : around.shape[-1] - beyond]
+    most = np.finfo(np.float32).max
+    made.real[one], made.imag[one] = np.clip(both.real, -most, most), np.clip(both.imag, -most, most)
     return made
 
 

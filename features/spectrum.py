@@ -388,7 +388,12 @@ def require_radar(carrier_hz: float, prf_hz: float) -> tuple[float, float]:
 def noise_shows(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     """True where there is noise between the lines, of samples (..., pulses): more than `LEAST_FLOOR`, shape (...)."""
     power = power_of(centred_transform(scaled(iq, unit_scale(iq))))
-    return np.asarray(noise_floor(power) > sums(power) * (LEAST_FLOOR / np.float32(power.shape[-1])), np.bool_)
+    return np.asarray(noise_floor(power) > _least_floor(power), np.bool_)
+
+
+def _least_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
+    """What the floor of power spectra is at least, shape (...)."""
+    return sums(power) * (LEAST_FLOOR / np.float32(power.shape[-1]))
 
 
 def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spectrum:
@@ -417,7 +422,7 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spec
     transform = centred_transform(scaled(samples, scale))
     power = power_of(transform)
     floor = noise_floor(power)
-    floor = np.maximum(floor, sums(power) * (LEAST_FLOOR / np.float32(power.shape[-1])))
+    floor = np.maximum(floor, _least_floor(power))
     natural = floor / np.square(scale[..., 0], dtype=np.float64)
     relative = np.multiply(power, per_floor(floor)[..., None], out=power)
     return Spectrum(relative, natural, carrier_hz, prf_hz, samples.shape[-1], scale, transform)

@@ -240,7 +240,10 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
     elif not folder.is_dir():
         raise BadInput(f"{folder}: not a folder: give the one that `bladewing train --out` wrote")
     else:
-        settle(folder)
+        try:
+            settle(folder)
+        except PermissionError as error:
+            raise unreadable(folder, error, "give a folder that can be read") from None
         found = {path.stem: _content(path) for path in folder.glob("*.onnx")}
     own = {*PICTURES, FEATURES, CASCADE, EIGHT_BITS}
     if taken := sorted(found.keys() & own):

@@ -64,15 +64,27 @@ def test_nothing_at_all_and_nothing_lost_are_no_dropouts() -> None:
     assert not lost_pulses(np.zeros(0, np.complex64)).any()
 
 
-@pytest.mark.parametrize("lost", [[700], [0], [100, 1500], [40, 41]])
+@pytest.mark.parametrize("lost", [[700], [100, 1500], [40, 41]])
 def test_one_lost_pulse_is_enough_where_samples_have_no_steps(lost: list[int]) -> None:
     """It stands 60 dB beside a strong line as noise that hides all blades."""
     pulse = np.arange(2000)
     iq = (1000 * np.exp(2j * np.pi * 0.003 * pulse) + noise(np.random.default_rng(2), 2000)).astype(np.complex64)
     iq[lost] = 0
     assert np.flatnonzero(lost_pulses(iq)).tolist() == lost
-    stepped = np.round(iq)
-    assert not lost_pulses(stepped.astype(np.complex64)).any() or len(lost) > 2
+    assert not lost_pulses(np.round(iq).astype(np.complex64)).any()
+
+
+@pytest.mark.parametrize("window", [np.bartlett, np.hanning, np.blackman])
+def test_the_ends_of_a_window_are_no_lost_pulses(window) -> None:
+    iq = noise(np.random.default_rng(2), 2000) * window(2000)
+    assert not lost_pulses(iq.astype(np.complex64)).any()
+    assert not lost_pulses((np.exp(0.3j * np.arange(2000)) - 1).astype(np.complex64)).any()
+
+
+def test_one_lost_pulse_of_few_is_chance() -> None:
+    rng = np.random.default_rng(1)
+    few = np.rint(30 * rng.normal(size=(2000, 15))).astype(np.complex64)
+    assert sum(lost_pulses(row).any() for row in few) == 0
 
 
 def test_a_silence_is_no_lost_pulses() -> None:
@@ -108,9 +120,9 @@ def test_a_recording_tells_of_a_channel_that_is_missing() -> None:
         (said,) = recording.remarks(0.1, recording.dwells(0.1))
         assert said.startswith(f"one channel: {name} is 0 in every pulse")
         (said,) = recording.remarks(0.1, recording.dwells(0.1), measured=True)
-        assert said.endswith("no band is told: record I and Q")
+        assert said.endswith("neither tips nor the sign of a velocity can be believed: record I and Q")
     alike = Recording("walk", (iq.real * (1 - 1j)).astype(np.complex64), 24e9, 1e4)
-    assert alike.remarks(0.1, alike.dwells(0.1))[0].startswith("one channel: Q is the same as I")
+    assert alike.remarks(0.1, alike.dwells(0.1))[0].startswith("one channel: I and Q are the same but for a sign")
     assert not Recording("walk", iq, 24e9, 1e4).remarks(0.1, iq.reshape(2, -1))
 
 

@@ -302,3 +302,15 @@ def test_a_drawing_that_cannot_be_written_is_told_before_anything_is_measured(fo
     assert main(["measure", str(folder / "drone.npy"), *RADAR, "--plot", str(tmp_path / "new.svg")]) == 2
     out, error = capsys.readouterr()
     assert (out, "nothing can be written into" in error) == ("", True)
+
+
+def test_silent_dwells_of_one_channel_hold_no_signal(tmp_path, capsys):
+    """The other dwells' tails would be all there is in them: a body at the end of the span."""
+    rng = np.random.default_rng(4)
+    iq = np.array(spinning(RATE_HZ, 8400) + 10 + white(rng, 8400)).real + 0j
+    iq[2800:5600] = 0
+    np.save(tmp_path / "one.npy", iq.astype(np.complex64))
+    assert main(["measure", str(tmp_path / "one.npy"), *RADAR, "--dwell", "0.08", "--json"]) == 0
+    dwells = [json.loads(line) for line in capsys.readouterr().out.splitlines()][:-1]
+    assert [dwell["reason"] for dwell in dwells] == [None, "no signal", None]
+    assert dwells[1]["body_velocity_mps"] is None
