@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 NEAR_STEPS, NEAR_SHARE = 2.1, 0.5
 
 #: They are so many, and not chance, likelier than this: of two channels 25 places lie so near, each about as likely as
-#: 0, of one channel 5, so that it takes six of one. Samples that are hardly ever alike, of so many or
-#: more, have no such places: one 0 among them is a lost pulse, but at an end, where a window or a beginning may be 0.
+#: 0, of one channel 5, so that it takes six of one. Samples that are hardly ever alike, of so many and more, have no
+#: such places: one 0 among them is a lost pulse, but for one at an end, where a window or a beginning may be 0.
 LEAST_LOST, CHANCE, PLACES, PLACES_OF_ONE, ALIKE, ENOUGH = 3, 1e-4, 25, 5, 0.01, 100
 
 #: More zeros in a row are silence, which is no comb, and too long to be filled in.
