@@ -96,7 +96,7 @@ def test_one_rotor_is_narrow_and_four_unlike_ones_smear():
 
     def index(rates_hz):
         noise = 0.1 * white(rng, PULSES)
-        spectrum, body, mask = measured(rotors(rates_hz) + noise)
+        spectrum, body, mask = measured(rotors(rates_hz, velocity_mps=rng.uniform(-20, 20)) + noise)
         energy = residual(spectrum, mask)
         return float(smearing_index(spectrum, energy, body, cepstral_chopping(spectrum, mask)))
 
