@@ -3,7 +3,7 @@
 import math
 import os
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -280,10 +280,10 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
         raise BadInput(f"{recording.name}: 1 pulse: a measurement needs at least 2")
     if beyond := beyond_radars(recording.carrier_hz, recording.prf_hz):
         raise BadInput(f"{recording.name}: {beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3")
-    silent = ~recording.dwells(settings.dwell_s, least=2).any(axis=-1, keepdims=True)
-    # as a whole: dwells made so would each have ends of their own; but what is silent stays so
-    whole = replace(recording, iq=made_analytic(recording.iq))
-    iq = np.where(silent, np.complex64(0), whole.dwells(settings.dwell_s, least=2))
+    iq = recording.dwells(settings.dwell_s, least=2)
+    whole = made_analytic(recording.iq)  # as a whole: dwells made so would each have ends of their own
+    if whole is not recording.iq:  # what is silent stays so
+        iq = np.where(iq.any(axis=-1, keepdims=True), whole[: iq.size].reshape(iq.shape), np.complex64(0))
     count, pulses = iq.shape
     radar = {"carrier_hz": recording.carrier_hz, "prf_hz": recording.prf_hz}
     acceleration, acceleration_std, smeared = body_acceleration(iq, **radar)
@@ -292,7 +292,7 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
         values = measure(iq, **radar, blades=settings.blades, beta_rad=settings.beta_rad, on_record=on_record)
     start_s = recording.start_s + np.arange(count) * pulses / recording.prf_hz
     long = len(recording.iq) >= LEAST_S * recording.prf_hz
-    beat = wingbeat(whole.iq, **radar) if long else None
+    beat = wingbeat(whole, **radar) if long else None
     stop_s = start_s + pulses / recording.prf_hz
     remarks = recording.remarks(settings.dwell_s, iq, measured=True)
     return Measured(recording, iq, start_s, stop_s, values, acceleration, acceleration_std, beat, remarks)

@@ -115,10 +115,11 @@ class Recording:
         What that means is another thing for what was `measured` than for labels.
         """
         said = [self.cut_sentence(dwell_s, dwells)]
+        clipped_so, one_channel_so = _OF_MEASUREMENTS if measured else _OF_LABELS
         if self.clipped:
             said.append(
                 f"clipped: {self.clipped} values of I and Q stand at the converter's largest, which makes lines that "
-                f"are no target's, so that {'tips may come out too fast' if measured else _UNCOUNTED}: lower the gain"
+                f"are no target's, so that {clipped_so}: lower the gain"
             )
         if self.filled_in:
             said.append(
@@ -139,15 +140,19 @@ class Recording:
         if one_channel(self.iq):
             none = [name for name, part in (("I", self.iq.real), ("Q", self.iq.imag)) if not part.any()]
             what = f"{none[0]} is 0 in every pulse" if none else "I and Q are the same but for a sign"
-            so = _NOT_TOLD if measured else _MISTAKEN
-            said.append(f"one channel: {what}, so that both sides of the spectrum are one and {so}")
+            said.append(f"one channel: {what}, so that both sides of the spectrum are one and {one_channel_so}")
         return tuple(sentence for sentence in said if sentence)
 
 
-#: What clipped and single channels do to labels.
-_UNCOUNTED = "no comb that stays is counted"
-_NOT_TOLD = "neither tips nor the sign of a velocity can be believed: record I and Q"
-_MISTAKEN = "noise may pass for a comb: record I and Q, or make it analytic (scipy.signal.hilbert)"
+#: What clipping and a single channel mean for labels, and for what is measured.
+_OF_LABELS = (
+    "no comb that stays is counted",
+    "noise may pass for a comb: record I and Q, or make it analytic (scipy.signal.hilbert)",
+)
+_OF_MEASUREMENTS = (
+    "tips may come out too fast",
+    "neither tips nor the sign of a velocity can be believed: record I and Q",
+)
 
 
 def load_recording(

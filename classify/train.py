@@ -77,7 +77,7 @@ def run_training(
     if stored is not None and stored.plan != Plan.of(settings):
         raise BadInput(f"{data}: holds sets of {stored.plan.records}, a training takes {settings.sets}: write it again")
     result_folder(out)
-    _alone(out, settings)
+    _refuse_others(out, settings)
     versions = _versions()
     simulator = simulator_digest() if stored is None else stored.simulator_sha256
     parts = Parts(
@@ -147,7 +147,7 @@ def _train_all(
         **made_by,
     }
     files[ACCOUNT] = (json.dumps(account, indent=1, allow_nan=False) + "\n").encode()
-    _alone(out, settings)  # nor has another run finished here meanwhile
+    _refuse_others(out, settings)  # nor has another run finished here meanwhile
     write_together(out, files)
     parts.forget()
     if progress:
@@ -155,7 +155,7 @@ def _train_all(
     return account
 
 
-def _alone(out: Path, settings: TrainingConfig) -> None:
+def _refuse_others(out: Path, settings: TrainingConfig) -> None:
     """Refuse a folder that holds models which this run would not replace: one account would stand beside two runs'."""
     others = [name for name in LADDER if name not in settings.models and (out / f"{name}.onnx").exists()]
     if others:

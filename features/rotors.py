@@ -154,14 +154,18 @@ def powers_of(fits: Sequence[CombFit]) -> list[float]:
 
     Not their means: where lines of two rotors lie in one another they may come out as large ones that cancel.
     """
+    return [float(np.median(powers)) for powers in _line_powers(fits)]
+
+
+def _line_powers(fits: Sequence[CombFit]) -> list[NDArray[np.floating]]:
+    """Power of each line of combs, over the orders that all of them reach."""
     common = min(int(np.abs(fit.orders).max()) for fit in fits)
-    return [float(np.median(squared(fit.amplitudes[np.abs(fit.orders) <= common]))) for fit in fits]
+    return [squared(fit.amplitudes[np.abs(fit.orders) <= common]) for fit in fits]
 
 
 def hidden_shift(fits: Sequence[CombFit]) -> float:
     """How far the mean of combs' rates is off, if those that may be several rotors are [cycles a sample]."""
-    common = min(int(np.abs(fit.orders).max()) for fit in fits)
-    powers = np.array([squared(fit.amplitudes[np.abs(fit.orders) <= common]).mean() for fit in fits])
+    powers = np.array([powers.mean() for powers in _line_powers(fits)])
     times = np.minimum(powers / powers.min(), MAX_ROTORS)
     rates = np.array([fit.spacing for fit in fits])
     return float(np.average(rates, weights=np.where(times > TWO_POWER, np.rint(times), 1)) - rates.mean())

@@ -227,7 +227,7 @@ def test_the_summary_counts_the_unreadable(run, sigmf_pair, tmp_path):
     assert out.splitlines()[-1] == "2 recordings: 1 uav, 1 unreadable"
 
 
-def test_a_recording_that_may_not_be_read_does_not_stop_the_others(run, sigmf_pair, tmp_path, monkeypatch):
+def test_a_recording_that_may_not_be_read_does_not_stop_the_others(run, tmp_path, monkeypatch):
     locked = tmp_path / "locked.npy"
     for file in (locked, locked.with_name("other.npy")):
         np.save(file, np.exp(0.3j * np.arange(2000)))
