@@ -101,9 +101,9 @@ def _usage(error: Exception) -> int:
         name = getattr(error, "param").opts[0]  # noqa: B009 - the class of the error has no public name
         rule = _NUMBERS.get(wrong[0]["type"], wrong[0]["msg"].removeprefix("Input should "))
         message = f"{name} is {wrong[0]['input']!r}: it must {rule}"
-    context = getattr(error, "ctx", None)
-    command = context.command_path if context is not None else "bladewing"
-    complain(f"{' '.join(message.split())} (see {command} --help)")
+    context = getattr(error, "ctx", None)  # the parser does not tell whose option lacks its value
+    command = f"{context.command_path} " if context is not None else ""
+    complain(f"{' '.join(message.split())} (see {command}--help)")
     return 2
 
 

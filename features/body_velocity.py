@@ -66,7 +66,7 @@ def body_velocity(
         Positive when the range grows. Without a comb, that of the strongest line, if one moves of that; NaN where none
         stands out.
     """
-    own, level_db = data.centres[0], data.centres_db[0]
+    own, level_db = data.strong.centres[0], data.strong.centres_db[0]
     if fit is None:
         if level_db < LINE_DB:
             return np.nan, np.nan
@@ -94,7 +94,7 @@ def _likeliest(data: Periodogram, spectrum: Spectrum, blades: bool) -> tuple[flo
     It is the strongest that leaves do not make in a wind, if there is any and blades do not: what stands at rest is a
     background then, or a rival where it is hardly stronger. Places in [cycles a sample].
     """
-    lines = list(zip(data.centres, data.centres_db, strict=True))
+    lines = list(zip(data.strong.centres, data.strong.centres_db, strict=True))
     moving = [] if blades else [line for line in lines if abs(line[0]) >= data.rest_half and line[1] >= LINE_DB]
     own, level_db = (moving or lines)[0]
     rest = data.rest_half if moving else 0.0

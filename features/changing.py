@@ -73,7 +73,7 @@ class ChangingSeparation(Separation):
             pulses, margin = self.data.pulses, margin_of(self.data.pulses)
             late = late_by(even_change(change, pulses), pulses)
             even = resampled(np.pad(self.rest.samples, margin), self.centre, late)
-            self._read[change] = self.data.left(remove_bands(even, self.data.bands), self.level)
+            self._read[change] = self.data.left(remove_bands(even, self.data.strong.bands), self.level)
         return self._read[change]
 
     def _take(self, fits: Sequence[CombFit], samples: NDArray[np.complex128]) -> None:

@@ -227,7 +227,7 @@ def fit_changing(
     if min(np.bincount(turning.comb[turning.used], minlength=turning.count)) < 3:
         return None
     smooth = over_orders(turning.comb, turning.order)
-    basis = band_basis(pulses, data.bands).astype(np.complex64)
+    basis = band_basis(pulses, data.strong.bands).astype(np.complex64)
     least = LEAST_LEVEL if turning.count == 1 else 1.0
     samples, level = data.samples.astype(np.complex64), level_about
     snr = np.full(len(turning.order), np.inf)
@@ -243,9 +243,9 @@ def fit_changing(
         factor, held_back = factored
         amplitudes = cho_solve(factor, seen, check_finite=False)
         snr = np.maximum(smooth(squared(amplitudes * (1 + held_back)) * pulses / noise) - 1, 1e-3)
-        rest = remove_bands(data.samples - amplitudes.astype(np.complex64) @ lines, data.bands)
+        rest = remove_bands(data.samples - amplitudes.astype(np.complex64) @ lines, data.strong.bands)
         counted = np.where(turning.used, amplitudes, 0).astype(np.complex64)
-        columns = remove_bands(turning.gained(lines, counted), data.bands)
+        columns = remove_bands(turning.gained(lines, counted), data.strong.bands)
         leaked = (lines @ columns.conj().T).conj() / pulses
         kept = leaked.conj().T @ cho_solve(factor, leaked, check_finite=False)
         counts = squared(counted * turning.order) + 1e-30

@@ -238,7 +238,7 @@ def threshold(data: Periodogram) -> float:
     """Score a comb must exceed in this record [nats]."""
     if data.rest_half > 0 or data.one_channel:
         return THRESHOLDS[2]
-    return THRESHOLDS[1] if data.centres_db[0] > LINE_DB else THRESHOLDS[0]
+    return THRESHOLDS[1] if data.strong.centres_db[0] > LINE_DB else THRESHOLDS[0]
 
 
 def _too_short(data: Periodogram) -> str:

@@ -144,7 +144,7 @@ def _is_own(data: Periodogram, found: Candidate, line: float) -> bool:
 
 def _moves(data: Periodogram, centre: float) -> bool:
     """True where a line is a moving body's: of slow ones, where another is nearer to rest, the background's."""
-    nearer = any(abs(line) < abs(centre) for line in data.centres)
+    nearer = any(abs(line) < abs(centre) for line in data.strong.centres)
     return abs(centre) * data.pulses >= AT_REST_BINS and (nearer or abs(centre) > data.rest_half)
 
 
@@ -172,9 +172,10 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
         out += [(found.centre + found.spacing * order, 0.0) for order in even]
     others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
     moving = 0.0
+    centres, levels = data.strong.centres, data.strong.centres_db
     # a line beside rest is a slow body's own, and hides no other
-    hides = abs(data.centres[0]) * data.pulses < AT_REST_BINS and not any(_moves(data, line) for line in data.centres)
-    for centre, level_db in sorted(zip(data.centres, data.centres_db, strict=True), key=lambda line: -abs(line[0])):
+    hides = abs(centres[0]) * data.pulses < AT_REST_BINS and not any(_moves(data, line) for line in centres)
+    for centre, level_db in sorted(zip(centres, levels, strict=True), key=lambda line: -abs(line[0])):
         if not _is_own(data, found, centre):
             continue
         is_line = _stands_out(data, np.array([centre]), 10 ** (level_db / 10))[0]

@@ -219,11 +219,11 @@ def fit_combs(
     level = data.level_at(frequency) if level_about is None else np.maximum(level_about(frequency), least)
 
     def left_by(frequency: NDArray[np.float64], amplitudes: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        return remove_bands(data.samples - sum_of_lines(pulses, frequency, amplitudes), data.bands)
+        return remove_bands(data.samples - sum_of_lines(pulses, frequency, amplitudes), data.strong.bands)
 
     for number in range(steps):
         seen, moment = data.lines.at(frequency)
-        products = notched_products(frequency, pulses, data.bands)
+        products = notched_products(frequency, pulses, data.strong.bands)
         # lines that lie in one another may come out as large ones that cancel: together they hold no more than is seen
         most = smooth(np.abs(seen) ** 2 * pulses / level) - 1
         together = lines_at_one_place(frequency, pulses)

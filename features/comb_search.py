@@ -343,7 +343,7 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     if low * SEARCHED_RATIO >= high:
         return None
     evidence = data.contrast
-    tried = [(coarse_spacings(data, evidence, centre), centre) for centre in data.centres]
+    tried = [(coarse_spacings(data, evidence, centre), centre) for centre in data.strong.centres]
     if data.rest_half > 0:
         for spacing, centre in free_spacings(data, evidence):
             if abs(centre) < data.rest_half:
@@ -359,7 +359,7 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     chosen = _families(spacings, scores, centres, data.pulses)
     fine = 1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * data.pulses)
     # a line's frequency is known to a hundredth of a bin; the phase of a correlation tells less
-    shifts = [(0.0,) if centres[i] in data.centres else CENTRE_SHIFTS for i in chosen]
+    shifts = [(0.0,) if centres[i] in data.strong.centres else CENTRE_SHIFTS for i in chosen]
     family = np.repeat(np.arange(len(chosen)), [len(fine) * len(s) for s in shifts])
     centres = np.concatenate(
         [np.repeat(centres[i] + np.array(s) / data.pulses, len(fine)) for i, s in zip(chosen, shifts, strict=True)]

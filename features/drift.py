@@ -213,10 +213,10 @@ def ahead_left(
     ]
     still = sum_of_lines(pulses, frequency, 2j * np.pi * amplitudes)
     # what the record gains by each polynomial of each rotor, and by another velocity or an acceleration of the body
-    gained = remove_bands(np.concatenate([*(shapes * one for one in turned), shapes[:2] * still]), data.bands)
+    gained = remove_bands(np.concatenate([*(shapes * one for one in turned), shapes[:2] * still]), data.strong.bands)
     # what other amplitudes would make of it does not count
     seen = against_lines(np.concatenate([gained, rest[None]]), frequency).T
-    products = notched_products(frequency, pulses, data.bands).plain
+    products = notched_products(frequency, pulses, data.strong.bands).plain
     snr = np.concatenate([fit.snr for fit in fits])
     products.flat[:: len(products) + 1] += np.where(lines_at_one_place(frequency, pulses) > 1, 1 / snr, LEAST_RIDGE)
     as_lines = whole(np.asarray(np.linalg.solve(products, parts(seen)), np.float64))

@@ -153,7 +153,7 @@ def _second_comb(data: Periodogram, comb: Comb, furthest: float) -> tuple[Gear |
     if fitted is None:
         return None, "no second comb: fewer than three lines of it are usable"
     (first, second), samples = fitted
-    lines = remove_bands(sum_of_lines(data.pulses, second.frequencies, second.amplitudes), data.bands)
+    lines = remove_bands(sum_of_lines(data.pulses, second.frequencies, second.amplitudes), data.strong.bands)
     gear = Gear(replace(comb, fit=first, rest=samples), second, data.left(data.samples - lines))
     if not GEAR_RANGE[0] <= gear.ratio <= GEAR_RANGE[1]:
         return None, "no second comb: its fit left the range of gear ratios"

@@ -17,7 +17,7 @@ from .octaves import over_neighbours
 from .one_channel import half_empty
 from .slow_lines import remove_bands
 from .spectrum import Spectrum, doppler_spectrum
-from .strong_lines import strong_lines
+from .strong_lines import StrongLines, strong_lines
 
 #: So many bins beside what was taken out the noise is thinner: it would lower the level of its block.
 THINNED_BINS = 4
@@ -70,12 +70,8 @@ class Periodogram:
         Its square: noise has mean 1.
     level : ndarray of float64, same shape
         The local level [noise power a sample].
-    bands : tuple of (float, float)
-        Centre [cycles a sample] and half width [bins] of what was taken out.
-    centres : tuple of float
-        Where the body line may be [cycles a sample], strongest first: about these a comb is sought.
-    centres_db : tuple of float
-        Their levels over the floor [dB].
+    strong : StrongLines
+        The strong slow lines: what was taken out, and the centres about which a comb is sought.
     wavelength_m, prf_hz : float
         Of the radar.
     one_channel : bool
@@ -86,9 +82,7 @@ class Periodogram:
     amplitude: NDArray[np.complex64]
     power: NDArray[np.float32]
     level: NDArray[np.float64]
-    bands: tuple[tuple[float, float], ...]
-    centres: tuple[float, ...]
-    centres_db: tuple[float, ...]
+    strong: StrongLines
     wavelength_m: float
     prf_hz: float
     one_channel: bool
@@ -96,7 +90,7 @@ class Periodogram:
     @property
     def blocked(self) -> tuple[tuple[float, float], ...]:
         """Centre and half width [cycles a sample] of what was taken out, with a margin."""
-        return _blocked(self.bands, self.pulses)
+        return _blocked(self.strong.bands, self.pulses)
 
     @property
     def rest_half(self) -> float:
@@ -338,9 +332,7 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
         (amplitude / np.sqrt(level)).astype(np.complex64),
         whitened,
         level,
-        strong.bands,
-        strong.centres,
-        strong.centres_db,
+        strong,
         spectrum.wavelength_m,
         spectrum.prf_hz,
         bool(half_empty(spectrum.relative_power)),

@@ -24,7 +24,17 @@ MOST_NOTCH_BINS = 160
 
 @dataclass(frozen=True)
 class StrongLines:
-    """What `Periodogram` has under these names, of one record."""
+    """What is strong and slow in one record.
+
+    Parameters
+    ----------
+    bands : tuple of (float, float)
+        Centre [cycles a sample] and half width [bins] of what is to be taken out.
+    centres : tuple of float
+        Where the body line may be [cycles a sample], strongest first: about these a comb is sought.
+    centres_db : tuple of float
+        Their levels over the floor [dB].
+    """
 
     bands: tuple[tuple[float, float], ...]
     centres: tuple[float, ...]

@@ -85,7 +85,7 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None)
         whole.snr[strong],
     )
     told = replace(comb, fit=own, rest=rest, blades=best, blades_sure=sure and most > UNEQUAL_NATS)
-    return data.left(data.samples - remove_bands(weak, data.bands)), told
+    return data.left(data.samples - remove_bands(weak, data.strong.bands)), told
 
 
 def _mirrored(fit: CombFit, parts: int, pulses: int) -> bool:
@@ -101,7 +101,7 @@ def _image_of_lines(data: Periodogram, fit: CombFit, space: LineSpace, level: Le
     """
 
     def line_at(place: float) -> float:
-        lines = zip(data.centres, data.centres_db, strict=True)
+        lines = zip(data.strong.centres, data.strong.centres_db, strict=True)
         return max((10 ** (db / 10) for line, db in lines if abs(line - place) * data.pulses < 1), default=0.0)
 
     body, mirror = line_at(fit.centre), np.array([-fit.centre])

@@ -76,6 +76,11 @@ def test_usage_errors_are_one_line(calls, capsys, arguments, said):
     assert calls == []
 
 
+def test_an_option_without_its_value_points_to_no_other_help(calls, capsys):
+    assert main(["train", "--records"]) == 2
+    assert capsys.readouterr().err.endswith(" (see --help)\n")
+
+
 @pytest.mark.parametrize("arguments", [["--help"], ["predict", "--help"], ["train", "--help"], ["report", "--help"]])
 def test_help_goes_to_stdout(capsys, arguments):
     assert main(arguments) == 0

@@ -73,7 +73,7 @@ def test_combs_are_fitted_whatever_way_each_changes():
         own = white(rng, len(orders))
         samples = samples + own @ turning_lines(body, rate_hz / records.PRF_HZ, ahead, orders, PULSES)
     data, _ = family_of(white(rng, PULSES).astype(np.complex64))
-    data = replace(data, samples=samples * 100, bands=())
+    data = replace(data, samples=samples * 100, strong=replace(data.strong, bands=()))
     starts = [
         Start((rate_hz + 0.05) / records.PRF_HZ, 30, even_change(change, PULSES))
         for rate_hz, change in zip(rates_hz, (0.005, -0.01), strict=True)
@@ -225,7 +225,8 @@ def test_without_a_notch_nothing_is_said_on_the_way(capfd):
     rng = np.random.default_rng(5)
     iq = 30.0 * (np.arange(PULSES) % 300 == 0) + white(rng, PULSES)
     measure(iq.astype(np.complex64), **records.RADAR)
-    data = replace(prepared(iq.astype(np.complex64), doppler_spectrum(iq, **records.RADAR)), bands=())
+    data = prepared(iq.astype(np.complex64), doppler_spectrum(iq, **records.RADAR))
+    data = replace(data, strong=replace(data.strong, bands=()))
     starts = [Start(1 / 300, 30, even_change(0.001, PULSES))]
     fit_changing(data, starts, 0.0, degrees=2, steps=2, level_about=lambda f: np.ones(np.shape(f)))
     assert capfd.readouterr() == ("", "")

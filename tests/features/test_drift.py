@@ -190,7 +190,7 @@ def test_straightened_to_its_ends():
     noise = np.sqrt(spectrum.floor)
     even = straightened(data, found.comb, found.edge, least_gain=0.0)
     # an even rotor has turned as far, on the mean over the dwell
-    error = even.samples * noise - remove_bands(comb(time + change * records.PULSES / 24), data.bands)
+    error = even.samples * noise - remove_bands(comb(time + change * records.PULSES / 24), data.strong.bands)
     ends = np.abs(time) > 0.495 * records.PULSES
     assert np.mean(np.abs(error[ends]) ** 2) < 300  # of 30 samples; the comb has 2880, without margins 410 are wrong
     assert np.mean(np.abs(error) ** 2) < 4.5  # of which 1 is the noise; without margins 5.5
