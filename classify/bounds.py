@@ -44,10 +44,12 @@ def require_size(path: Path) -> int:
     Raises
     ------
     BadInput
-        It is larger than what is read.
+        It is larger than what is read, or a pipe or a device.
     OSError
         It cannot be looked at.
     """
+    if not path.is_file():
+        raise BadInput(f"{path}: a pipe or a device, no file: copy what it gives into one")
     size = path.stat().st_size
     if size > MOST_BYTES:
         raise BadInput(f"{path}: {size} bytes are more than the {MOST_BYTES} that are read at once: cut it into parts")

@@ -1,31 +1,26 @@
 """The command line: what each command takes, and where its work is done."""
 
 import json
-import os
 import sys
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from .bounds import LEAST_RECORDS
 from .errors import BadInput, Interrupted
 from .exits import complain, exit_code, mend_streams
-
-if TYPE_CHECKING:
-    from rich.console import Console
+from .terminal import console
 
 app = typer.Typer(
     name="bladewing",
     add_completion=False,
     rich_markup_mode=None,  # else the units in [brackets] are taken for markup
 )
-
-_LONGEST_LINE = 10_000
 
 Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]
 
@@ -43,7 +38,8 @@ Recordings = Annotated[
     typer.Argument(
         metavar="RECORDING",
         readable=False,
-        help="SigMF (.sigmf-meta, .sigmf-data, their stem, or an archive .sigmf), .npy, .npz or .mat.",
+        help="SigMF (.sigmf-meta, .sigmf-data, their stem, or an archive .sigmf), .npy, .npz or .mat. "
+        "One named twice is answered once.",
         show_default=False,
     ),
 ]
@@ -122,8 +118,13 @@ def predict(
     """Say of each dwell of each recording: uav, bird, clutter or unknown, with probabilities and the reason."""
     from . import predict as work
     from .inference import Classifier
+    from .samples import positive
 
     dwell_s = work.checked_dwell_s(dwell)
+    rule = {"--budget-us": budget_us, "--max-false-alarm": max_false_alarm, "--coverage": coverage}
+    for option, value in rule.items():
+        if value is not None:
+            positive(value, option)
     classifier = Classifier.load(model, budget_us=budget_us, max_false_alarm=max_false_alarm, coverage=coverage)
     if budget_us is not None:  # it follows from a timing of this moment
         complain(f"the budget of {budget_us:g} us buys the model {classifier.name}", kind="note")
@@ -143,7 +144,7 @@ def predict(
             for line in result.json_objects():
                 print(json.dumps(line, allow_nan=False))
         else:
-            result.print(_console())
+            result.print(console())
         sys.stdout.flush()
     if not as_json and said.total() + unreadable > 1:
         print(work.summary(said, unreadable), flush=True)
@@ -192,7 +193,7 @@ def measure(
             for line in result.json_objects():
                 print(json.dumps(line, allow_nan=False))
         else:
-            print_measured(result, _console())
+            print_measured(result, console())
         sys.stdout.flush()
         clearest = result.clearer(clearest)
     if plot is not None and clearest is not None:
@@ -379,15 +380,6 @@ def _goes_on(kept: Path) -> Iterator[None]:
         raise Interrupted(f"what is done is kept in {kept}: the same command goes on") from None
 
 
-def _console() -> "Console":
-    """Where answers are printed: as wide as the terminal, and in a pipe or a file as wide as a line is."""
-    from rich.console import Console
-
-    columns = os.environ.get("COLUMNS", "")
-    unbounded = columns.strip("0") == "" if columns else not sys.stdout.isatty()  # no terminal has no columns
-    return Console(highlight=False, width=_LONGEST_LINE if unbounded else None)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
@@ -405,3 +397,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None and not sys.warnoptions:
         warnings.simplefilter("ignore")  # a library's warning is for developers, unless one asks for it with -W
     return exit_code(lambda: typer.main.get_command(app).main(arguments, prog_name="bladewing", standalone_mode=False))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import NoReturn
 
 import numpy as np
 from bladewing.features.allocator import keep_freed
@@ -43,7 +44,7 @@ _STEP_INPUTS = 4096
 _TOLD = len(CLASSES) + 1  # columns of what is told of a record: the classes' probabilities and that of mere noise
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Prediction:
     """The answers for a batch of records.
 
@@ -202,6 +203,9 @@ class Classifier:
             name = chosen_name(budget_us=budget_us, single=True)
         content, source = read_model(name)
         return cls(content, source=source, threads=threads, max_false_alarm=max_false_alarm, coverage=coverage)
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a classifier is neither pickled nor copied deeply: load it in each process, Classifier.load()")
 
     @property
     def name(self) -> str:

@@ -32,7 +32,7 @@ def decide(probabilities: NDArray[np.floating], accept: Sequence[float]) -> tupl
     for row, best in zip(probabilities.tolist(), probabilities.argmax(axis=-1).tolist(), strict=True):
         named = row[best] >= accept[best]
         labels.append(CLASSES[best] if named else UNKNOWN)
-        reasons.append("" if named else f"not sure: best {CLASSES[best]} {_below(row[best], accept[best])}")
+        reasons.append("" if named else f"not sure: best {_below(CLASSES[best], row[best], accept[best])}")
     return np.array(labels, _LABEL), reasons
 
 
@@ -64,16 +64,19 @@ def decide_by_sets(
         if len(held) != 1:
             reason = f"not sure: {' or '.join(held) or 'no class is likely'} at coverage {coverage:g}"
         elif held == ["uav"] and least_uav is not None and row[0] < (least := max(least_uav, *row)):
-            reason = f"not sure: uav {_below(row[0], least)}"
+            reason = f"not sure: {_below('uav', row[0], least)}"
         labels.append(UNKNOWN if reason else held[0])
         reasons.append(reason)
     return np.array(labels, _LABEL), reasons
 
 
-def _below(value: float, limit: float) -> str:
-    """`value < limit` with two decimals, or as many as it takes to tell them apart."""
+def _below(name: str, value: float, limit: float) -> str:
+    """`name value < limit` with two decimals, or as many as it takes to tell them apart."""
+    if limit > 1:  # see `NEVER` of the calibration
+        cure = "but no threshold of this model is precise enough to name it: train with more records"
+        return f"{name} {value:.2f}, {cure}"
     for decimals in range(2, 7):
         left, right = f"{value:.{decimals}f}", f"{limit:.{decimals}f}"
         if left != right:
             break
-    return f"{left} < {right}"
+    return f"{name} {left} < {right}"

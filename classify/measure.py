@@ -57,6 +57,9 @@ WHOLE = ("comb_order", "rotor_count", "blades")
 #: What a recording's JSON object holds of the wingbeat and of the body's course.
 WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std", "acceleration_mps2", "acceleration_mps2_std")
 
+#: Pulses of a dwell at most, as of one that is named: to measure so many takes a quarter of a minute.
+MOST_PULSES = 65_536
+
 #: No dwell knows the body better.
 LEAST_STD_MPS = 1e-6
 
@@ -95,7 +98,7 @@ class Settings:
         return cls(checked_dwell_s(dwell_s), blades, None if beta_deg is None else math.radians(beta_deg))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Measured:
     """What was measured in one recording.
 
@@ -274,13 +277,18 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     Raises
     ------
     BadInput
-        The recording holds fewer than 2 pulses, or a frequency is no radar's.
+        The recording holds fewer than 2 pulses, a dwell more than `MOST_PULSES`, or a frequency is no radar's.
     """
     if len(recording.iq) < 2:
         raise BadInput(f"{recording.name}: 1 pulse: a measurement needs at least 2")
     if beyond := beyond_radars(recording.carrier_hz, recording.prf_hz):
         raise BadInput(f"{recording.name}: {beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3")
     iq = recording.dwells(settings.dwell_s, least=2)
+    if iq.shape[1] > MOST_PULSES:
+        raise BadInput(
+            f"{recording.name}: a dwell of {settings.dwell_s:g} s takes {iq.shape[1]} pulses, more than {MOST_PULSES}: "
+            f"give --dwell in seconds, {0.99 * MOST_PULSES / recording.prf_hz:.2g} at most"
+        )
     whole = made_analytic(recording.iq)  # as a whole: dwells made so would each have ends of their own
     if whole is not recording.iq:  # what is silent stays so
         iq = np.where(iq.any(axis=-1, keepdims=True), whole[: iq.size].reshape(iq.shape), np.complex64(0))

@@ -52,7 +52,7 @@ def terms(point: "OperatingPoint", *, by_sets: bool = False) -> str:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Answer:
     """What is said of one recording.
 
@@ -174,7 +174,9 @@ def distinct(paths: Iterable[Path]) -> Iterator[Path]:
     seen = set()
     for path in paths:
         try:
-            key = find_recording(path).resolve()
+            found = find_recording(path)
+            # a link is a name of its own: metadata of several recordings may be one file, its samples lie beside it
+            key = found.parent.resolve() / found.name
         except BadInput:
             key = path
         if key not in seen:

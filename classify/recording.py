@@ -19,7 +19,7 @@ from .sigmf_file import find_sigmf, read_sigmf
 _SAME = 1e-9  # relative: an option that repeats the file's number may be rounded as text is
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recording:
     """Slow-time samples of one range cell.
 
@@ -79,7 +79,12 @@ class Recording:
         """
         if dwell_s * self.prf_hz < 0.5:
             asked = f"a dwell of {dwell_s:g} s holds no pulse at a PRF of {self.prf_hz:g} Hz"
-            raise BadInput(f"{self.name}: {asked}: give more than {1 / self.prf_hz:.2g} s")
+            cure = (
+                f"give the PRF in hertz, {1 / self.prf_hz:g} if that is the interval from pulse to pulse"
+                if self.prf_hz < 1
+                else f"give more than {1 / self.prf_hz:.2g} s"
+            )
+            raise BadInput(f"{self.name}: {asked}: {cure}")
         pulses = max(least, round(min(dwell_s * self.prf_hz, len(self.iq))))
         count = len(self.iq) // pulses
         return self.iq[: count * pulses].reshape(count, pulses)

@@ -115,9 +115,13 @@ def read_sigmf(path: Path) -> SigmfSamples:
 def _read_pair(path: Path) -> SigmfSamples:
     import sigmf
 
+    text = b""
     try:
-        metadata = json.loads(read_bounded(path, MOST_TEXT_BYTES))
+        text = read_bounded(path, MOST_TEXT_BYTES)
+        metadata = json.loads(text)
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        if not text:
+            raise BadInput(f"{path}: the file is empty (0 bytes): copy it again") from None
         raise BadInput(f"{path}: not JSON: {error}: SigMF metadata are a JSON object") from None
     except RecursionError:
         raise BadInput(f"{path}: nested too deep to be read: SigMF metadata are an object of a few levels") from None

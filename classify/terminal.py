@@ -1,10 +1,24 @@
-"""Tables on the terminal, none of whose numbers is ever cut and no line of which ends in spaces."""
+"""Where answers are printed, and tables there: none of their numbers is ever cut, no line of theirs ends in spaces."""
 
+import os
+import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
+
+
+_LONGEST_LINE = 10_000
+
+
+def console() -> "Console":
+    """Where answers are printed: as wide as the terminal, and in a pipe or a file as wide as a line is."""
+    from rich.console import Console
+
+    columns = os.environ.get("COLUMNS", "")
+    unbounded = columns.strip("0") == "" if columns else not sys.stdout.isatty()  # no terminal has no columns
+    return Console(highlight=False, width=_LONGEST_LINE if unbounded else None)
 
 
 def print_table(console: "Console", table: "Table") -> None:

@@ -28,7 +28,7 @@ from .model_file import COVERAGES, CURVE_KEY, FORMAT, KINDS_KEY, SETS_KEY
 from .parts import TRAIN_PARTS, Parts
 from .progress import Progress
 from .train_network import OnFraction, ScoresOf, Taught, epochs_of, train_net
-from .training_account import ACCOUNT, covered, figures, print_table
+from .training_account import ACCOUNT, covered, figures, print_account
 from .training_config import TrainingConfig, training_config
 from .training_costs import add_costs
 
@@ -151,7 +151,7 @@ def _train_all(
     write_together(out, files)
     parts.forget()
     if progress:
-        print_table(account, out)
+        print_account(account, out)
     return account
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .labels import CLASSES
 from .ladder import CASCADE, COST_KEY, STAGES_KEY
+from .terminal import console, print_table
 
 #: Name of the account beside the models.
 ACCOUNT = "train.json"
@@ -46,13 +47,12 @@ def figures(
     }
 
 
-def print_table(account: dict[str, Any], out: Path) -> None:
+def print_account(account: dict[str, Any], out: Path) -> None:
     """Write the table of all models to the terminal."""
-    from rich.console import Console
     from rich.table import Table
 
     title = f"{account['records']['test']} test records, looked at once"
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("model", no_wrap=True)
     for column in ("accuracy", "found", "false", "named", "right", "ECE", "kB", "s", "FFTs"):
         table.add_column(column, justify="right", no_wrap=True)
@@ -72,9 +72,10 @@ def print_table(account: dict[str, Any], out: Path) -> None:
             f"{model['seconds']:.0f}" if "seconds" in model else "",
             f"{model[COST_KEY]:.1f}",
         )
-    console = Console(highlight=False)
-    console.print(table)
-    console.print(
+    printed = console()
+    printed.print(title)
+    print_table(printed, table)
+    printed.print(
         "accuracy  balanced over the classes; radars of 2 to 100 GHz, dwells from 5 ms,\n"
         "          SNR from -20 dB: many records hold nothing to see\n"
         f"found     UAVs found where {100 * account['false_alarm']:.3g}% of birds and clutter would be called UAV\n"
@@ -86,10 +87,10 @@ def print_table(account: dict[str, Any], out: Path) -> None:
     if cascade:
         first, second = cascade[STAGES_KEY]
         useless = " (so many that the second alone is as fast)" if cascade["asked"] > MOST_ASKED else ""
-        console.print(
+        printed.print(
             f"cascade   {first} first, then {second}\n"
             f"          about the {cascade['asked']:.0%} that it is not sure of{useless}"
         )
     since = " since the interruption" if account["resumed"] else ""
     took = f"trained in {account['seconds']['all']:.0f} s{since}"
-    console.print(f"Models and {ACCOUNT} are in {out}; {took}.", soft_wrap=True)
+    printed.print(f"Models and {ACCOUNT} are in {out}; {took}.", soft_wrap=True)

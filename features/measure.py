@@ -53,8 +53,8 @@ def measure(
     beta_rad : float, optional
         Angle between the line of sight and the rotor plane [rad], 0 <= beta < pi/2.
     on_record : callable, optional
-        Called after each record with the number of those done: a record takes some hundredths of a second, and up to
-        two where several rotors change or are not told apart.
+        Called after each record with the number of those done: one of 3000 pulses takes some hundredths of a second,
+        and up to two where several rotors change or are not told apart; one of 65 536 pulses a quarter of a minute.
 
     Returns
     -------

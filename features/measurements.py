@@ -15,7 +15,7 @@ EACH_ROTOR = ("rotor_rates_hz", "rotor_rates_hz_std", "rotor_drifts_hz_per_s", "
 BLADE_CHOICES = (1, 2, 3, 4, 5)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Measurements:
     """What `measure` found; every array has the batch's leading shape, NaN where there is no value.
 

@@ -35,7 +35,7 @@ _FLOOR_BLOCKS = 64  # a side of the spectrum
 _EMPTY_RATIO = np.array(4, np.float32)  # a side this much below the other holds no noise of its own
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Spectrum:
     """Power spectra on their own axes, in units of their noise floors.
 

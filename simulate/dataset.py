@@ -92,7 +92,7 @@ _LONG_CHANCE = 0.12  # of a radar whose dwell is `long_dwell_s`, as tracks' are:
 _MAX_LONG_PULSES = 65536  # longest record of those
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Records:
     """Labelled slow-time records.
 

@@ -1,5 +1,6 @@
 """`bladewing train` and `bladewing report` hand their options on; help and usage errors of the whole command line."""
 
+import json
 import subprocess
 import sys
 import types
@@ -9,6 +10,8 @@ from pathlib import Path
 
 import pytest
 from bladewing.classify.cli import main
+from bladewing.classify.training_account import ACCOUNT, print_account
+from bladewing.models import pretrained
 
 
 @pytest.fixture
@@ -92,6 +95,23 @@ def test_help_goes_to_stdout(capsys, arguments):
 def test_the_version_is_that_of_the_package(capsys):
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == metadata.version("bladewing") + "\n"
+
+
+@pytest.mark.parametrize("module", ["bladewing.classify", "bladewing.classify.cli"])
+def test_modules_run_as_the_program_does(module):
+    command = [sys.executable, "-m", module, "measure", "gone"]
+    told = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (told.returncode, told.stdout) == (2, "")
+    assert told.stderr.startswith("bladewing: error: gone: no such file")
+
+
+def test_an_account_of_a_training_is_not_wrapped_in_a_pipe(capsys):
+    account = json.loads((Path(pretrained.__file__).parent / ACCOUNT).read_text())
+    account["cascade"]["asked"] = 0.95
+    print_account(account, Path("out"))
+    lines = capsys.readouterr().out.splitlines()
+    assert "          about the 95% that it is not sure of (so many that the second alone is as fast)" in lines
+    assert not any(line.endswith(" ") for line in lines)
 
 
 def test_help_shows_units(capsys):

@@ -171,6 +171,16 @@ def test_both_files_of_a_recording_are_answered_once(run_json, sigmf_pair):
     assert [line["file"] for line in lines] == [str(data)] * 3
 
 
+def test_links_to_the_same_metadata_are_recordings_of_their_own(run_json, sigmf_pair):
+    first, second = sigmf_pair("a"), sigmf_pair("b", iq=noise(1600))
+    for meta in (first, second):
+        meta.unlink(missing_ok=True)
+        meta.symlink_to("common.json")
+    (first.parent / "common.json").write_bytes(sigmf_pair("other").read_bytes())
+    closing = [line for line in run_json(first, second) if "track" in line]
+    assert [(line["file"], line["track"]["dwells"]) for line in closing] == [(str(first), 2), (str(second), 1)]
+
+
 def test_arrays_take_the_radar_from_the_options(run_json, tmp_path):
     np.save(tmp_path / "iq.npy", noise(1600).reshape(-1, 1))
     np.savez(tmp_path / "two.npz", a=noise(1600), b=noise(3200))
@@ -263,6 +273,9 @@ def test_names_are_never_taken_for_markup_or_escape_codes(run, sigmf_pair):
         (("{rec}", "--carrier-hz", "0"), "carrier given (--carrier-hz) is 0"),
         (("{rec}", "--prf-hz", "x"), "--prf-hz is 'x': it must be a number"),
         (("{rec}", "--variable", "x"), "variable 'x' given"),
+        (("{rec}", "--max-false-alarm", "0"), "--max-false-alarm is 0: it must be a finite number above 0"),
+        (("{rec}", "--coverage", "-1"), "--coverage is -1"),
+        (("{rec}", "--budget-us", "nan"), "--budget-us is nan"),
         (("{rec}", "--no-such-option"), "No such option: --no-such-option"),
         ((), "Missing argument 'RECORDING'"),
         (("{folder}",), "is a directory: name the recordings in it"),

@@ -1,5 +1,7 @@
+import copy
 import json
 import os
+import pickle
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 
@@ -8,6 +10,7 @@ import pytest
 from bladewing.classify import BadInput, Classifier, inference, model_file
 from bladewing.classify.model_file import model_names
 from bladewing.features import model_inputs
+from bladewing.models.calibration import NEVER
 from bladewing.simulate import Radar, draw_records
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -113,6 +116,26 @@ def test_each_class_has_its_own_limit(make_model, probabilities, label, reason):
     answer = model.predict(noise(200), **RADAR)
     assert (answer.labels, answer.reasons) == (label, reason)
     np.testing.assert_allclose(answer.probabilities, probabilities, rtol=1e-4)
+
+
+def test_a_class_that_the_model_never_names_is_told_as_such(make_model):
+    model = Classifier(make_model(bias=np.log((0.2, 0.2, 0.6)), accept=json.dumps([0.62, 0.45, NEVER])))
+    answer = model.predict(noise(200), **RADAR)
+    said = "best clutter 0.60, but no threshold of this model is precise enough to name it: train with more records"
+    assert (answer.labels, answer.reasons) == ("unknown", f"not sure: {said}")
+
+
+def test_answers_compare_as_objects_do(always_uav):
+    one, other = (always_uav.predict(noise(200), **RADAR) for _ in range(2))
+    assert one == one
+    assert one != other
+    assert one in [other, one]
+
+
+@pytest.mark.parametrize("copied", [pickle.dumps, copy.deepcopy])
+def test_a_classifier_says_why_it_is_not_handed_to_another_process(always_uav, copied):
+    with pytest.raises(TypeError, match=r"load it in each process, Classifier\.load"):
+        copied(always_uav)
 
 
 def test_a_model_without_kinds_tells_of_no_noise(mixed):

@@ -112,6 +112,13 @@ def test_what_is_shorter_than_a_dwell_is_said_to_be_left_out(folder, capsys):
         assert said in capsys.readouterr().out
 
 
+def test_a_dwell_of_more_pulses_than_can_be_measured_is_refused(tmp_path, capsys):
+    np.save(tmp_path / "long.npy", np.ones(70_000, np.complex64))
+    assert main(["measure", str(tmp_path / "long.npy"), *RADAR, "--dwell", "80"]) == 2
+    said = f"a dwell of 80 s takes 70000 pulses, more than 65536: give --dwell in seconds, {64880 / PRF_HZ:.2g} at most"
+    assert said in capsys.readouterr().err
+
+
 def test_the_reason_for_no_rotor_is_given_whole(folder, capsys):
     assert main(["measure", str(folder / "drone.npy"), *RADAR, "--dwell", "0.018"]) == 0
     # two flashes a dwell

@@ -109,6 +109,17 @@ def test_a_directory_is_refused_with_the_cure(tmp_path):
         load_recording(tmp_path)
 
 
+def test_a_pipe_is_no_recording(tmp_path):
+    os.mkfifo(tmp_path / "pipe.npy")
+    assert "a pipe or a device, no file" in refused(tmp_path / "pipe.npy")
+
+
+def test_an_interval_given_as_the_prf_is_told_as_such():
+    recording = Recording("walk", np.ones(100, np.complex64), 24e9, 40e-6)
+    with pytest.raises(BadInput, match="give the PRF in hertz, 25000 if that is the interval from pulse to pulse"):
+        recording.dwells(0.08)
+
+
 @pytest.mark.parametrize("name", ["gone.npy", "gone.mat", "gone.sigmf-meta", "gone.sigmf-data", "gone.sigmf", "gone"])
 def test_a_missing_file_is_named(tmp_path, name):
     assert "no such file" in refused(tmp_path / name)

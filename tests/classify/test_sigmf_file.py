@@ -118,7 +118,8 @@ def test_one_altered_byte_is_found_by_the_hash(sigmf_pair):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "not JSON"),
+        ("", r"the file is empty \(0 bytes\)"),
+        (" ", "not JSON"),
         ("{", "not JSON"),
         ("[" * 100_000, "nested too deep"),
         ('{"global": ' + "9" * 6000 + "}", "a number in it has thousands of digits"),
