@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from .series import looks
-from .svg import INK, MUTED, PAPER, SERIES, Panel, drawing, panel
+from .svg import MUTED, PAPER, SERIES, Panel, drawing, panel
 from .ticks import log_ticks, percent_ticks
 from .words import batch_words, count, micros, number, percent, size, spoken
 
@@ -67,19 +67,19 @@ def front(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def stages(report: Mapping[str, Any]) -> list[Panel]:
-    """Median time of every step, one panel a batch size; a tick marks the 99th percentile."""
+    """Median time of every step, one panel a batch size, each with a tick at its 99th percentile."""
     panels = []
     look = looks([model["name"] for model in report["models"]])
     for part in report["cost"]["batches"]:
         rows = part["stages"]
         with drawing(height_in=0.8 + 0.2 * len(rows)) as (figure, axes):
-            least = min(row["median_us"] for row in rows) / 2
-            for i, row in enumerate(rows):
+            for i, row in enumerate(rows):  # dots: a bar's length says nothing on a scale without a zero
                 colour = look[row["name"]].colour if row["stage"] in ("model", "chain") else MUTED
-                alpha = 1.0 if row["stage"] in ("chain", "fft") else 0.55
-                axes.barh(i, row["median_us"] - least, left=least, height=0.7, color=colour, alpha=alpha)
-                axes.plot([row["p99_us"]] * 2, [i - 0.35, i + 0.35], color=INK, linewidth=1.1)
-            axes.set_xlim(left=least)
+                whole = row["stage"] in ("chain", "fft")
+                axes.plot([row["median_us"], row["p99_us"]], [i, i], color=colour, linewidth=1.4)
+                axes.plot([row["p99_us"]] * 2, [i - 0.25, i + 0.25], color=colour, linewidth=1.4)
+                filled = colour if whole else PAPER
+                axes.plot(row["median_us"], i, "o", color=colour, markersize=6, markerfacecolor=filled)
             _log_times(axes, "µs a record; tick: 99th percentile")
             axes.set_yticks(range(len(rows)), [stage_name(row) for row in rows])
             axes.set_ylim(len(rows) - 0.4, -0.6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,8 +16,9 @@ from .words import percent, spoken
 
 GROUPS = ("all", "uav", "bird", "clutter")
 _TITLES = {"all": "All records", "uav": "UAV records", "bird": "Bird records", "clutter": "Clutter records"}
-# A point over fewer records than this says little and is left out of the lines; the tables keep it.
+# A point over fewer records than this says little: the lines break there; the tables keep it.
 LEAST_RECORDS = 10
+_GAP = dict.fromkeys(("value", "low", "high"), math.nan)
 
 
 def accuracy_by_snr(report: Mapping[str, Any]) -> list[Panel]:
@@ -53,14 +55,15 @@ def _lines(axes: Axes, report: Mapping[str, Any], by: str, group: str, *, centre
     names = [model["name"] for model in report["models"]]
     words = []
     for name, look in looks(names).items():
-        slices = [one for one in report["scores"][name][by] if one[group]["count"] >= LEAST_RECORDS]
-        if not slices:
+        slices = report["scores"][name][by]
+        rates = [one[group] if one[group]["count"] >= LEAST_RECORDS else _GAP for one in slices]
+        known = [rate for rate in rates if rate is not _GAP]
+        if not known:
             continue
         x = [centre(one["from"] * unit, one["to"] * unit) for one in slices]
-        rates = [one[group] for one in slices]
         banded(axes, x, rates, look.colour, look.marker)
         words.append(
-            f"{name}: {percent(rates[0]['value'])} at the left end, {percent(rates[-1]['value'])} at the right."
+            f"{name}: {percent(known[0]['value'])} at the left end, {percent(known[-1]['value'])} at the right."
         )
     axes.axhline(1 / 3, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
     return " ".join(words)

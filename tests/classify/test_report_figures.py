@@ -1,13 +1,16 @@
 """The README's figures and the model card are those of the committed report."""
 
+import copy
 import importlib.util
 import json
+import re
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
 from bladewing.classify.report.card import model_card
+from bladewing.classify.report.draw_scores import GROUPS, LEAST_RECORDS, accuracy_by_snr
 
 ROOT = Path(__file__).parents[2]
 CURE = "run: python docs/figures.py"
@@ -54,3 +57,17 @@ def test_committed_report_is_of_the_shipped_models(report: dict[str, Any]) -> No
     shipped = {path.stem: path.read_bytes() for path in (ROOT / "models" / "pretrained").glob("*.onnx")}
     said = {model["name"]: model["sha256"] for model in report["models"] if model["sha256"] is not None}
     assert said == {name: hashlib.sha256(content).hexdigest() for name, content in shipped.items()}
+
+
+def test_a_step_of_few_records_breaks_the_lines_of_its_class_alone(report: dict[str, Any]) -> None:
+    changed = copy.deepcopy(report)
+    for scores in changed["scores"].values():
+        scores["by_snr"][5]["uav"]["count"] = LEAST_RECORDS - 1
+
+    def drawn(told: dict[str, Any]) -> list[str]:
+        return [panel.svg for panel in accuracy_by_snr(told)]
+
+    whole, broken = drawn(report), drawn(changed)
+    assert [one == other for one, other in zip(whole, broken, strict=True)] == [group != "uav" for group in GROUPS]
+    begun = [len(re.findall(r"\bM -?\d", svgs[GROUPS.index("uav")])) for svgs in (whole, broken)]
+    assert begun[1] >= begun[0] + len(report["models"])  # each line begins once more
