@@ -349,7 +349,6 @@ def edge_around(
             blades,
             scatter=scatter,
             leak=SEVERAL_LEAK,
-            plain=True,
             spread=relative,
         )
 

@@ -264,6 +264,20 @@ def test_blades_unlike_the_ideal_one_stay_within_what_is_stated(blade, snr_db):
     assert np.median(relative) < 0.012
 
 
+@pytest.mark.parametrize("fall", [1.5, -1.5], ids=["less at the tip", "more at the tip"])
+def test_several_rotors_of_blades_that_reflect_unevenly_stay_within_what_is_stated(fall):
+    rng, length_m, rates_hz = np.random.default_rng(0), 0.12, 58 * np.array([1.0, 1.004, 1.009, 1.013])
+    along = (np.arange(200) + 0.5) / 200
+    turned_rad = 2 * np.pi * np.arange(PULSES) / PRF_HZ * rates_hz[:, None] + rng.uniform(0, 2 * np.pi, (4, 1))
+    phase_rad = 4 * np.pi / WAVELENGTH_M * length_m * np.cos(turned_rad)
+    both = 2 * np.cos(phase_rad[..., None] * along) @ np.exp(fall * (1 - along))  # opposite blades
+    both -= both.mean(axis=1, keepdims=True)
+    echo = (both * np.exp(2j * np.pi * rng.uniform(size=(4, 1)))).sum(axis=0)
+    found = measure(3 * (echo / echo.std() + 10) + white(rng, PULSES), **RADAR, blades=2)
+    band_hz = 8 * np.pi * rates_hz.max() * length_m / WAVELENGTH_M
+    assert abs(found.bandwidth_hz - band_hz) < min(0.015 * band_hz, 2 * found.bandwidth_hz_std)
+
+
 @pytest.mark.parametrize("gamma", [150.0, 470.0])
 def test_the_edge_of_blades_that_reflect_at_their_tips_is_found_far_out_too(gamma):
     # strong lines still show five past the edge there: the search went half as far
