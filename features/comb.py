@@ -200,7 +200,7 @@ def finer_spacing(data: Periodogram, fit: CombFit) -> float | None:
     )
     spacings = fit.spacing / np.array([1, *fractions])
     finer = (spacings * data.pulses < MIN_SPACING_BINS) & (spacings * data.prf_hz > least_hz)
-    if not finer.any():
+    if not finer.any() or fit.is_folded:  # what comes back from the other end of the span lies between as well
         return None
     finer[0] = True
     spacings = spacings[finer]
@@ -219,7 +219,7 @@ def slower_spacing(data: Periodogram, fit: CombFit) -> float | None:
     """
     spacings = fit.spacing / np.array([1, *SLOWER_FRACTIONS])
     slower = (spacings * data.prf_hz < CHOPPING_RANGE_HZ[0]) & (spacings * data.pulses >= SLOWER_BINS)
-    if not slower[1:].any() or fit.is_folded:  # what comes back from the other end of the span lies between as well
+    if not slower[1:].any() or fit.is_folded:  # as in `finer_spacing`
         return None
     slower[0] = True
     scores = _scores_near(data, fit, spacings[slower])

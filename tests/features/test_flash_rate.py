@@ -43,6 +43,15 @@ def test_the_chopping_frequency_is_not_a_fraction_whose_lines_are_the_same(turns
         assert np.isnan(found.rotation_hz)  # lines that come back between the others tell of no unlike blades
 
 
+def test_in_short_dwells_lines_that_come_back_are_none_of_a_finer_comb():
+    """They lay halfway between the others, and the dwell was said to be too short."""
+    right = 0
+    for seed in range(12):
+        iq, radar, chopping_hz = come_round(seed, Fraction(107, 2), dwell_s=0.028, blade_m=0.15)
+        right += abs(measure(iq, **radar).chopping_hz / chopping_hz - 1) < 0.01
+    assert right >= 6  # it was 2
+
+
 def test_a_comb_that_ends_within_the_span_or_does_not_come_round_is_left_as_it_is():
     iq = rotors([57.3]) + 0.1 * white(np.random.default_rng(0), 3000)
     data = prepare(iq.astype(np.complex64), carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
