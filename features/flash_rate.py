@@ -21,7 +21,7 @@ LEAST_OVER_NOISE = 10.0
 #: Factors by which a spacing may be too fine. Every so many-th line of the power holds one such part of it by chance;
 #: where blades flash at that multiple it holds of the rest this share more. Over twice the spacing so little is asked
 #: because the combs are asked as well: blades of an odd number flash twice a period, one on each side.
-FACTORS = {2: 0.06, 3: 0.13, 5: 0.13, 7: 0.13}
+FACTORS = {2: 0.06, 3: 0.13, 5: 0.2, 7: 0.2}
 
 
 def of_flashes(data: Periodogram, found: Candidate) -> Candidate:
