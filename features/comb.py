@@ -11,6 +11,8 @@ from .chopping import CHOPPING_RANGE_HZ
 from .comb_centre import centred
 from .comb_fit import CombFit, fit_combs
 from .comb_search import FINE_STEPS, MIN_SPACING_BINS, SEARCHED_RATIO, best_candidate, heights, spacing_limits
+from .flash_rate import of_flashes
+from .folding import may_come_back
 from .lines import LineSpace, squared
 from .periodogram import Periodogram
 
@@ -198,7 +200,7 @@ def finer_spacing(data: Periodogram, fit: CombFit) -> float | None:
     )
     spacings = fit.spacing / np.array([1, *fractions])
     finer = (spacings * data.pulses < MIN_SPACING_BINS) & (spacings * data.prf_hz > least_hz)
-    if not finer.any():
+    if not finer.any() or fit.is_folded:  # what comes back from the other end of the span lies between as well
         return None
     finer[0] = True
     spacings = spacings[finer]
@@ -217,7 +219,7 @@ def slower_spacing(data: Periodogram, fit: CombFit) -> float | None:
     """
     spacings = fit.spacing / np.array([1, *SLOWER_FRACTIONS])
     slower = (spacings * data.prf_hz < CHOPPING_RANGE_HZ[0]) & (spacings * data.pulses >= SLOWER_BINS)
-    if not slower[1:].any() or fit.is_folded:  # what comes back from the other end of the span lies between as well
+    if not slower[1:].any() or fit.is_folded:  # as in `finer_spacing`
         return None
     slower[0] = True
     scores = _scores_near(data, fit, spacings[slower])
@@ -272,7 +274,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
         return None, _too_short(data)
     if start.score < threshold(data):
         return None, f"no comb: evidence {start.score:.1f} below {threshold(data):.0f} nats"
-    start, open_orders = centred(data, start)
+    start, open_orders = centred(data, of_flashes(data, start))
     fitted = fit_combs(data, start.centre, [start.spacing], [(start.low, start.high)])
     if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
         return None, f"no comb: fewer than {LEAST_LINES} lines"
@@ -300,4 +302,5 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
         if of_mains(fit, data, start.score, number):
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"
     last = max(start.high, -start.low)
-    return Comb(fit, fitted[1], last, per_turn, open_orders * fit.spacing, per_turn, per_turn > 1), ""
+    is_sure = per_turn > 1 and not may_come_back(last, fit.spacing)  # further lines fall on every so many-th
+    return Comb(fit, fitted[1], last, per_turn, open_orders * fit.spacing, per_turn, is_sure), ""

@@ -9,9 +9,10 @@ from scipy import fft
 
 from .comb import Comb
 from .comb_fit import CombFit
+from .left_flashes import others_flash
 from .lines import squared
 from .periodogram import Periodogram
-from .rotors import RESOLVED_BINS, Rotors
+from .rotors import RATE_SPREAD, RESOLVED_BINS, Rotors
 
 #: A rotor flashes once a period on each side of the body. A second flash of this share of the first one's power is
 #: another rotor's, of a rate that the dwell does not tell apart; so far from the first it is no part of it [1 / lines].
@@ -181,6 +182,8 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float, *, fitted
     # lines that come back from the other end of the span are none of a family that ends within it
     contradicted = not several and rotors.fits[0].is_folded and edge < 0.5
     past = (not several or fitted_to is not None) and _stands_past(about, rotors.fits, fitted_to or edge)
+    if fitted_to is None and others_flash(data, rotors.rest, (fit.spacing for fit in rotors.fits), edge):
+        return not_all(rotors, data, 2 * RATE_SPREAD * float(rotors.rates.mean()))  # they may be any of one airframe
     if not (twice or hidden or past or contradicted or share > (LEFT_SHARE if several else LEFT_ALONE)):
         return rotors
     apart = abs(rotors.next_rate - float(rotors.rates[0])) if hidden and not several else 0.0

@@ -11,6 +11,7 @@ import numpy as np
 from .comb import LEAST_LINES, UNEQUAL_NATS, Comb, blade_numbers, two_means_nats
 from .comb_fit import CombFit, fit_combs
 from .comb_search import MIRROR_BINS, from_mirror_bins
+from .folding import may_come_back
 from .lines import LineSpace, squared, sum_of_lines
 from .periodogram import Level, Periodogram
 from .slow_lines import remove_bands
@@ -66,6 +67,7 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None)
         if there.mean() > beside.mean() and nats > LEAST_NATS:
             best, most = parts, nats
             sure = not _mirrored(fit, parts, data.pulses) or there.mean() - 1 > IMAGE_FACTOR * image
+            sure &= not may_come_back(last, fit.spacing)  # further lines fall between
     if best == 1:
         return data, comb
     reach = (int(fit.orders.min()) * best, int(fit.orders.max()) * best)
