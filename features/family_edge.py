@@ -349,6 +349,7 @@ def edge_around(
             blades,
             scatter=scatter,
             leak=SEVERAL_LEAK,
+            plain=True,
             spread=relative,
         )
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 #: No blade reflects quite evenly: where a line is strong, at so large a share of the tip's order, tells how that place
 #: on the blade reflects. The logarithm of the powers follows these powers of the distance from the tip, each by a
 #: factor of this standard deviation. (Chords that taper to half at the tip are off by 2 % with none of it, and then by
-#: less than 1 %. Of several rotors not told apart, blades of such laws and of all profiles, a tenth is off by 2 to 3 %
-#: with next to none of it and with blades that begin at the hub, and then by 1 to 2 %.)
+#: less than 1 %. Of several rotors that are not told apart, of blades of such laws, one in ten is off by 3 to 8 % with
+#: next to none of it, and then by 2 to 3 %.)
 BENDS, BEND_STD = (0.5, 1.0, 2.0), 1.0
 
 #: Gauss-Newton steps of the level and its bends, none of them larger than this [nepers of power].

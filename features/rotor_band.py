@@ -111,6 +111,7 @@ def fit_edge(
     *,
     scatter: NDArray[np.float64] | float = 0.0,
     leak: float = LEAK_SHARE,
+    plain: bool = False,
     spread: float = 0.0,
 ) -> tuple[float, float]:
     """Fit the edge of a line family.
@@ -123,6 +124,9 @@ def fit_edge(
         Blades of the rotor: they set how sharp the edge is. Those of `BLADES` are tried where it is not known.
     leak : float
         Share of the family's power that lines may leak past its edge: that much, or less by `LEAST_LEAK`.
+    plain : bool
+        Take blades to reflect from the hub to the tip, or there alone: where the lines of several rotors run into one
+        another, they strengthen and weaken one another from order to order as those of other blades do.
     spread : float
         Range of several rotors' rates over their mean, in whose multiples the orders are counted: what lies about a
         high order is then of its neighbours too.
@@ -141,7 +145,7 @@ def fit_edge(
         leaks.append(LEAST_LEAK * leaks[-1])
     tried = _Hypotheses(
         tuple(BLADES) if blades is None else (blades,),
-        np.arange(len(PROFILES)),
+        np.arange(2 if plain else len(PROFILES)),
         np.arange(len(shares))[::-FIRST_SHARES],
         tuple(leaks),
     )
