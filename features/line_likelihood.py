@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 #: No blade reflects quite evenly: where a line is strong, at so large a share of the tip's order, tells how that place
 #: on the blade reflects. The logarithm of the powers follows these powers of the distance from the tip, each by a
-#: factor of this standard deviation. (Chords that taper to half at the tip are off by 2 % with none of it, and then by
-#: less than 1 %. Of several rotors that are not told apart, of blades of such laws, one in ten is off by 3 to 8 % with
-#: next to none of it, and then by 2 to 3 %.)
-BENDS, BEND_STD = (0.5, 1.0, 2.0), 1.0
+#: factor of this standard deviation, or next to nothing. (Chords that taper to half at the tip are off by 2 % with none
+#: of it, and then by less than 1 %.)
+BENDS, BEND_STD, PLAIN_BEND = (0.5, 1.0, 2.0), 1.0, 0.05
 
 #: Gauss-Newton steps of the level and its bends, none of them larger than this [nepers of power].
 LEVEL_STEPS, LONGEST_STEP = 2, 3.0
@@ -60,6 +59,7 @@ def log_likelihood(
     shape: NDArray[np.float64],
     away: NDArray[np.float64],
     start: NDArray[np.float64],
+    bend_std: float,
     shares: NDArray[np.float64],
     leak: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -77,6 +77,8 @@ def log_likelihood(
         How far from the tip each line speaks of, 0 at the tip to 1 at the hub.
     start : ndarray, shape (len(BENDS),)
         Bends to begin from.
+    bend_std : float
+        How far each may go.
     shares : ndarray, shape (shares,)
         How unlike the model the powers may be, beyond their `scatter`: variance over the mean's square.
     leak : float
@@ -111,8 +113,8 @@ def log_likelihood(
     bent = np.empty((bends.shape[1], each[1] * each[2]))
     bent[0] = np.broadcast_to(np.log(level), each[1:]).ravel()
     bent[1:] = start[:, None]
-    left = _stepped(bent, bends, each, single)
-    held = (BEND_STD**-2 * (np.arange(len(bent)) > 0))[:, None]
+    left = _stepped(bent, bends, bend_std, each, single)
+    held = (bend_std**-2 * (np.arange(len(bent)) > 0))[:, None]
     line = np.exp((bends @ bent).astype(np.float32)).reshape(each)
     line *= family
     mean = line + (noise + leak)[:, None, None].astype(np.float32)
@@ -134,6 +136,7 @@ def log_likelihood(
 def _stepped(
     bent: NDArray[np.float64],
     bends: NDArray[np.float64],
+    bend_std: float,
     each: tuple[int, int, int],
     single: Sequence[NDArray[np.float32]],
 ) -> NDArray[np.float64]:
@@ -146,7 +149,7 @@ def _stepped(
     pairs = np.stack([bends[:, row] * bends[:, column] for row, column in places]).astype(np.float32)
     along = bends.astype(np.float32)
     # a level of any size is as likely, what is left of its logarithm counts as if it were known to one
-    known = np.array([1.0, *[BEND_STD**-2] * (len(bent) - 1)])
+    known = np.array([1.0, *[bend_std**-2] * (len(bent) - 1)])
     held = known * (np.arange(len(bent)) > 0)
     left = np.zeros(bent.shape[1])
     for _ in range(LEVEL_STEPS):

@@ -11,8 +11,8 @@ from scipy import fft
 
 #: How likely beforehand blades are that reflect evenly, points at their tips, a model of the literature rather than a
 #: blade, blades that begin anywhere between these shares of their length, and even ones with a point at the tip, of so
-#: large a share of the amplitude of the whole blade at rest and of any phase.
-PROFILES, ROOTS, TIP_AMPLITUDE = (0.5, 0.05, 0.35, 0.1), (0.03, 0.6), 0.2
+#: large a share of the amplitude of the whole blade at rest and of a phase whose cosine is 0 or, to either side, this.
+PROFILES, ROOTS, TIP_AMPLITUDE, TIP_COSINE = (0.5, 0.05, 0.35, 0.04, 0.03, 0.03), (0.03, 0.6), 0.2, 0.87
 
 #: Lines this weak beside a blade at rest, 60 dB under any that counts, are none: single precision leaves a third of it,
 #: and beyond so large a phase deviation [rad] more with its root.
@@ -68,7 +68,8 @@ def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[
     begins = np.clip((blades * np.arange(1, count + 1) / gamma[:, None] - ROOTS[0]) / (ROOTS[1] - ROOTS[0]), 0, 1)
     level = 1 / gamma[:, None]
     ends = (np.abs(amplitudes[0]) - level) ** 2 + level**3 / (np.pi * np.mean(ROOTS))
-    return np.stack([even, tip, begins * even + (1 - begins) * ends, even + TIP_AMPLITUDE**2 * tip])
+    both, beat = even + TIP_AMPLITUDE**2 * tip, 2 * TIP_COSINE * TIP_AMPLITUDE * amplitudes[0] * amplitudes[1]
+    return np.stack([even, tip, begins * even + (1 - begins) * ends, both, both + beat, both - beat])
 
 
 def spread_powers(gamma: NDArray[np.float64], blades: int, count: int, spread: float) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from .line_likelihood import BENDS, OrderPowers, log_likelihood
+from .line_likelihood import BEND_STD, BENDS, PLAIN_BEND, OrderPowers, log_likelihood
 from .line_shapes import PROFILES, spread_powers
 
 #: Blades that a fit to an unknown number of them tries, and how likely they are beforehand.
@@ -125,8 +125,8 @@ def fit_edge(
     leak : float
         Share of the family's power that lines may leak past its edge: that much, or less by `LEAST_LEAK`.
     plain : bool
-        Take blades to reflect from the hub to the tip, or there alone: where the lines of several rotors run into one
-        another, they strengthen and weaken one another from order to order as those of other blades do.
+        Take blades to reflect evenly or at their tips alone: where the lines of several rotors run into one another,
+        what falls off says nothing more of them.
     spread : float
         Range of several rotors' rates over their mean, in whose multiples the orders are counted: what lies about a
         high order is then of its neighbours too.
@@ -155,6 +155,7 @@ def fit_edge(
     furthest = float(order[-1]) + _half_range(order[-1], fewest)  # nothing speaks for an edge that nothing shows
     most = max(tried.blades)
     step = max(STEP if most <= max(BLADES) else STEP_GAMMA / most, (high - low) / MOST_STEPS)
+    bend_std = PLAIN_BEND if plain else BEND_STD
     bent, edge = np.zeros(len(BENDS)), high
     for search in range(SEARCHES):
         apart, edges = step, np.arange(max(low, LEAST_EDGE), high + step, step)
@@ -165,7 +166,7 @@ def fit_edge(
         away = np.clip(1 - near.order / edge, 0, 1)
         # the first search asks the leak of the least sharp edge alone: it only says about which lines to look
         said = [
-            log_likelihood(near, shape, away, bent, shares[tried.shares], one * loud)
+            log_likelihood(near, shape, away, bent, bend_std, shares[tried.shares], one * loud)
             for one in (tried.leaks if search else tried.leaks[:1])
         ]
         nats, bent = np.stack([one for one, _ in said]), max(said, key=lambda one: float(one[0].max()))[1]

@@ -264,20 +264,6 @@ def test_blades_unlike_the_ideal_one_stay_within_what_is_stated(blade, snr_db):
     assert np.median(relative) < 0.012
 
 
-@pytest.mark.parametrize("fall", [1.5, -1.5], ids=["less at the tip", "more at the tip"])
-def test_several_rotors_of_blades_that_reflect_unevenly_stay_within_what_is_stated(fall):
-    rng, length_m, rates_hz = np.random.default_rng(0), 0.12, 58 * np.array([1.0, 1.004, 1.009, 1.013])
-    along = (np.arange(200) + 0.5) / 200
-    turned_rad = 2 * np.pi * np.arange(PULSES) / PRF_HZ * rates_hz[:, None] + rng.uniform(0, 2 * np.pi, (4, 1))
-    phase_rad = 4 * np.pi / WAVELENGTH_M * length_m * np.cos(turned_rad)
-    both = 2 * np.cos(phase_rad[..., None] * along) @ np.exp(fall * (1 - along))  # opposite blades
-    both -= both.mean(axis=1, keepdims=True)
-    echo = (both * np.exp(2j * np.pi * rng.uniform(size=(4, 1)))).sum(axis=0)
-    found = measure(3 * (echo / echo.std() + 10) + white(rng, PULSES), **RADAR, blades=2)
-    band_hz = 8 * np.pi * rates_hz.max() * length_m / WAVELENGTH_M
-    assert abs(found.bandwidth_hz - band_hz) < min(0.015 * band_hz, 2 * found.bandwidth_hz_std)
-
-
 @pytest.mark.parametrize("gamma", [150.0, 470.0])
 def test_the_edge_of_blades_that_reflect_at_their_tips_is_found_far_out_too(gamma):
     # strong lines still show five past the edge there: the search went half as far
@@ -310,8 +296,8 @@ def test_whatever_orders_are_seen_an_edge_is_found(data):
     assert std >= 0
 
 
-def test_a_point_at_the_tip_of_even_blades_shows_in_the_deviation():
-    """It is strongest where the band ends, at a phase of its own: half of the tips came out 4 % and more too fast."""
+def test_a_point_at_the_tip_of_even_blades_is_told_whatever_its_phase():
+    """It is strongest where the band ends; of points of any phase at once half of the tips came out 1.4 % off."""
     errors, off = [], []
     for seed in range(24):
         rng = np.random.default_rng(seed)
@@ -325,8 +311,8 @@ def test_a_point_at_the_tip_of_even_blades_shows_in_the_deviation():
         tip_mps = 2 * np.pi * rate_hz * 0.15
         off.append(found.tip_speed_mps / tip_mps - 1)
         errors.append((found.tip_speed_mps - tip_mps) / found.tip_speed_mps_std)
-    assert np.median(np.abs(off)) < 0.025
-    assert np.sqrt(np.nanmean(np.square(errors))) < 3.0  # it was 5
+    assert np.median(np.abs(off)) < 0.002
+    assert np.sqrt(np.nanmean(np.square(errors))) < 1.5
 
 
 def test_noise_at_the_end_of_the_span_is_no_family_that_fills_it():
