@@ -3,6 +3,7 @@
 import bz2
 import io
 import lzma
+import stat
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -48,9 +49,10 @@ def require_size(path: Path) -> int:
     OSError
         It cannot be looked at.
     """
-    if not path.is_file():
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):
         raise BadInput(f"{path}: a pipe or a device, no file: copy what it gives into one")
-    size = path.stat().st_size
+    size = status.st_size
     if size > MOST_BYTES:
         raise BadInput(f"{path}: {size} bytes are more than the {MOST_BYTES} that are read at once: cut it into parts")
     return size

@@ -71,10 +71,10 @@ def decide_by_sets(
 
 
 def _below(name: str, value: float, limit: float) -> str:
-    """`name value < limit` with two decimals, or as many as it takes to tell them apart."""
-    if limit > 1:  # see `NEVER` of the calibration
-        cure = "but no threshold of this model is precise enough to name it: train with more records"
-        return f"{name} {value:.2f}, {cure}"
+    """`name value < limit` with two decimals, or as many as it takes to tell them apart; or that no value is enough."""
+    if limit > 1:  # as `NEVER` of the calibration, and what an operating point may ask
+        why = "but no threshold of this model is precise enough to name it: train with more records"
+        return f"{name} {value:.2f}, {why}"
     for decimals in range(2, 7):
         left, right = f"{value:.{decimals}f}", f"{limit:.{decimals}f}"
         if left != right:

@@ -14,6 +14,7 @@ from bladewing.features.measurements import BODY, EACH_ROTOR, Measurements
 from bladewing.features.one_channel import made_analytic
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
+from .envelope import Envelope
 from .errors import BadInput
 from .measure_words import counted
 from .predict import checked_dwell_s, distinct
@@ -58,7 +59,7 @@ WHOLE = ("comb_order", "rotor_count", "blades")
 WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std", "acceleration_mps2", "acceleration_mps2_std")
 
 #: Pulses of a dwell at most, as of one that is named: to measure so many takes a quarter of a minute.
-MOST_PULSES = 65_536
+MOST_PULSES = Envelope.pulses_max
 
 #: No dwell knows the body better.
 LEAST_STD_MPS = 1e-6

@@ -115,7 +115,6 @@ def read_sigmf(path: Path) -> SigmfSamples:
 def _read_pair(path: Path) -> SigmfSamples:
     import sigmf
 
-    text = b""
     try:
         text = read_bounded(path, MOST_TEXT_BYTES)
         metadata = json.loads(text)

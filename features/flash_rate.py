@@ -39,7 +39,7 @@ def of_flashes(data: Periodogram, found: Candidate) -> Candidate:
         return found
     highest = spacing_limits(data.pulses, data.prf_hz)[1]
     multiples = [multiple for multiple in _flash_multiples(data, found.spacing) if multiple * found.spacing <= highest]
-    if multiples in ([], [1]):
+    if not multiples:
         return found
     steps = 1 + np.arange(-2 * FINE_STEPS, 2 * FINE_STEPS + 1) / (FINE_STEPS * data.pulses)
     spacings = np.outer(multiples, found.spacing * steps).ravel()
@@ -72,6 +72,8 @@ def _flash_multiples(data: Periodogram, spacing: float) -> list[int]:
             and share(factor) > 1 / factor + more * (1 - 1 / factor)
         ):
             multiple *= factor
+    if multiple == 1:
+        return []
     return [multiple, multiple // 2] if multiple % 2 == 0 else [multiple]
 
 

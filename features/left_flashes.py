@@ -40,8 +40,10 @@ def others_flash(data: Periodogram, rest: NDArray[np.complex128], rates: Iterabl
     edge : float
         Edge of the line family [cycles a sample from the body].
     """
+    if edge < NEARLY_FILLED:
+        return False
     left = squared(rest)
-    if edge < NEARLY_FILLED or left.mean() < (1 - LEAST_EXPLAINED) * squared(data.samples).mean():
+    if left.mean() < (1 - LEAST_EXPLAINED) * squared(data.samples).mean():
         return False
     return min(_unevenness(left, rate) for rate in rates) > MOST_UNEVEN
 

@@ -75,10 +75,9 @@ def stages(report: Mapping[str, Any]) -> list[Panel]:
         with drawing(height_in=0.8 + 0.2 * len(rows)) as (figure, axes):
             for i, row in enumerate(rows):  # dots: a bar's length says nothing on a scale without a zero
                 colour = look[row["name"]].colour if row["stage"] in ("model", "chain") else MUTED
-                whole = row["stage"] in ("chain", "fft")
                 axes.plot([row["median_us"], row["p99_us"]], [i, i], color=colour, linewidth=1.4)
                 axes.plot([row["p99_us"]] * 2, [i - 0.25, i + 0.25], color=colour, linewidth=1.4)
-                filled = colour if whole else PAPER
+                filled = colour if row["stage"] in ("chain", "fft") else PAPER
                 axes.plot(row["median_us"], i, "o", color=colour, markersize=6, markerfacecolor=filled)
             _log_times(axes, "µs a record; tick: 99th percentile")
             axes.set_yticks(range(len(rows)), [stage_name(row) for row in rows])
