@@ -16,10 +16,10 @@ from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
 from .envelope import Envelope
 from .errors import BadInput
-from .measure_words import counted
 from .predict import checked_dwell_s, distinct
 from .progress import Progress
 from .recording import Recording, load_recording
+from .terminal import counted
 
 #: What a dwell's JSON object holds beside its times and the reason, in this order.
 VALUES = (

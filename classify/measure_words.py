@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from bladewing.features.measurements import BODY
+from bladewing.features.rotor.comb import OVER_BODY
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
-from bladewing.features.steady_comb import OVER_BODY
 
 from .errors import one_line
-from .terminal import print_table
+from .terminal import counted, print_table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -169,8 +169,3 @@ def signed(velocity_mps: float, std_mps: float) -> str:
     if std_mps >= 1:
         return with_error(velocity_mps, std_mps)
     return f"{round(velocity_mps, 2) + 0.0:+.2f} +- {max(std_mps, 0.01):.2f}"  # not -0.00
-
-
-def counted(dwells: int) -> str:
-    """A number of dwells in words."""
-    return f"{dwells} dwell{'s' * (dwells != 1)}"

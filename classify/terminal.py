@@ -21,6 +21,11 @@ def console() -> "Console":
     return Console(highlight=False, width=_LONGEST_LINE if unbounded else None)
 
 
+def counted(dwells: int) -> str:
+    """A number of dwells in words."""
+    return f"{dwells} dwell{'s' * (dwells != 1)}"
+
+
 def print_table(console: "Console", table: "Table") -> None:
     """Print a table; a terminal too narrow for what must not be wrapped gets narrow gaps, then wraps the lines."""
     from rich.cells import cell_len

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bodies import LINE_DB, tops
-from .comb_centre import AT_REST_BINS
-from .comb_fit import CombFit
 from .notch import LOBE_BINS
-from .periodogram import Periodogram
+from .rotor.comb_centre import AT_REST_BINS
+from .rotor.comb_fit import CombFit
+from .rotor.periodogram import Periodogram
 from .spectrum import KAISER_BETA, NOISE_BANDWIDTH_BINS, Spectrum
 
 #: What the interpolation between bins is off by [bins], and by how much noise moves it where a line stands at its floor

@@ -12,7 +12,7 @@ from .measure_record import measure_record
 from .measurements import EACH_ROTOR, Measurements
 from .one_channel import made_analytic
 from .one_thread import one_thread
-from .rotors import MAX_ROTORS
+from .rotor.rotors import MAX_ROTORS
 from .spectrum import doppler_spectrum, finite_complex
 
 #: Radars that are measured [Hz]: beyond, a frequency was given in another unit.

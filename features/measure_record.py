@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from .bandwidth import threshold_band_hz
 from .body_velocity import body_velocity, folded
 from .chopping import Chopping
-from .family import Family, as_wheels, find_family, slower_than_rotors, too_few_flashes
-from .family_edge import SPAN, edge_around, edge_of_lines, span_of, surer_edge
-from .folding import FASTEST_TIP_MPS, fastest_tip
 from .measurements import BODY, EACH_ROTOR, Measurements
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
-from .periodogram import prepared
-from .rotors import MAX_ROTORS, hidden_shift
+from .rotor.family import Family, as_wheels, find_family, slower_than_rotors, too_few_flashes
+from .rotor.family_edge import SPAN, edge_around, edge_of_lines, span_of, surer_edge
+from .rotor.folding import FASTEST_TIP_MPS, fastest_tip
+from .rotor.periodogram import prepared
+from .rotor.rotors import MAX_ROTORS, hidden_shift
 from .smearing import wide_smearing_index
 from .spectrum import LEAST_PART, Spectrum, largest_part
 

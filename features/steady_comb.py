@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .body_velocity import folded
-from .comb import find_comb
 from .following import by_recording, normed
 from .one_thread import one_thread
-from .periodogram import prepare
+from .rotor.comb import OVER_BODY, find_comb
+from .rotor.periodogram import prepare
 from .spectrum import SPEED_OF_LIGHT_MPS
 
 #: Length of a dwell [s], short enough for a rate that changes, and its pulses at least and at most: more cost time and
@@ -25,10 +25,6 @@ DWELLS, LEAST = 8, 3
 
 #: Chopping frequencies are the same where their logarithms differ by less: in flight a controller moves them so far.
 SAME = 0.08
-
-#: A wheel rolls: its lines reach from rest to twice the body's velocity, as far from the body as that moves. A rotor's
-#: must reach further by this factor. On simulated tracks of 2.5 s it keeps 0.02 of vehicles (0.12 without it).
-OVER_BODY = 1.15
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """Signals of known spectra for the tests of this folder."""
 
 import numpy as np
-from bladewing.features.family import Family, find_family
-from bladewing.features.periodogram import Periodogram, prepared
+from bladewing.features.rotor.family import Family, find_family
+from bladewing.features.rotor.periodogram import Periodogram, prepared
 from bladewing.features.spectrum import doppler_spectrum
 from bladewing.simulate import RotorMotion, rotor_echo
 

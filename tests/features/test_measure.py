@@ -4,16 +4,16 @@ from threading import Event, Thread
 import numpy as np
 import pytest
 from bladewing.features import measure
-from bladewing.features.clicks import CLICK_OVER_BESIDE, CLICK_POWER, without_clicks
-from bladewing.features.comb import find_comb, strong_multiple
-from bladewing.features.comb_fit import fit_combs
-from bladewing.features.flashes import flash_nats
 from bladewing.features.lines import LineSpace, line_products, sum_of_lines
 from bladewing.features.one_thread import one_thread
-from bladewing.features.periodogram import prepare
-from bladewing.features.rotors import MAX_ROTORS
-from bladewing.features.slow_lines import notched_products, remove_bands, slepian
-from bladewing.features.strong_lines import MOST_NOTCH_BINS
+from bladewing.features.rotor.clicks import CLICK_OVER_BESIDE, CLICK_POWER, without_clicks
+from bladewing.features.rotor.comb import find_comb, strong_multiple
+from bladewing.features.rotor.comb_fit import fit_combs
+from bladewing.features.rotor.flashes import flash_nats
+from bladewing.features.rotor.periodogram import prepare
+from bladewing.features.rotor.rotors import MAX_ROTORS
+from bladewing.features.rotor.slow_lines import notched_products, remove_bands, slepian
+from bladewing.features.rotor.strong_lines import MOST_NOTCH_BINS
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 from bladewing.simulate.catalogue import AIRFRAMES
 from scipy.signal import hilbert

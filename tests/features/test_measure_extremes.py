@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from bladewing.features import measure, rotors
-from bladewing.features.comb import LEAST_REACH_MPS
+from bladewing.features import measure
+from bladewing.features.rotor import rotors
+from bladewing.features.rotor.comb import LEAST_REACH_MPS
 from bladewing.simulate import Radar, draw_records
 
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors_by_chance, white

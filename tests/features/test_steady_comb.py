@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
-from bladewing.features.steady_comb import DWELL_S, DWELLS, LEAST, OVER_BODY, steady_comb
+from bladewing.features.rotor.comb import OVER_BODY
+from bladewing.features.steady_comb import DWELL_S, DWELLS, LEAST, steady_comb
 
 from .signals import white
 

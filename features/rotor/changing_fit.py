@@ -1,0 +1,262 @@
+"""Combs whose rates change within the dwell, each in its own way: fitted to the record as it is, all together.
+
+A line turns with its rotor, whatever way that turns. Inner products of such lines have no closed form: each step forms
+them, for ten times what one of `fit_combs` takes.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..lines import middle_times, squared
+from .comb_fit import ENOUGH, NOTCH_RIDGE, CombFit, lines_at_one_place, orders_within, over_orders, ridges
+from .periodogram import LEAST_LEVEL, Level, Periodogram
+from .slow_lines import band_basis, remove_bands
+from .turning import inverse_of, other_rate, polynomials
+
+#: A step takes lines^2 x pulses multiplications and holds several times lines x pulses samples, no more than these.
+MOST_PRODUCTS, MOST_SAMPLES = 3_000_000_000, 8_000_000
+
+
+def most_lines(pulses: int) -> int:
+    """How many lines are fitted together at most."""
+    return min(int(np.sqrt(MOST_PRODUCTS / pulses)), MOST_SAMPLES // pulses)
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where the fit of a comb begins.
+
+    Parameters
+    ----------
+    rate : float
+        Spacing of its lines [cycles a sample].
+    reach : int
+        Outermost order to both sides.
+    ahead : ndarray, shape (degrees,)
+        How far ahead of one that turns evenly it is, by polynomials of `DEGREES` [samples].
+    """
+
+    rate: float
+    reach: int
+    ahead: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ChangingFit(CombFit):
+    """A comb of lines that turn with a rotor whose rate changes.
+
+    Parameters
+    ----------
+    ahead, ahead_std : ndarray of float64, shape (degrees,)
+        How far ahead of one that turns evenly it is, by polynomials of `DEGREES`, and standard deviations [samples];
+        infinite where it was taken to be 0.
+    """
+
+    ahead: NDArray[np.float64]
+    ahead_std: NDArray[np.float64]
+
+
+def turning_lines(
+    body: NDArray[np.float64], rate: float, ahead: NDArray[np.float64], orders: NDArray[np.intp], pulses: int
+) -> NDArray[np.complex64]:
+    """Unit lines that turn with a rotor, shape (lines, pulses); their phases count from the middle of the record.
+
+    Parameters
+    ----------
+    body : ndarray, shape (pulses,)
+        Turns of the body's line.
+    rate : float
+        From order to order [cycles a sample].
+    ahead : ndarray, shape (degrees,)
+        As of `ChangingFit`.
+    orders : ndarray of int, shape (lines,)
+        Orders.
+    pulses : int
+        Pulses of the record.
+    """
+    time = middle_times(pulses)
+    turn = 2 * np.pi * rate * (time + ahead @ polynomials(time, pulses))
+    powers = np.empty((int(np.abs(orders).max()) + 1, pulses), np.complex64)
+    powers[0] = 1
+    powers[1:2] = np.exp(1j * turn)
+    for order in range(2, len(powers)):  # of two halves: errors grow with the logarithm of the order
+        np.multiply(powers[order // 2], powers[order - order // 2], out=powers[order])
+    out = powers[np.abs(orders)]
+    np.conjugate(out, out=out, where=(orders < 0)[:, None])
+    out *= np.exp(2j * np.pi * body).astype(np.complex64)
+    return out
+
+
+def _products(lines: NDArray[np.complex64], basis: NDArray[np.complex64]) -> NDArray[np.complex128]:
+    """Mean products of lines that what a basis spans was taken from; the upper triangle."""
+    from scipy.linalg import blas  # here, because predicting needs no such import
+
+    share = 1 / lines.shape[1]
+    out = blas.cherk(share, lines.T, trans=2)
+    if not len(basis):
+        return np.asarray(out, np.complex128)
+    held = lines @ basis.conj().T
+    return np.asarray(blas.cherk(-share, held.T, beta=1.0, c=out, trans=2, overwrite_c=True), np.complex128)
+
+
+def _factored(
+    products: NDArray[np.complex128], held_back: NDArray[np.float64]
+) -> tuple[tuple[NDArray[np.complex128], bool], NDArray[np.float64]] | None:
+    """Cholesky factor of products with what holds amplitudes back added, and that, larger where it had to be."""
+    from scipy.linalg import LinAlgError, cho_factor
+
+    diagonal = products.diagonal().copy()
+    for more in (0.0, NOTCH_RIDGE):
+        products.flat[:: len(products) + 1] = diagonal + held_back + more
+        try:
+            return cho_factor(products, check_finite=False), held_back + more
+        except LinAlgError:
+            continue
+    return None
+
+
+class _Turning:
+    """Rotors about a body, as their fit goes on: rates, how far ahead they are, and the lines that turn with them."""
+
+    def __init__(self, data: Periodogram, starts: Sequence[Start], centre: float, degrees: int) -> None:
+        self.pulses, self.count, self.degrees = data.pulses, len(starts), degrees
+        self.time = middle_times(data.pulses)
+        self.shapes = polynomials(self.time, data.pulses)[:degrees]
+        self.centre, self.pull = centre, 0.0
+        self.rates, self.ahead = np.array([one.rate for one in starts]), np.array([one.ahead for one in starts])
+        self.orders = [orders_within(data, centre, one.rate, (-one.reach, one.reach)) for one in starts]
+        self.order = np.concatenate(self.orders)
+        self.comb = np.repeat(np.arange(self.count), [len(own) for own in self.orders])
+        self.used = data.usable(self.frequency)
+        # no step turns an outermost line by more than half a turn
+        self._furthest = 0.5 / np.array([max(1, np.abs(own).max(initial=0)) for own in self.orders]) / self.rates
+
+    @property
+    def frequency(self) -> NDArray[np.float64]:
+        """Of each line on average [cycles a sample]."""
+        return np.asarray(self.centre + self.rates[self.comb] * self.order, np.float64)
+
+    def lines(self) -> NDArray[np.complex64]:
+        """All of them, shape (lines, pulses)."""
+        body = self.centre * self.time + self.pull * self.shapes[1]
+        each = zip(self.rates, self.ahead, self.orders, strict=True)
+        return np.concatenate([turning_lines(body, *rotor, self.pulses) for rotor in each])
+
+    def gained(self, lines: NDArray[np.complex64], counted: NDArray[np.complex64]) -> NDArray[np.complex128]:
+        """What a record gains by another velocity or an acceleration of the body and by each polynomial of each rotor.
+
+        Shape (2 + rotors x degrees, pulses), where lines have such amplitudes.
+        """
+        out = list(2j * np.pi * (counted @ lines) * self.shapes[:2])
+        leads = (counted * self.order).astype(np.complex64)
+        ends = np.searchsorted(self.comb, np.arange(self.count + 1))
+        for rate, (first, last) in zip(self.rates, pairwise(ends), strict=True):
+            out += list(2j * np.pi * rate * (leads[first:last] @ lines[first:last]) * self.shapes)
+        return np.array(out)
+
+    def take(self, step: NDArray[np.float64]) -> None:
+        """Go on by a step in what `gained` names."""
+        self.centre += float(np.clip(2 * step[0] / self.pulses, -0.5 / self.pulses, 0.5 / self.pulses))
+        self.pull += float(np.clip(step[1], -0.5, 0.5))
+        limit = self._furthest[:, None]
+        self.ahead[:, : self.degrees] += np.clip(step[2:].reshape(self.count, self.degrees), -limit, limit)
+        # its first polynomial is another rate
+        faster = 1 + np.array([other_rate(first, self.pulses) for first in self.ahead[:, 0]])
+        self.rates, self.ahead = self.rates * faster, self.ahead / faster[:, None]
+        self.ahead[:, 0] = 0
+
+    def fits(
+        self, std: NDArray[np.float64], amplitudes: NDArray[np.complex128], snr: NDArray[np.float64]
+    ) -> list[ChangingFit]:
+        """Each rotor's comb, with standard deviations in the order of `gained`."""
+        out = []
+        own_std = np.full(self.ahead.shape, np.inf)
+        own_std[:, : self.degrees] = std[2:].reshape(self.count, self.degrees)
+        centre_std = other_rate(std[0], self.pulses)
+        for rotor, rate in enumerate(self.rates):
+            own = (self.comb == rotor) & self.used
+            rate_std = other_rate(own_std[rotor, 0], self.pulses) * rate
+            known = (float(rate), self.centre, rate_std, centre_std)
+            lines = (self.order[own], amplitudes[own], snr[own])
+            out.append(ChangingFit(*known, *lines, self.ahead[rotor], own_std[rotor]))
+        return out
+
+
+def fit_changing(
+    data: Periodogram,
+    starts: Sequence[Start],
+    centre: float,
+    *,
+    degrees: int,
+    steps: int,
+    level_about: Level,
+) -> tuple[list[ChangingFit], NDArray[np.complex128]] | None:
+    """Fit combs whose rates change, by Gauss-Newton steps on how far ahead each is and on the body they are about.
+
+    That may accelerate. As `fit_combs` does it: amplitudes are Gaussian of the power seen about their lines, and
+    eliminated.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    starts : sequence of Start
+        Where each begins.
+    centre : float
+        Start of the centre [cycles a sample].
+    degrees : int
+        The first so many of `DEGREES` are fitted.
+    steps : int
+        Steps at most, >= 1.
+    level_about : callable
+        Local level without what is known of the combs already.
+
+    Returns
+    -------
+    (list of ChangingFit, ndarray of complex128 of shape (pulses,)) or None
+        A fit for each and the samples that they leave. None where a comb has fewer than three usable lines, or lines
+        lie in one another too closely.
+    """
+    from scipy.linalg import cho_solve  # here, because predicting needs no such import
+
+    pulses, turning = data.pulses, _Turning(data, starts, centre, degrees)
+    if min(np.bincount(turning.comb[turning.used], minlength=turning.count)) < 3:
+        return None
+    smooth = over_orders(turning.comb, turning.order)
+    basis = band_basis(pulses, data.strong.bands).astype(np.complex64)
+    least = LEAST_LEVEL if turning.count == 1 else 1.0
+    samples, level = data.samples.astype(np.complex64), level_about
+    snr = np.full(len(turning.order), np.inf)
+    for number in range(steps):
+        frequency, lines = turning.frequency, turning.lines()
+        noise = np.maximum(level(frequency), least)
+        seen = (lines @ samples.conj()).conj() / pulses
+        together = lines_at_one_place(frequency, pulses)
+        snr = np.minimum(snr, np.maximum((smooth(squared(seen) * pulses / noise) - 1) / together, 1e-3))
+        factored = _factored(_products(lines, basis), ridges(snr, together))
+        if factored is None:
+            return None
+        factor, held_back = factored
+        amplitudes = cho_solve(factor, seen, check_finite=False)
+        snr = np.maximum(smooth(squared(amplitudes * (1 + held_back)) * pulses / noise) - 1, 1e-3)
+        rest = remove_bands(data.samples - amplitudes.astype(np.complex64) @ lines, data.strong.bands)
+        counted = np.where(turning.used, amplitudes, 0).astype(np.complex64)
+        columns = remove_bands(turning.gained(lines, counted), data.strong.bands)
+        leaked = (lines @ columns.conj().T).conj() / pulses
+        kept = leaked.conj().T @ cho_solve(factor, leaked, check_finite=False)
+        counts = squared(counted * turning.order) + 1e-30
+        mean_noise = float(np.average(noise, weights=counts))
+        covariance = inverse_of(2 / mean_noise * (columns.conj() @ columns.T - pulses * kept).real)
+        step = covariance @ (2 / mean_noise * (columns.conj() @ rest).real)
+        std = np.sqrt(covariance.diagonal())
+        turning.take(step)
+        if number and np.all(np.abs(step) < ENOUGH * std):
+            break
+        level = data.level_of(rest)
+    # the noise is what the last step leaves, not what the one before it left
+    left = float(np.average(np.maximum(data.level_of(rest)(frequency), least), weights=counts))
+    return turning.fits(std * np.sqrt(left / mean_noise), amplitudes, snr), rest

@@ -1,0 +1,310 @@
+"""The comb of a rotor in one record: sought, judged against chance, fitted; or why there is none."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bodies import LINE_DB
+from ..chopping import CHOPPING_RANGE_HZ
+from ..lines import LineSpace, squared
+from .comb_centre import centred
+from .comb_fit import CombFit, fit_combs
+from .comb_search import FINE_STEPS, MIN_SPACING_BINS, SEARCHED_RATIO, best_candidate, heights, spacing_limits
+from .flash_rate import of_flashes
+from .folding import may_come_back
+from .periodogram import Periodogram
+
+#: Score that chance alone exceeds in under 1 % of the records: of white noise; where a line was taken out; where the
+#: static background was, with its skirt, or in one channel, whose combs are sought about two places [nats]. Checked by
+#: tests/benchmarks/measurement_tables.py.
+THRESHOLDS = (18.0, 18.0, 25.0)
+
+#: A rotor's lines reach at least so far from the body [m/s]; wings, limbs and wheels seldom do with so few lines.
+LEAST_REACH_MPS = 12.0
+
+#: A wheel rolls: its lines reach from rest to twice the body's velocity, as far from the body as that moves. A rotor's
+#: must reach further by this factor. On simulated tracks of 2.5 s it keeps 0.02 of vehicles (0.12 without it).
+OVER_BODY = 1.15
+
+#: A comb needs so many lines, at least.
+LEAST_LINES = 4
+
+#: A comb whose lines all lie on multiples of the mains is taken for the supply's, this near to them, relative: a simple
+#: converter's clock is off by some thousandths. Of two channels, and a comb that speaks loudly, less: that is what the
+#: mains themselves are off by.
+MAINS_HZ = (50.0, 60.0)
+MAINS_MULTIPLES = (1, 2, 3, 4, 6)
+MAINS_SHARE, MAINS_SHARE_OF_TWO = 0.0055, 0.0025
+
+#: Where fewer bins than this lie between multiples of the mains, any centre lies near one: only one at rest tells then.
+MAINS_BINS = 4.0
+
+#: Beside a static background a comb of less evidence [nats], or one channel's, is not believed at such a spacing,
+#: wherever its centre is: supplies click.
+MAINS_SCORE = 70.0
+
+#: A rotor has up to so many blades, if its number is not known.
+MOST_BLADES = 4
+
+#: Every k-th line stronger than the others by this factor in power: unequal blades, k to a turn.
+UNEQUAL_FACTOR = 4.0
+
+#: Among the outer half of the lines alone, they must be by this.
+OUTER_FACTOR = 2.5
+
+#: And so much must speak for two kinds of lines [nats]: near the noise every other one is strong by chance.
+UNEQUAL_NATS = 8.0
+
+#: A fraction of the spacing, where that is too fine for the search, may be the comb's nevertheless: if its lines speak
+#: for it as loudly as this beside those of the spacing found. Most rotors chop faster than so many hertz: where a dwell
+#: is too short for that, less is enough, and of further fractions.
+FRACTIONS, FRACTION_SHARE = (2, 3), 0.9
+USUAL_HZ, USUAL_FRACTIONS, USUAL_SHARE = 60.0, (2, 3, 4, 5, 6, 7, 8), 0.85
+
+#: A comb is no rotor's where lines so many times as dense, slower than rotors chop, speak for so many times as much:
+#: a full-size helicopter's for twice as much, noise between a rotor's lines for less than those alone. Asked where they
+#: are so many bins apart and more: fewer than a search takes, but these are about one that it found.
+SLOWER_FRACTIONS, SLOWER_SHARE, SLOWER_BINS = (2, 3, 4), 1.3, 1.5
+
+
+@dataclass(frozen=True)
+class Comb:
+    """A rotor's comb.
+
+    Parameters
+    ----------
+    fit : CombFit
+        All its lines; where `per_turn` is more than 1, weak ones between the strong included.
+    rest : ndarray of complex128, shape (pulses,)
+        Samples that its lines leave.
+    last : int
+        Outermost order that speaks for it.
+    per_turn : int
+        Strong lines are this many spacings apart: 1 for equal blades (or a lone one), else the number of blades.
+    body_std : float
+        Standard deviation of the body's place, where several of its lines may be the body's [cycles a sample].
+    blades : int
+        How many blades unequal lines speak for; 1 where they are equal.
+    blades_sure : bool
+        Whether that is more than chance.
+    """
+
+    fit: CombFit
+    rest: NDArray[np.complex128]
+    last: int
+    per_turn: int
+    body_std: float
+    blades: int
+    blades_sure: bool
+
+    @property
+    def chopping(self) -> float:
+        """Spacing of the strong lines [cycles a sample]."""
+        return self.fit.spacing * self.per_turn
+
+    @property
+    def chopping_std(self) -> float:
+        """Its standard deviation [cycles a sample]."""
+        return self.fit.spacing_std * self.per_turn
+
+
+def blade_numbers(blades: int | None) -> range:
+    """Numbers of blades, from two on, that lines of unlike strength may show: the one given, or any up to the most."""
+    return range(2, MOST_BLADES + 1) if blades is None else range(max(blades, 2), blades + 1)
+
+
+def strong_multiple(
+    orders: NDArray[np.intp], power: NDArray[np.float64], tried: Iterable[int], factor: float = UNEQUAL_FACTOR
+) -> int:
+    """Every how many-th line is strong: 1, or one of those tried.
+
+    Parameters
+    ----------
+    orders : ndarray of int, shape (lines,)
+        Orders.
+    power : ndarray, shape (lines,)
+        Power of each line over the noise [1].
+    tried : iterable of int
+        Multiples that are tried.
+    factor : float
+        By which the strong ones are stronger in power.
+    """
+    best = 1
+    outer = np.abs(orders) > np.median(np.abs(orders))
+    for multiple in tried:
+        strong = orders % multiple == 0
+        # the outermost lines are edges; four of each kind tell them apart
+        if strong.sum() < 4 or (~strong).sum() < 4:
+            continue
+        means = np.maximum([power[strong].mean(), power[~strong].mean()], 1e-9)
+        ratio = _contrast(means[0], means[1])
+        # several rotors' lines lie in one another at the low orders and may cancel at some; further out they part
+        if outer[strong].any() and outer[~strong].any():
+            parted = _contrast(power[outer & strong].mean(), power[outer & ~strong].mean())
+            ratio = ratio if parted > OUTER_FACTOR else 0.0
+        if ratio > factor and two_means_nats(power[strong], power[~strong]) > UNEQUAL_NATS:
+            best, factor = multiple, ratio
+    return best
+
+
+def powers_over_noise(data: Periodogram, fit: CombFit, rest: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Power of each line of a comb over the noise [1], as they are beside what combs leave of the record."""
+    seen = fit.amplitudes + LineSpace(rest).at(fit.frequencies)[0]
+    return squared(seen) * data.pulses / data.level_of(rest)(fit.frequencies)
+
+
+def two_means_nats(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Log likelihood ratio of two means of exponentials against one, of powers of two kinds of lines."""
+    means = (max(float(each.mean()), 1e-9) for each in (np.concatenate([one, other]), one, other))
+    both, first, second = (float(np.log(mean)) for mean in means)
+    return (len(one) + len(other)) * both - len(one) * first - len(other) * second
+
+
+def _contrast(strong: float, weak: float) -> float:
+    """Ratio of two mean powers without their noise."""
+    return max(strong - 1, 0) / max(weak - 1, 0.1)
+
+
+def of_mains(fit: CombFit, data: Periodogram, score: float, per_turn: int = 1) -> bool:
+    """True where spacing and centre of strong lines (`per_turn` apart) are the mains', or a weak comb's spacing is."""
+    spacing = fit.spacing * per_turn
+    share = MAINS_SHARE if data.one_channel or score < MAINS_SCORE else MAINS_SHARE_OF_TWO
+    for mains_hz in MAINS_HZ:
+        multiple = round(spacing * data.prf_hz / mains_hz)
+        if multiple in MAINS_MULTIPLES and abs(spacing * data.prf_hz / (multiple * mains_hz) - 1) < share:
+            base = spacing / multiple
+            nearest = base * round(fit.centre / base) if base * data.pulses >= MAINS_BINS else 0.0
+            off = abs(fit.centre - nearest) * data.pulses
+            clicks = data.rest_half > 0 and (data.one_channel or score < MAINS_SCORE)
+            return clicks or off < max(0.2, 3 * fit.centre_std * data.pulses)
+    return False
+
+
+def is_short(data: Periodogram) -> bool:
+    """True where a dwell is too short for the lines of a usual rotor to be told apart."""
+    return MIN_SPACING_BINS / data.pulses * data.prf_hz > USUAL_HZ
+
+
+def finer_spacing(data: Periodogram, fit: CombFit) -> float | None:
+    """Spacing that is too fine for the search, where lines stand between those of a comb; or None [cycles a sample].
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    fit : CombFit
+        A comb of some times that spacing: it holds every second, third or eighth line.
+    """
+    fractions, share, least_hz = (
+        (USUAL_FRACTIONS, USUAL_SHARE, USUAL_HZ)
+        if is_short(data)
+        else (FRACTIONS, FRACTION_SHARE, CHOPPING_RANGE_HZ[0])
+    )
+    spacings = fit.spacing / np.array([1, *fractions])
+    finer = (spacings * data.pulses < MIN_SPACING_BINS) & (spacings * data.prf_hz > least_hz)
+    if not finer.any() or fit.is_folded:  # what comes back from the other end of the span lies between as well
+        return None
+    finer[0] = True
+    spacings = spacings[finer]
+    scores = _scores_near(data, fit, spacings)
+    as_loud = np.flatnonzero(scores[1:] > share * scores[0]) + 1
+    return float(spacings[as_loud[0]]) if len(as_loud) else None
+
+
+def slower_spacing(data: Periodogram, fit: CombFit) -> float | None:
+    """Spacing at which no rotor chops, where lines stand between those of a comb; or None [cycles a sample].
+
+    Parameters
+    ----------
+    data, fit
+        As in `finer_spacing`.
+    """
+    spacings = fit.spacing / np.array([1, *SLOWER_FRACTIONS])
+    slower = (spacings * data.prf_hz < CHOPPING_RANGE_HZ[0]) & (spacings * data.pulses >= SLOWER_BINS)
+    if not slower[1:].any() or fit.is_folded:  # as in `finer_spacing`
+        return None
+    slower[0] = True
+    scores = _scores_near(data, fit, spacings[slower])
+    best = int(scores.argmax())
+    least = SLOWER_SHARE * max(scores[0], threshold(data))
+    return float(spacings[slower][best]) if scores[best] > least else None
+
+
+def _scores_near(data: Periodogram, fit: CombFit, spacings: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What speaks for combs of about these spacings, about the centre of another [nats]."""
+    steps = 1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (FINE_STEPS * data.pulses)
+    tried = np.outer(spacings, steps)
+    scores = heights(data.contrast, tried.ravel(), np.full(tried.size, fit.centre)).reshape(tried.shape)
+    return np.asarray(scores.max(axis=1), np.float64)
+
+
+def threshold(data: Periodogram) -> float:
+    """Score a comb must exceed in this record [nats]."""
+    if data.rest_half > 0 or data.one_channel:
+        return THRESHOLDS[2]
+    return THRESHOLDS[1] if data.strong.centres_db[0] > LINE_DB else THRESHOLDS[0]
+
+
+def _too_short(data: Periodogram) -> str:
+    """Why no comb is sought at all."""
+    _, highest = spacing_limits(data.pulses, data.prf_hz)
+    if CHOPPING_RANGE_HZ[0] * SEARCHED_RATIO >= highest * data.prf_hz:
+        return f"PRF too low: chopping frequencies from {CHOPPING_RANGE_HZ[0]:.0f} Hz up do not fit into it"
+    least_s = MIN_SPACING_BINS * SEARCHED_RATIO / highest / data.prf_hz
+    return f"dwell too short: no chopping frequency can be told in less than {1e3 * least_s:.1f} ms at this PRF"
+
+
+def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None, str]:
+    """Find the comb of a record.
+
+    Parameters
+    ----------
+    data : Periodogram
+        From `prepare`.
+    blades : int, optional
+        Of a rotor.
+
+    Returns
+    -------
+    comb : Comb or None
+        None where there is none.
+    reason : str
+        Why not; empty where there is one.
+    """
+    start = best_candidate(data)
+    if start is None:
+        return None, _too_short(data)
+    if start.score < threshold(data):
+        return None, f"no comb: evidence {start.score:.1f} below {threshold(data):.0f} nats"
+    start, open_orders = centred(data, of_flashes(data, start))
+    fitted = fit_combs(data, start.centre, [start.spacing], [(start.low, start.high)])
+    if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
+        return None, f"no comb: fewer than {LEAST_LINES} lines"
+    fit = fitted[0][0]
+    reach_mps = max(start.high, -start.low) * fit.spacing * data.span_mps
+    if reach_mps < LEAST_REACH_MPS:
+        return None, f"no rotor: lines reach {reach_mps:.1f} m/s, rotors {LEAST_REACH_MPS:.0f} m/s and more"
+    finer = finer_spacing(data, fit)
+    if finer is not None:
+        least_s = MIN_SPACING_BINS / finer / data.prf_hz
+        return None, (
+            f"dwell too short: lines {fit.spacing * data.prf_hz:.0f} Hz apart with others between them, "
+            f"to tell them apart takes {1e3 * least_s:.0f} ms at least"
+        )
+    slower = slower_spacing(data, fit)
+    if slower is not None:
+        return None, (
+            f"no rotor: lines every {slower * data.prf_hz:.1f} Hz, "
+            f"rotors chop at {CHOPPING_RANGE_HZ[0]:.0f} Hz and more"
+        )
+    power = powers_over_noise(data, fit, fitted[1])
+    within = (fit.orders >= start.low) & (fit.orders <= start.high)
+    per_turn = strong_multiple(fit.orders[within], power[within], blade_numbers(blades))
+    for number in sorted({1, per_turn}):
+        if of_mains(fit, data, start.score, number):
+            return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"
+    last = max(start.high, -start.low)
+    is_sure = per_turn > 1 and not may_come_back(last, fit.spacing)  # further lines fall on every so many-th
+    return Comb(fit, fitted[1], last, per_turn, open_orders * fit.spacing, per_turn, is_sure), ""

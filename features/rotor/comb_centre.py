@@ -1,0 +1,241 @@
+"""Which line of a comb is the body's, about which its orders count."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bodies import LINE_DB
+from .comb_search import FINE_STEPS, Candidate, even_scores
+from .folding import outermost_orders
+from .periodogram import Periodogram
+
+#: What speaks for the comb's centre where a line stands so far over all others of it [nats, dB], and more for each dB
+#: beyond. Blades may be the stronger: then their outermost lines are, and say nothing of the body.
+STRONG_LINE, STRONG_OVER_DB = 10.0, 6.0
+STRONG_LINE_DB = 1.0
+
+#: Counted from its outermost line, a family that takes up most of the unambiguous span reaches around all of it but for
+#: so many orders.
+AROUND_ORDERS = 4
+
+#: What speaks for the order about which all that shows within so much of the strongest line is even, where that stands
+#: so high over the noise that both ends show [nats, dB, dB].
+EVEN, ENDS_DB, CLEAR_DB = 20.0, 20.0, 30.0
+
+#: Levels to both sides are never more alike than by this variance [nats^2]; what an order says that is less even than
+#: another is so many times that of Gaussian levels, which are those of several rotors' lines.
+LEAST_UNEVEN, UNEVEN_WEIGHT = 0.05, 3.0
+
+#: By this variance [nats^2] levels to both sides differ that have nothing to do with one another; from half of it on it
+#: says less that they are about even there.
+UNRELATED = np.pi**2 / 3
+
+#: A family goes on over so many orders that do not show. So far about the middle of its ends [orders] the one about
+#: which it is even is sought.
+ENDS_GAP, MIDDLE_REACH = 2, 3
+
+#: What speaks for the order at rest at most where a background lies there, and more where no line that moves is as
+#: strong as a body's [nats]: a background is strong whatever hovers in it, and a line of the comb comes as near to it
+#: by chance, but many do hover. Where no line stands out that moves, the body hides in what was taken out there.
+REST, HOVERS = 14.0, 5.0
+
+#: A line is at rest so near to it [bins].
+AT_REST_BINS = 1.0
+
+#: A strong line is another target's where the comb counted from it speaks for less than this share of what it does
+#: counted from its own nearest line; lines nearer than this to one [bins] are as good as on it.
+OWN_SHARE, ON_COMB_BINS = 0.15, 0.5
+
+#: Before a static background only what stands so far out of its skirt is a line [times the local level].
+OUT_OF_SKIRT = 12.0
+
+#: Other orders that have at most so much less [nats] leave the choice open; asked are those within so many of the best.
+OPEN_NATS, NEAR_ORDERS = 3.0, 3
+
+
+def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
+    """Count a comb from the line that is most likely the body's.
+
+    A rotor's lines reach equally far to both sides of the body and are as strong on both, and the body's own line is
+    strong.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    found : Candidate
+        The comb, counted from any of its lines.
+
+    Returns
+    -------
+    best : Candidate
+        The same comb.
+    open_orders : float
+        Standard deviation of the body's order, of those that may be the body's as well; 0 where none is as likely.
+    """
+    evidence = data.contrast
+    best, most = found, -np.inf
+    totals: dict[int, float] = {}
+    bonuses, even = _bonuses(data, found)
+    shifts = [round((centre - found.centre) / found.spacing) for centre in bonuses]
+    # one comb for several rotors may pass a little beside the body's line: either place will do
+    either = np.stack([list(bonuses), found.centre + found.spacing * np.array(shifts)], axis=1)
+    within, furthest = _furthest(data, found)
+    steps, scores = _scores_about(data, found, either)
+    scores = scores.max(axis=2)
+    for shift, (centre, bonus), own in zip(shifts, bonuses.items(), scores.T, strict=True):
+        index = int(own.argmax())
+        total = float(own[index]) + bonus + even.get(shift, 0.0)
+        totals[shift] = max(totals.get(shift, -np.inf), total)
+        if total > most:
+            most = total
+            if centre == found.centre:
+                best = found
+            else:
+                best = Candidate(
+                    float(steps[index]),
+                    centre,
+                    max(min(found.low - shift, 0), -within),
+                    min(max(found.high - shift, 0), within),
+                    found.score,
+                )
+    chosen = round((best.centre - found.centre) / found.spacing)
+    others = np.setdiff1d(chosen + np.arange(-NEAR_ORDERS, NEAR_ORDERS + 1), list(totals))
+    places = best.centre + best.spacing * (others - chosen)
+    scores, _ = even_scores(evidence, np.full(len(others), best.spacing), places, furthest)
+    away = np.append(others, list(totals)) - chosen
+    likely = np.exp(np.append(scores, list(totals.values())) - most)
+    likely[likely < np.exp(-OPEN_NATS)] = 0.0
+    if found.is_folded:
+        _, (reach,) = even_scores(evidence, np.array([best.spacing]), np.array([best.centre]), furthest)
+        best = replace(best, centre=best.centre - round(best.centre), low=-int(reach), high=int(reach))
+    return best, float(np.sqrt((likely * away**2).sum() / likely.sum()))
+
+
+def _furthest(data: Periodogram, found: Candidate) -> tuple[int, float]:
+    """Outermost order that the body may have, and how far from it lines are looked for [cycles a sample]."""
+    # only lines that were found to come back from the other end of the span lie past it
+    within = int(outermost_orders(data, found.spacing)) if found.is_folded else int(0.5 / found.spacing)
+    return within, within * found.spacing if found.is_folded else 0.5
+
+
+def _scores_about(
+    data: Periodogram, found: Candidate, places: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Spacings tried about that of a comb [cycles a sample], and its score with each counted from each place [nats].
+
+    The scores are of shape (spacings, *places.shape).
+    """
+    steps = found.spacing * (1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * data.pulses))
+    tried = np.repeat(steps, places.size), np.tile(places.ravel(), len(steps))
+    scores, _ = even_scores(data.contrast, *tried, _furthest(data, found)[1])
+    return steps, scores.reshape(len(steps), *places.shape)
+
+
+def _is_own(data: Periodogram, found: Candidate, line: float) -> bool:
+    """False for another target's line, about which the comb has no lines: it says nothing of the body's."""
+    nearest = found.centre + found.spacing * round((line - found.centre) / found.spacing)
+    if abs(line - nearest) * data.pulses < ON_COMB_BINS:
+        return True
+    there, own = _scores_about(data, found, np.array([line, nearest]))[1].max(axis=0)
+    return bool(there > OWN_SHARE * own)
+
+
+def _moves(data: Periodogram, centre: float) -> bool:
+    """True where a line is a moving body's: of slow ones, where another is nearer to rest, the background's."""
+    nearer = any(abs(line) < abs(centre) for line in data.strong.centres)
+    return abs(centre) * data.pulses >= AT_REST_BINS and (nearer or abs(centre) > data.rest_half)
+
+
+def _stands_out(
+    data: Periodogram, places: NDArray[np.floating], power: NDArray[np.floating] | float
+) -> NDArray[np.bool_]:
+    """False where so much power at places [cycles a sample] is a static background's skirt, or may be."""
+    return np.asarray(~data.in_skirt(places) | (power > OUT_OF_SKIRT * data.level_at(places)), np.bool_)
+
+
+def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], dict[int, float]]:
+    """What speaks for the body's line besides the comb [nats]: by place [cycles a sample], and by order of the comb."""
+    middle = found.centre + found.spacing * round((found.high + found.low) / 2)
+    out = [(found.centre, 0.0), (middle, 0.0)]
+    places = found.centre + found.spacing * np.arange(found.low, found.high + 1)
+    if (found.high - found.low + AROUND_ORDERS) * found.spacing > 1:  # all around the circle: it has no middle
+        out += [(float(place), 0.0) for place in places]
+    power = data.at(places) * data.level_at(places) * data.usable(places)
+    power *= _stands_out(data, places, power)
+    highest_db = 10 * float(np.log10(power.max(initial=1.0)))
+    even: dict[int, float] = {}
+    if highest_db > CLEAR_DB and not found.is_folded:  # on both sides of any line there are those of the other end
+        unlikely, most_even = _even_orders(data, found, 10 ** ((highest_db - ENDS_DB) / 10))
+        even = {order: most_even - nats for order, nats in unlikely.items() if nats < most_even}
+        out += [(found.centre + found.spacing * order, 0.0) for order in even]
+    others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
+    moving = 0.0
+    centres, levels = data.strong.centres, data.strong.centres_db
+    # a line beside rest is a slow body's own, and hides no other
+    hides = abs(centres[0]) * data.pulses < AT_REST_BINS and not any(_moves(data, line) for line in centres)
+    for centre, level_db in sorted(zip(centres, levels, strict=True), key=lambda line: -abs(line[0])):
+        if not _is_own(data, found, centre):
+            continue
+        is_line = _stands_out(data, np.array([centre]), 10 ** (level_db / 10))[0]
+        over_db = max(level_db - others_db, 0.0) if is_line else 0.0
+        nats = STRONG_LINE * min(over_db / STRONG_OVER_DB, 1.0)
+        nats += STRONG_LINE_DB * max(over_db - STRONG_OVER_DB, 0.0)
+        # a line at rest that is no background may be an offset of the receiver all the same
+        if _moves(data, centre):
+            moving = nats
+        elif hides:
+            reach = int(data.rest_half / found.spacing) + 1
+            hidden = found.centre % found.spacing + found.spacing * np.arange(-reach, reach + 1)
+            out += [(float(place), nats) for place in hidden[np.abs(hidden) <= data.rest_half]]
+            nats += REST
+        else:
+            nats = min(nats, REST + max(HOVERS - moving, 0.0))
+        orders = (centre - found.centre) / found.spacing
+        # several rotors' spacings differ: the further off, the less one comb for them all tells where a line must be
+        from_middle = abs(orders - (found.low + found.high) / 2)
+        off = (orders - round(orders)) * found.spacing * data.pulses / (1 + 0.2 * from_middle)
+        if abs(off) < 1.5 and level_db > LINE_DB:
+            out.append((centre, nats - 16 * off**2))
+    most: dict[float, float] = {}
+    for place, nats in out:  # a place may come in twice, as a line's and as one that hides
+        most[place] = max(most.get(place, -np.inf), nats)
+    return most, even
+
+
+def _even_orders(data: Periodogram, found: Candidate, least: float) -> tuple[dict[int, float], float]:
+    """Orders about which what shows of this power is about even, and what the evenest has before each, and by itself.
+
+    All that lies about each order counts, the lines of several rotors too that it has parted from. The levels of two
+    places as far to both sides differ by what the blades' echoes make of it and by chance, of one variance for all.
+    """
+    size, furthest = len(data.power), int(0.49 / found.spacing)
+    order = np.arange(-furthest, furthest + 1)
+    borders = np.rint((found.centre + found.spacing * (np.append(order, furthest + 1) - 0.5)) * size).astype(np.intp)
+    bins = np.arange(borders[0], borders[-1]) % size
+    starts = borders[:-1] - borders[0]
+    power = data.power * data.level
+    seen = data.seen & _stands_out(data, np.arange(size) / size, power)
+    highest = np.maximum.reduceat((power * seen)[bins], starts)
+    hidden = ~np.logical_or.reduceat(data.seen[bins], starts)
+    shows = np.flatnonzero((highest > least) | hidden)
+    hidden |= ~np.logical_or.reduceat(seen[bins], starts)
+    # from what speaks for the comb outwards: another family may follow
+    groups = np.split(shows, np.flatnonzero(np.diff(shows) > 1 + ENDS_GAP) + 1)
+    own = [group for group in groups if np.any((order[group] >= found.low) & (order[group] <= found.high))]
+    if not own:
+        return {0: 0.0}, EVEN
+    first, last = int(own[0][0]), int(own[-1][-1])
+    half = (last - first) // 2 + ENDS_GAP
+    nats = np.pad(np.log(np.maximum(highest, least)), half, constant_values=np.log(least))
+    seen = np.pad(~hidden, half, constant_values=True)
+    tried = np.arange((first + last) // 2 - MIDDLE_REACH, (first + last + 1) // 2 + MIDDLE_REACH + 1)
+    tried = np.clip(tried, 0, len(order) - 1)
+    after, before = (half + tried[:, None] + sign * np.arange(1, half + 1) for sign in (1, -1))
+    both = seen[after] & seen[before]
+    count = np.maximum(both.sum(axis=1), 1)
+    uneven = (both * (nats[after] - nats[before]) ** 2).sum(axis=1) / count + LEAST_UNEVEN
+    unlikely = UNEVEN_WEIGHT * count / 2 * np.log(uneven / uneven.min())
+    related = float(np.clip(2 * (1 - uneven.min() / UNRELATED), 0, 1))
+    return dict(zip(order[tried].tolist(), unlikely.tolist(), strict=True)), EVEN * related

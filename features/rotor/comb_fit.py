@@ -1,0 +1,266 @@
+"""Combs fitted line by line, several at once: spacings and centre below the bin, with the variance the bound gives."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..lines import sum_of_lines
+from .folding import comes_back, outermost_orders
+from .periodogram import LEAST_LEVEL, Level, Periodogram
+from .slow_lines import LineProducts, notched_products, parts, remove_bands, times, whole
+
+#: Gauss-Newton steps at most. They end after one below so many standard deviations: the next would be a tenth of it.
+STEPS = 8
+ENOUGH = 0.1
+
+#: Orders to each side over which line powers are averaged to weigh the lines.
+SMOOTHED_ORDERS = 2
+
+#: Added to one over the lines' snr: a line that lies half in a band taken out has little left to be fitted by.
+LEAST_RIDGE = 1e-6
+
+#: Added besides where that is not enough.
+NOTCH_RIDGE = 1e-2
+
+#: Well above this snr the amplitude of a line by itself is not held back: what that leaves would pull at others.
+CLEAR_SNR = 30.0
+
+#: Lines nearer than this share the power seen there [bins].
+ONE_BINS = 1.0
+
+#: Lines beyond the outermost that speak for the comb, fitted with it: what they hold must not leak into the others.
+MARGIN_ORDERS = 3
+
+
+@dataclass(frozen=True)
+class CombFit:
+    """A comb of lines at centre + order x spacing.
+
+    Parameters
+    ----------
+    spacing, centre : float
+        [cycles a sample].
+    spacing_std, centre_std : float
+        Their standard deviations [cycles a sample].
+    orders : ndarray of int, shape (lines,)
+        Orders of the lines that take part.
+    amplitudes : ndarray of complex128, shape (lines,)
+        Their amplitudes, held back as far as noise makes them, in units of the noise's rms a sample.
+    snr : ndarray of float64, shape (lines,)
+        Power of each line over the local noise of a bin, smoothed over neighbouring orders [1].
+    """
+
+    spacing: float
+    centre: float
+    spacing_std: float
+    centre_std: float
+    orders: NDArray[np.intp]
+    amplitudes: NDArray[np.complex128]
+    snr: NDArray[np.float64]
+
+    @property
+    def is_folded(self) -> bool:
+        """Whether its outer lines come back from the other end of the span."""
+        return bool(comes_back(np.abs(self.orders).max(initial=0), self.spacing))
+
+    @property
+    def frequencies(self) -> NDArray[np.float64]:
+        """Where its lines are [cycles a sample]."""
+        return np.asarray(self.centre + self.spacing * self.orders, np.float64)
+
+
+def over_orders(
+    comb: NDArray[np.intp], order: NDArray[np.intp]
+) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Means over neighbouring orders of the same comb; combs one after the other, orders rising."""
+    place = order + comb * (2 * np.abs(order).max() + 4 * SMOOTHED_ORDERS)
+    first = np.searchsorted(place, place - SMOOTHED_ORDERS)
+    last = np.searchsorted(place, place + SMOOTHED_ORDERS, side="right")
+
+    def smooth(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        sums = np.concatenate([[0.0], np.cumsum(values)])
+        return np.asarray((sums[last] - sums[first]) / (last - first), np.float64)
+
+    return smooth
+
+
+def orders_within(data: Periodogram, centre: float, spacing: float, reach: tuple[int, int]) -> NDArray[np.intp]:
+    """Orders of the lines that are fitted: some past the outermost that speak, and none that were taken out."""
+    (low, high), widest = reach, int(0.49 / spacing)
+    if comes_back(max(high, -low), spacing):
+        widest = int(outermost_orders(data, spacing))
+    own = np.arange(max(low - MARGIN_ORDERS, -widest), min(high + MARGIN_ORDERS, widest) + 1)
+    return np.asarray(own[~data.removed(centre + spacing * own)], np.intp)
+
+
+def lines_at_one_place(frequency: NDArray[np.float64], pulses: int) -> NDArray[np.intp]:
+    """How many lines, itself among them, lie within `ONE_BINS` of each."""
+    first, last = np.sort(frequency).searchsorted(frequency + np.array([[-ONE_BINS], [ONE_BINS]]) / pulses)
+    return np.asarray(last - first, np.intp)
+
+
+def ridges(snr: NDArray[np.float64], together: NDArray[np.intp]) -> NDArray[np.float64]:
+    """What holds amplitudes back, added to the lines' products with themselves.
+
+    Parameters
+    ----------
+    snr : ndarray, shape (lines,)
+        Power of each over the noise of a bin.
+    together : ndarray, shape (lines,)
+        From `lines_at_one_place`. Those that lie in one another are held back however strong they are: let go, they
+        come out as large ones that cancel.
+    """
+    let_go = np.where(together > 1, 1.0, 1 + (snr / CLEAR_SNR) ** 2)
+    return np.asarray(1 / (snr * let_go) + LEAST_RIDGE, np.float64)
+
+
+def _weighed(
+    amplitudes: NDArray[np.complex128], used: NDArray[np.bool_], level: NDArray[np.float64]
+) -> NDArray[np.complex128]:
+    """Amplitudes over the rms of the noise about them, 0 where a line does not count."""
+    return np.asarray(amplitudes * used / np.sqrt(level), np.complex128)
+
+
+def _factored(plain: NDArray[np.float64], ridge: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+    """Cholesky factor of symmetric products with a ridge, and whether that failed."""
+    from scipy.linalg import lapack  # here, because predicting needs no such import
+
+    ridged = plain.copy()
+    ridged.flat[:: len(ridged) + 1] += ridge
+    factor, failed = lapack.dpotrf(ridged.T, overwrite_a=True)
+    return np.asarray(factor, np.float64), int(failed)
+
+
+def _fisher(
+    weighed: NDArray[np.complex128],
+    design: NDArray[np.float64],
+    factor: NDArray[np.float64],
+    products: LineProducts,
+    pulses: int,
+) -> NDArray[np.float64]:
+    """Fisher matrix of centre and spacings with the amplitudes eliminated, these over the rms of the noise about them.
+
+    The other arguments are those of `fit_combs`: the products of the lines, and the plain ones factored.
+    """
+    from scipy.linalg import lapack
+
+    sway = np.asarray(weighed[:, None] * design, np.complex128)
+    leaked = products.with_time(sway)
+    kept = whole(lapack.dpotrs(factor, parts(leaked))[0])
+    fisher = (sway.conj().T @ products.with_time_squared(sway) - leaked.conj().T @ kept).real
+    fisher *= 8 * np.pi**2 * pulses
+    fisher.flat[:: len(fisher) + 1] *= 1 + 1e-9
+    return np.asarray(fisher, np.float64)
+
+
+def fit_combs(
+    data: Periodogram,
+    centre: float,
+    spacings: Sequence[float],
+    reaches: Sequence[tuple[int, int]],
+    steps: int = STEPS,
+    *,
+    level_about: Level | None = None,
+) -> tuple[list[CombFit], NDArray[np.complex128]] | None:
+    """Refine combs about one centre, jointly, by Gauss-Newton steps on the frequencies of their lines.
+
+    Lines are complex Gaussian amplitudes of the power seen about them, in noise; given the frequencies their means are
+    a linear estimate, so that no line leaks into its neighbours. The steps and the variances come from the Fisher
+    matrix of centre and spacings with the amplitudes eliminated, at the estimated amplitudes: for one comb the
+    Cramer-Rao bound for unknown body frequency, with each line's snr replaced by snr^2 / (1 + snr).
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    centre : float
+        Start of the centre [cycles a sample].
+    spacings : sequence of float
+        Starts of the spacings [cycles a sample].
+    reaches : sequence of (int, int)
+        Outermost orders of each, low <= 0 <= high.
+    steps : int
+        Steps at most, >= 1.
+    level_about : callable, optional
+        Local level without what is known of the combs already: the first step takes the level about the lines from it.
+
+    Returns
+    -------
+    (list of CombFit, ndarray of complex128 of shape (pulses,)) or None
+        A fit for each spacing and the samples that the lines leave. None where a comb has fewer than three usable
+        lines.
+    """
+    from scipy.linalg import lapack  # here, because predicting needs no such import
+
+    pulses = data.pulses
+    which, orders = [], []
+    for number, (spacing, reach) in enumerate(zip(spacings, reaches, strict=True)):
+        own = orders_within(data, centre, spacing, reach)
+        orders.append(own)
+        which.append(np.full(len(own), number))
+    count = len(orders)
+    comb, order = np.concatenate(which), np.concatenate(orders)
+    values = np.array([centre, *spacings])
+    used = data.usable(centre + values[1 + comb] * order)
+    if min(np.bincount(comb, used, count)) < 3:
+        return None
+    # change of each line's frequency with the centre and the spacings
+    design = np.zeros((len(order), 1 + count))
+    design[:, 0] = 1.0
+    design[np.arange(len(order)), 1 + comb] = order
+    smooth = over_orders(comb, order)
+    limit = np.concatenate([[0.5], 0.5 / np.array([max(1, np.abs(own).max()) for own in orders])]) / pulses
+    frequency = values[0] + values[1 + comb] * order
+    # several combs' lines take so much of the noise out with them that what they leave says little of it
+    least = LEAST_LEVEL if count == 1 else 1.0
+    snr = np.full(len(order), np.inf)
+    level = data.level_at(frequency) if level_about is None else np.maximum(level_about(frequency), least)
+
+    def left_by(frequency: NDArray[np.float64], amplitudes: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        return remove_bands(data.samples - sum_of_lines(pulses, frequency, amplitudes), data.strong.bands)
+
+    for number in range(steps):
+        seen, moment = data.lines.at(frequency)
+        products = notched_products(frequency, pulses, data.strong.bands)
+        # lines that lie in one another may come out as large ones that cancel: together they hold no more than is seen
+        most = smooth(np.abs(seen) ** 2 * pulses / level) - 1
+        together = lines_at_one_place(frequency, pulses)
+        snr = np.minimum(snr, np.maximum(most / together, 1e-3))
+        held_back = ridges(snr, together)
+        factor, failed = _factored(products.plain, held_back)
+        if failed:  # what is tabulated of the notch is a little off where nearly all was taken out
+            factor, _ = _factored(products.plain, held_back + NOTCH_RIDGE)
+        amplitudes: NDArray[np.complex128] = whole(lapack.dpotrs(factor, parts(seen))[0])[:, 0]
+        left = seen - times(products.plain, amplitudes)
+        snr = np.maximum(smooth(np.abs(amplitudes + left) ** 2 * pulses / level) - 1, 1e-3)
+        slope = moment - 1j * products.time_with(amplitudes)[:, 0]
+        # the score of each line's frequency, and the Fisher matrix of centre and spacings
+        pull = np.where(used, (amplitudes.conj() * slope).imag / level * (4 * np.pi * pulses), 0.0)
+        fisher = _fisher(_weighed(amplitudes, used, level), design, factor, products, pulses)
+        step = np.linalg.solve(fisher, design.T @ pull)
+        step = np.clip(step, -limit, limit)
+        values = values + step
+        frequency = values[0] + values[1 + comb] * order
+        if number == steps - 1 or (number and np.all(step**2 * np.diag(fisher) < ENOUGH**2)):
+            break
+        # what the lines leak lifts the level between them: as they are fitted, it is taken from what they leave
+        level = np.maximum(data.level_of(left_by(frequency, amplitudes))(frequency), least)
+    std = np.sqrt(np.maximum(np.diag(np.linalg.inv(fisher)), 0))
+    out = []
+    for number in range(count):
+        own = (comb == number) & used
+        out.append(
+            CombFit(
+                float(values[1 + number]),
+                float(values[0]),
+                float(std[1 + number]),
+                float(std[0]),
+                order[own],
+                amplitudes[own],
+                snr[own],
+            )
+        )
+    # an amplitude changes little with the last step
+    return out, left_by(frequency, amplitudes)

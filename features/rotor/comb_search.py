@@ -1,0 +1,439 @@
+"""Where a comb may be: spacings from the autocorrelation of band-limited spectra, scored by the likelihood of lines."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from ..chopping import CHOPPING_RANGE_HZ
+from ..evidence import MOST_SNRS, Evidence
+from .comb_sums import running_sums
+from .flashes import flash_evidence
+from .folding import comes_back, outermost_orders
+from .octaves import MULTIPLE_SHARE, coarsest
+from .periodogram import Periodogram
+
+#: Lines nearer than this are not told apart [bins].
+MIN_SPACING_BINS = 3.0
+
+#: The largest spacing sought is so many times the smallest, or none is sought.
+SEARCHED_RATIO = 1.5
+
+#: Shares of the whole span within which lines are sought: noise outside a comb's band only hides it.
+BANDS = (1.0, 0.5, 0.25, 0.125)
+
+#: Multiples of the period that are summed at most.
+MAX_PERIODS = 12
+
+#: Candidates taken from each band, and the other octaves tried for each.
+PER_BAND = 4
+OCTAVES = (1.0, 0.5, 2.0, 1 / 3, 3.0)
+
+#: Flashes speak for a comb by at most so many times what the powers of its lines do: they must not make one of what
+#: hardly is one.
+#: Beside a static background, where supplies click, it is less.
+FLASH_SHARE, REST_FLASH_SHARE = 2.0, 1.0
+
+#: What a comb whose sides reach unequally far must have more [nats].
+UNEVEN_COST = 4.0
+
+#: Lines of tips faster than the unambiguous velocity count where they speak for so much more [nats]: noise there speaks
+#: for less than nothing.
+FOLDED_NATS = 8.0
+
+#: They may be those of the comb found without them, no further off than so many bins at the PRF. Another comb is
+#: believed where none without them has this share of its score, and if it is hardly finer than the one found: each
+#: finer one finds some of several rotors' lines all over the span.
+SAME_BINS, UNFOLDED_SHARE, FINER = 4.0, 0.88, 0.9
+
+#: Further than this from its mirror image about velocity zero a comb's lines are others than that one's [bins].
+MIRROR_BINS = 1.5
+
+#: Steps to each side of a coarse spacing, of one bin at the PRF; then finer ones about the best families.
+COARSE_STEPS = 4
+FAMILIES = 8
+FINE_STEPS = 4
+CENTRE_SHIFTS = (-0.3, 0.0, 0.3)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A comb as the search sees it.
+
+    Parameters
+    ----------
+    spacing : float
+        Chopping frequency [cycles a sample].
+    centre : float
+        The line about which the orders count [cycles a sample].
+    low, high : int
+        Outermost orders that speak for it, low <= 0 <= high.
+    score : float
+        Log likelihood ratio against noise [nats].
+    """
+
+    spacing: float
+    centre: float
+    low: int
+    high: int
+    score: float
+
+    @property
+    def is_folded(self) -> bool:
+        """Whether its outer lines come back from the other end of the span."""
+        return bool(comes_back(max(self.high, -self.low), self.spacing))
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Periods tried, and the lags each one sums."""
+
+    periods: NDArray[np.float64]
+    lags: NDArray[np.intp]
+    starts: NDArray[np.intp]
+    weight: NDArray[np.float64]
+
+
+@lru_cache(maxsize=16)
+def _grid(pulses: int, shortest: float, longest: float) -> _Grid:
+    """Periods in geometric steps of half a bin at the edge of the span."""
+    count = int(np.ceil(np.log(longest / shortest) * 2 * pulses / MAX_PERIODS * 2)) + 1
+    periods = np.geomspace(shortest, longest, count)
+    summed = np.clip((0.9 * pulses / periods).astype(np.intp), 1, MAX_PERIODS)
+    starts = np.concatenate([[0], np.cumsum(summed)[:-1]])
+    number = np.arange(summed.sum()) - np.repeat(starts, summed) + 1
+    lags = np.minimum(np.rint(number * np.repeat(periods, summed)).astype(np.intp), pulses - 1)
+    # the real part of a lag of noise has half the variance of its complex value, pulses - lag terms make it up
+    variance = np.add.reduceat((pulses - lags) / 2.0, starts)
+    return _Grid(periods, lags, starts, 1 / np.sqrt(variance))
+
+
+def spacing_limits(pulses: int, prf_hz: float) -> tuple[float, float]:
+    """Smallest and largest spacing sought [cycles a sample]; empty where the first is not below the second."""
+    low, high = CHOPPING_RANGE_HZ
+    return max(low / prf_hz, MIN_SPACING_BINS / pulses), min(high / prf_hz, 0.2)
+
+
+def coarse_spacings(data: Periodogram, evidence: Evidence, centre: float) -> NDArray[np.float64]:
+    """Spacings worth a closer look [cycles a sample], best of every band first, with their octaves."""
+    low, high = spacing_limits(data.pulses, data.prf_hz)
+    grid = _grid(data.pulses, 1 / high, 1 / low)
+    size = len(data.power)
+    offset = np.arange(size) / size - centre
+    distance = np.abs(offset - np.rint(offset))
+    turn = np.exp(-2j * np.pi * centre * np.arange(data.pulses))
+    found: list[float] = []
+    for correlation in _correlations(evidence.rows[0], distance, BANDS, data.pulses):
+        sums = np.add.reduceat((correlation * turn).real[grid.lags], grid.starts) * grid.weight
+        found += _apart(grid.periods, sums, 2 * MAX_PERIODS / data.pulses)
+    spacings = (1 / np.array(found))[:, None] * np.array(OCTAVES)
+    spacings = np.unique(spacings.ravel())
+    spacings = spacings[(spacings >= low) & (spacings <= high)]
+    return spacings[np.diff(np.log(spacings), prepend=-np.inf) > 1 / data.pulses]
+
+
+def _correlations(
+    ripple: NDArray[np.float32], distance: NDArray[np.float64], shares: tuple[float, ...], lags: int
+) -> NDArray[np.complex64]:
+    """Autocorrelations of a spectrum within shares of the span about a place, shape (shares, lags)."""
+    inside = distance <= np.array(shares)[:, None] / 2
+    part = np.where(inside, ripple, np.float32(0))
+    part -= inside * (part.sum(axis=1, keepdims=True) / inside.sum(axis=1, keepdims=True, dtype=np.float32))
+    return np.asarray(fft.rfft(part)[:, :lags].conj() / np.float32(len(ripple)), np.complex64)
+
+
+def free_spacings(data: Periodogram, evidence: Evidence) -> list[tuple[float, float]]:
+    """Spacings and centres of combs whose body line hides in the static background [cycles a sample each].
+
+    The phase of the autocorrelation at multiples of the period tells the centre, up to whole spacings.
+    """
+    low, high = spacing_limits(data.pulses, data.prf_hz)
+    grid = _grid(data.pulses, 1 / high, 1 / low)
+    size = len(data.power)
+    offset = np.arange(size) / size
+    distance = np.abs(offset - np.rint(offset))
+    number = np.arange(1, MAX_PERIODS + 1)
+    steering = np.exp(-2j * np.pi * np.outer(np.arange(48) / 48, number))
+    found = []
+    for correlation in _correlations(evidence.rows[0], distance, BANDS[1:], data.pulses):
+        sums = np.add.reduceat(np.abs(correlation[grid.lags]), grid.starts) * grid.weight
+        for period in _apart(grid.periods, sums, 2 * MAX_PERIODS / data.pulses):
+            used = number[: max(1, int(0.9 * data.pulses / period))]
+            lags = np.rint(used * period).astype(np.intp)
+            turn = int((steering[:, : len(used)] @ correlation[lags]).real.argmax()) / 48
+            found.append((1 / period, (turn - round(turn)) / period))
+    return found
+
+
+def _apart(periods: NDArray[np.float64], sums: NDArray[np.float64], least: float) -> list[float]:
+    """Periods of the highest sums, each further from the others than `least`, relative."""
+    taken: list[float] = []
+    left = sums.copy()
+    while len(taken) < PER_BAND and np.isfinite(left[index := int(left.argmax())]):
+        taken.append(float(periods[index]))
+        left[np.abs(periods / periods[index] - 1) <= least] = -np.inf
+    return taken
+
+
+def score(
+    evidence: Evidence,
+    spacings: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    outermost: NDArray[np.intp] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
+    """Score combs by their lines, each side of the centre out to where its lines stop.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Of each bin.
+    spacings, centres : ndarray, shape (candidates,)
+        [cycles a sample].
+    outermost : ndarray of int, shape (candidates,), optional
+        Lines up to this order count, of sides that reach equally far; else those within half a span of the centre.
+
+    Returns
+    -------
+    score : ndarray of float64, shape (candidates,)
+        [nats]
+    low, high : ndarray of int, shape (candidates,)
+        Outermost orders.
+    """
+    size = evidence.rows.shape[-1]
+    widest = (0.5 / spacings).astype(np.intp) if outermost is None else outermost
+    order = np.arange(1, widest.max(initial=0) + 1)
+    beyond = order > widest[:, None]
+    step = (spacings * size)[:, None] * order
+    middle = (centres * size)[:, None]
+    places = [np.rint(middle + sign * step).astype(np.intp) for sign in (-1, 1)]
+    number = np.arange(len(spacings))
+    best = np.full(len(spacings), -np.inf, np.float32)
+    reach = np.zeros((2, len(spacings)), np.intp)
+    for row in evidence.rows:
+        sides = [row.take(place, mode="wrap") for place in places]
+        for side in sides:
+            side[beyond] = 0.0
+        for side in sides:
+            side.cumsum(axis=1, out=side)
+        # a rotor's lines reach equally far to both sides; other reaches cost as much as the choice of two ends gives
+        both = sides[0] + sides[1]
+        last = both.argmax(axis=1)
+        total = np.maximum(both[number, last], 0)
+        ends = np.stack([last, last]) + 1
+        if outermost is None:
+            apart = np.stack([side.argmax(axis=1) for side in sides])
+            peaks = np.stack([np.maximum(side[number, end], 0) for side, end in zip(sides, apart, strict=True)])
+            uneven = peaks.sum(axis=0) - np.float32(UNEVEN_COST)
+            ends = np.where(uneven > total, np.where(peaks > 0, apart + 1, 0), ends)
+            total = np.maximum(total, uneven)
+        better = total > best
+        best[better] = total[better]
+        reach[:, better] = ends[:, better]
+    return best.astype(np.float64), -reach[0], reach[1]
+
+
+def even_scores(
+    evidence: Evidence, spacings: NDArray[np.float64], centres: NDArray[np.float64], furthest: float = 0.5
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Score combs whose two sides reach equally far.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Of each bin.
+    spacings, centres : ndarray, shape (candidates,)
+        [cycles a sample]; the spacings rise.
+    furthest : float
+        Lines up to so far from the centre count [cycles a sample].
+
+    Returns
+    -------
+    score : ndarray of float64, shape (candidates,)
+        [nats]
+    reach : ndarray of int, shape (candidates,)
+        Outermost order.
+    """
+    best = np.full((len(spacings), len(evidence.rows)), -np.inf, np.float32)
+    reach = np.ones(best.shape, np.intp)
+    first = 1
+    for sums in _sums_of_sides(evidence, spacings, centres, furthest):
+        both = (sums[:, 0] + sums[:, 1])[..., : len(evidence.rows)]
+        far = both.argmax(axis=0)
+        highest = np.take_along_axis(both, far[None], axis=0)[0]
+        held, ends = best[: len(highest)], reach[: len(highest)]
+        better = highest > held
+        held[better], ends[better] = highest[better], far[better] + first
+        first += len(both)
+    row = best.argmax(axis=1)[:, None]
+    scores = np.maximum(np.take_along_axis(best, row, axis=1)[:, 0], 0)
+    return scores.astype(np.float64), np.take_along_axis(reach, row, axis=1)[:, 0]
+
+
+def _sums_of_sides(
+    evidence: Evidence, spacings: NDArray[np.float64], centres: NDArray[np.float64], furthest: float = 0.5
+) -> Iterator[NDArray[np.float32]]:
+    """Running sums to both sides of combs, the spacings rising: as `running_sums` gives them."""
+    size = evidence.rows.shape[-1]
+    # a line beyond half the PRF is the alias on the other side; turns more, that no place is below 0
+    start, step = (np.ceil(furthest) + centres % 1.0) * size, spacings * size
+    return running_sums(evidence, np.stack([start, start]), np.stack([-step, step]), furthest * size)
+
+
+def heights(evidence: Evidence, spacings: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The scores of many combs, as `score` gives them, without their reaches, shape (candidates,) [nats]."""
+    rising = np.argsort(spacings)
+    sides = np.zeros((2, len(rising), MOST_SNRS), np.float32)
+    both = np.zeros((len(rising), MOST_SNRS), np.float32)
+    for sums in _sums_of_sides(evidence, spacings[rising], centres[rising]):
+        some = sums.shape[2]
+        np.maximum(sides[:, :some], sums.max(axis=0), out=sides[:, :some])
+        np.maximum(both[:some], (sums[:, 0] + sums[:, 1]).max(axis=0), out=both[:some])
+    best = np.maximum(both, sides.sum(axis=0) - np.float32(UNEVEN_COST)).max(axis=1)
+    out = np.empty(len(best))
+    out[rising] = best
+    return out
+
+
+def _loudness(data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What speaks for combs: their lines, and where there is one channel those that it has of the other side."""
+    return heights(data.contrast, spacings, centres) + _mirrored(data, spacings, centres)
+
+
+def from_mirror_bins(
+    spacing: NDArray[np.float64] | float, centre: NDArray[np.float64] | float, pulses: int
+) -> NDArray[np.float64]:
+    """How far a comb's lines lie from those of its mirror image about velocity zero [bins]."""
+    off = 2 * np.asarray(centre) / spacing
+    return np.asarray(np.abs(off - np.rint(off)) * spacing * pulses)
+
+
+def _mirrored(data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What else speaks for combs in one channel, where they stand about the body's mirror image as well [nats].
+
+    Without it a third or a fourth of the spacing, which holds about all of these lines and others, is the louder one.
+    """
+    if not data.one_channel:
+        return np.zeros(len(spacings))
+    apart = from_mirror_bins(spacings, centres, data.pulses) > MIRROR_BINS
+    return np.where(apart, heights(data.contrast, spacings, -centres), 0.0)
+
+
+def _families(
+    spacings: NDArray[np.float64], scores: NDArray[np.float64], centres: NDArray[np.float64], pulses: int
+) -> list[int]:
+    """The best of each family of neighbouring spacings about one centre, best family first."""
+    taken: list[int] = []
+    left = scores.copy()
+    while len(taken) < FAMILIES and np.isfinite(left[index := int(left.argmax())]):
+        taken.append(index)
+        near = np.abs(spacings / spacings[index] - 1) <= 6 / pulses
+        left[near & (np.abs(centres - centres[index]) * pulses <= 2)] = -np.inf
+    return taken
+
+
+def best_candidate(data: Periodogram) -> Candidate | None:
+    """The spacing whose lines speak loudest; None where the dwell is too short to search.
+
+    Any line of the comb may pass for its centre: see `comb_centre`.
+    """
+    low, high = spacing_limits(data.pulses, data.prf_hz)
+    if low * SEARCHED_RATIO >= high:
+        return None
+    evidence = data.contrast
+    tried = [(coarse_spacings(data, evidence, centre), centre) for centre in data.strong.centres]
+    if data.rest_half > 0:
+        for spacing, centre in free_spacings(data, evidence):
+            if abs(centre) < data.rest_half:
+                octaves = spacing * np.array(OCTAVES)
+                octaves = octaves[(octaves >= low) & (octaves <= high)]
+                tried.append((octaves, centre))
+    factors = 1 + np.arange(-COARSE_STEPS, COARSE_STEPS + 1) / data.pulses
+    spacings = np.concatenate([np.outer(s, factors).ravel() for s, _ in tried])
+    centres = np.concatenate([np.full(len(s) * len(factors), c) for s, c in tried])
+    scores = _loudness(data, spacings, centres)
+    if not len(scores):
+        return None
+    chosen = _families(spacings, scores, centres, data.pulses)
+    fine = 1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * data.pulses)
+    # a line's frequency is known to a hundredth of a bin; the phase of a correlation tells less
+    shifts = [(0.0,) if centres[i] in data.strong.centres else CENTRE_SHIFTS for i in chosen]
+    family = np.repeat(np.arange(len(chosen)), [len(fine) * len(s) for s in shifts])
+    centres = np.concatenate(
+        [np.repeat(centres[i] + np.array(s) / data.pulses, len(fine)) for i, s in zip(chosen, shifts, strict=True)]
+    )
+    spacings = np.concatenate([np.tile(spacings[i] * fine, len(s)) for i, s in zip(chosen, shifts, strict=True)])
+    scores = _loudness(data, spacings, centres)
+    loudest_first = np.argsort(-scores, kind="stable")
+    finest = loudest_first[np.unique(family[loudest_first], return_index=True)[1]]
+    spacings, centres = spacings[finest], centres[finest]
+    scored = score(evidence, spacings, centres)
+    mirrored = _mirrored(data, spacings, centres)
+    totals = _with_flashes(data, spacings, centres, scored, mirrored)
+    all_totals = np.where(totals > 0, totals + mirrored, 0.0)
+    best = coarsest(spacings, all_totals)
+    low, high = int(scored[1][best]), int(scored[2][best])
+    found = Candidate(float(spacings[best]), float(centres[best]), low, high, float(totals[best]))
+    if data.one_channel:
+        return found
+    return _folded(data, spacings, centres, scored[0], float(all_totals.max()), found) or found
+
+
+#: Of combs: what speaks for each [nats], and its outermost orders, low <= 0 <= high.
+_Scored = tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]
+
+
+def _with_flashes(
+    data: Periodogram,
+    spacings: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    scored: _Scored,
+    mirrored: NDArray[np.float64] | float = 0.0,
+) -> NDArray[np.float64]:
+    """What speaks for combs with their flashes, shape (combs,) [nats]; 0 where these do not bring one near the best."""
+    scores, lows, highs = scored
+    all_scores = scores + mirrored
+    share = REST_FLASH_SHARE if data.rest_half > 0 else FLASH_SHARE
+    near = np.flatnonzero((1 + share) * all_scores >= MULTIPLE_SHARE * all_scores.max())
+    flashes = flash_evidence(data, spacings[near], centres[near], lows[near], highs[near])
+    totals = np.zeros(len(spacings))
+    totals[near] = scores[near] + np.minimum(flashes, share * scores[near])
+    return totals
+
+
+def _folded(
+    data: Periodogram,
+    spacings: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    within: NDArray[np.float64],
+    most: float,
+    found: Candidate,
+) -> Candidate | None:
+    """The comb whose lines come back from the other end of the span, if one speaks louder than all that do not.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    spacings, centres, within : ndarray, shape (candidates,)
+        Combs [cycles a sample] and their scores within the span [nats].
+    most : float
+        The most that speaks for any of these [nats].
+    found : Candidate
+        The one chosen of them.
+    """
+    scores, lows, highs = score(data.contrast, spacings, centres, outermost_orders(data, spacings))
+    own = (scores > within + FOLDED_NATS) & comes_back(highs, spacings) & (spacings > FINER * found.spacing)
+    same = own & (np.abs(spacings / found.spacing - 1) * data.pulses < SAME_BINS)
+    own = same if same.any() else own
+    if not own.any():
+        return None
+    spacings, centres, lows, highs = spacings[own], centres[own], lows[own], highs[own]
+    totals = _with_flashes(data, spacings, centres, (scores[own], lows, highs))
+    best = int(totals.argmax())
+    if not same.any() and UNFOLDED_SHARE * totals[best] < most:
+        return None
+    low, high = int(lows[best]), int(highs[best])
+    return Candidate(float(spacings[best]), float(centres[best]), low, high, float(totals[best]))

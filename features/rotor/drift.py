@@ -1,0 +1,231 @@
+"""A rotor whose rate changes within the dwell: by how much, and the record as if it had turned evenly.
+
+Such a rotor's lines widen with their order and fill what lies between them, as those of several rotors do. Read at the
+times at which an even rotor has turned as far, counted about the body's line, they are narrow again, all at once. Hover
+is full of it: in the measured recordings a multirotor's rates change by one or two parts in a hundred within 80 ms.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..lines import against_lines, middle_times, squared, sum_of_lines
+from .changing_fit import ChangingFit, Start, fit_changing, most_lines
+from .comb import Comb
+from .comb_fit import ENOUGH, LEAST_RIDGE, CombFit, lines_at_one_place
+from .periodogram import Periodogram
+from .slow_lines import notched_products, parts, remove_bands, whole
+from .turning import (
+    DEGREES,
+    FIRST_DEGREES,
+    MOST_CHANGE,
+    change_of,
+    changed,
+    inverse_of,
+    is_sure,
+    late_by,
+    margin_of,
+    other_rate,
+    polynomials,
+    resampled,
+)
+
+#: Lines are seen in so many parts of the dwell, or parts of so many samples where those are longer: within one of them
+#: hardly a line turns out of phase.
+PARTS, LONGEST_PART = 64, 48
+
+#: The change is sought by the inner orders first, on which an even one that large has about this effect [rad], and then
+#: by so many times more of them, up to all.
+FIRST_RAD, MORE_ORDERS, LEAST_ORDERS = 1.0, 1.3, 4
+
+#: Steps at all orders, at most; and by each line over the dwell a change is sure by so many standard deviations.
+LAST_STEPS, ROUGHLY_SURE = 6, 3.0
+
+#: Steps of the fit of all lines after that, at most, out to so many times the edge, which smeared lines hide.
+FITTED_STEPS, FURTHER = 8, 2.0
+
+
+@dataclass(frozen=True)
+class Straightened:
+    """A record as if its rotor had turned evenly.
+
+    Parameters
+    ----------
+    samples : ndarray of complex128, shape (pulses,)
+        Its samples, those of `Periodogram` read at other times; the body's line is what it was.
+    record : Periodogram
+        The record as it is.
+    fit : ChangingFit
+        The rotor's lines in that, every blade's.
+    """
+
+    samples: NDArray[np.complex128]
+    record: Periodogram
+    fit: ChangingFit
+
+
+def _continued(samples: NDArray[np.complex128], fit: ChangingFit) -> NDArray[np.complex128]:
+    """A record with margins in which its comb goes on and fades out: it repeats without a step between its ends."""
+    pulses = len(samples)
+    margin = margin_of(pulses)
+    away = np.arange(1, margin + 1)
+    time = np.concatenate([-away[::-1], away]) + np.repeat([-1, 1], margin) * (pulses - 1) / 2
+    turned = fit.spacing * (time + fit.ahead @ polynomials(time, pulses))
+    lines = np.exp(2j * np.pi * (turned[:, None] * fit.orders + fit.centre * time[:, None])) @ fit.amplitudes
+    fade = np.cos(np.pi / 2 * away / (margin + 1)) ** 2
+    return np.concatenate([lines[:margin] * fade[::-1], samples, lines[margin:] * fade])
+
+
+def straightened(data: Periodogram, comb: Comb, edge: float, *, least_gain: float) -> Straightened | None:
+    """Take out of a record what its rotor's rate changed by.
+
+    By Gauss-Newton steps on the phases of the comb's lines over the dwell: first of each line by itself, from the inner
+    orders outwards, then of all together.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    comb : Comb
+        The comb found in it.
+    edge : float
+        Edge of the line family [cycles a sample from the body].
+    least_gain : float
+        What each line by itself must at least tell of the rate once the change is taken out, over what it told before.
+
+    Returns
+    -------
+    Straightened or None
+        None where no change is sure, or it is larger than `MOST_CHANGE`.
+    """
+    pulses, rate, centre = data.pulses, comb.chopping, comb.fit.centre
+    furthest = max(int(0.45 / rate), 1)
+    reach = min(max(comb.last // comb.per_turn, round(edge / rate), LEAST_ORDERS), furthest)
+    rough, gain = _each_by_itself(data, rate, centre, reach)
+    if gain < least_gain:
+        return None
+    ahead = rough if gain > 1 else np.zeros(len(DEGREES))
+    outermost = min(int(FURTHER * reach) * comb.per_turn, furthest * comb.per_turn, most_lines(pulses) // 2)
+    spacing = rate / comb.per_turn * (1 + other_rate(ahead[0], pulses))
+    starts = [Start(spacing, outermost, changed(ahead))]
+    fitted = fit_changing(data, starts, centre, degrees=len(DEGREES), steps=FITTED_STEPS, level_about=data.level_at)
+    if fitted is None:
+        return None
+    ((fit,), _) = fitted
+    if not is_sure(fit.ahead, fit.ahead_std) or not change_of(fit.ahead, pulses) < MOST_CHANGE:
+        return None
+    late = late_by(fit.ahead, pulses)
+    return Straightened(resampled(_continued(data.samples, fit), fit.centre, late), data, fit)
+
+
+def _each_by_itself(data: Periodogram, rate: float, centre: float, reach: int) -> tuple[NDArray[np.float64], float]:
+    """How far ahead of an even rotor one is, by each line over the dwell, and what the lines then tell over before.
+
+    That is 0 where no change is sure, or it is larger than `MOST_CHANGE`.
+    """
+    pulses = data.pulses
+    orders = np.concatenate([np.arange(-reach, 0), np.arange(1, reach + 1)])
+    orders = orders[data.usable(centre + rate * orders)]
+    seen, time = _over_time(data.samples, centre + rate * orders)
+    # towards the ends parts count less, or each line's neighbours would leak into it
+    taper = np.cos(np.pi * time / pulses) ** 2
+    taper /= taper.sum()
+    shapes = polynomials(time, pulses)
+    about = shapes - (shapes @ taper)[:, None]
+    products = (about * taper) @ about.T
+    noise = data.level_at(centre + rate * orders) / pulses * len(time) * float((taper**2).sum())
+    lead = 2 * np.pi * rate * orders
+    ahead = np.zeros(len(DEGREES))
+    # an even change of the whole puts the ends ahead by an eighth of it
+    order = int(np.clip(8 * FIRST_RAD / (2 * np.pi * MOST_CHANGE * rate * pulses), min(LEAST_ORDERS, reach), reach))
+    last = 0
+    before = float((lead**2 * _excess(seen @ taper, noise)).sum())
+    while True:
+        last += order == reach
+        few = len(DEGREES) if last else FIRST_DEGREES
+        own = np.abs(orders) <= order
+        turned = seen[own] * np.exp(-1j * lead[own, None] * (ahead @ shapes))
+        amplitude = turned @ taper
+        snr = _excess(amplitude, noise[own])
+        weight = lead[own] * snr / (1 + snr) / noise[own]
+        power = float((lead[own] * weight * squared(amplitude)).sum())
+        if not power:
+            return ahead, 0.0
+        score = (about * taper)[:few] @ ((amplitude.conj()[:, None] * turned).imag.T @ weight)
+        covariance = np.linalg.inv(power * products[:few, :few])
+        step, std = covariance @ score, np.sqrt(np.diag(covariance) / 2)
+        ahead[:few] += step
+        if not change_of(ahead, pulses) < MOST_CHANGE:
+            return ahead, 0.0
+        if last == LAST_STEPS or (last and np.all(np.abs(step) < ENOUGH * std)):
+            break
+        order = min(int(MORE_ORDERS * order) + 1, reach)
+    sure = is_sure(ahead, std, ROUGHLY_SURE)
+    return ahead, float((lead**2 * snr).sum()) / max(before, 1e-9) if sure else 0.0
+
+
+def _excess(amplitude: NDArray[np.complex128], noise: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Power of lines over that of noise, without it, at least 0."""
+    return np.maximum(squared(amplitude) / noise - 1, 0)
+
+
+def _over_time(
+    samples: NDArray[np.complex128], frequency: NDArray[np.float64]
+) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
+    """What unit lines see in each part of a dwell, shape (lines, parts), and the parts' middles [samples]."""
+    pulses = len(samples)
+    length = min(max(pulses // PARTS, 1), LONGEST_PART)
+    cut = samples[: pulses // length * length].reshape(-1, length)
+    within = np.arange(length) - (length - 1) / 2
+    time = np.asarray(np.arange(len(cut)) * length + (length - pulses) / 2, np.float64)
+    short = np.exp(-2j * np.pi * frequency[:, None] * within) / length
+    return short @ cut.T * np.exp(-2j * np.pi * frequency[:, None] * time), time
+
+
+def ahead_left(
+    data: Periodogram, fits: Sequence[CombFit], rest: NDArray[np.complex128]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How far ahead of even rotors those of combs are, by what their lines leave.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    fits : sequence of CombFit
+        The combs, of one centre.
+    rest : ndarray of complex128, shape (pulses,)
+        Samples that they leave.
+
+    Returns
+    -------
+    ahead, std : ndarray, shape (combs, degrees)
+        Of each of `DEGREES`, and standard deviations at the fitted amplitudes [samples], whatever velocity and even
+        acceleration the body has: one Gauss-Newton step, near to the truth where the change leaves the lines narrow.
+    """
+    pulses, frequency = data.pulses, np.concatenate([fit.frequencies for fit in fits])
+    amplitudes = np.concatenate([fit.amplitudes for fit in fits])
+    leads = [2 * np.pi * fit.spacing * fit.orders for fit in fits]
+    shapes = polynomials(middle_times(pulses), pulses)
+    turned = [
+        sum_of_lines(pulses, fit.frequencies, 1j * lead * fit.amplitudes) for fit, lead in zip(fits, leads, strict=True)
+    ]
+    still = sum_of_lines(pulses, frequency, 2j * np.pi * amplitudes)
+    # what the record gains by each polynomial of each rotor, and by another velocity or an acceleration of the body
+    gained = remove_bands(np.concatenate([*(shapes * one for one in turned), shapes[:2] * still]), data.strong.bands)
+    # what other amplitudes would make of it does not count
+    seen = against_lines(np.concatenate([gained, rest[None]]), frequency).T
+    products = notched_products(frequency, pulses, data.strong.bands).plain
+    snr = np.concatenate([fit.snr for fit in fits])
+    products.flat[:: len(products) + 1] += np.where(lines_at_one_place(frequency, pulses) > 1, 1 / snr, LEAST_RIDGE)
+    as_lines = whole(np.asarray(np.linalg.solve(products, parts(seen)), np.float64))
+    own = gained.conj() @ np.vstack([gained, rest]).T - pulses * seen[:, :-1].conj().T @ as_lines
+    level = float(
+        np.average(data.level_of(rest)(frequency), weights=squared(np.concatenate(leads) * amplitudes) + 1e-30)
+    )
+    information, score = 2 * own[:, :-1].real / level, 2 * own[:, -1].real / level
+    covariance = inverse_of(information)
+    step, std = covariance @ score, np.sqrt(np.diag(covariance))
+    each = (len(fits), len(DEGREES))
+    return step[:-2].reshape(each), std[:-2].reshape(each)

@@ -1,0 +1,287 @@
+"""The line family of a record's rotors: comb, edge, second comb and single rotors, of rates that may change."""
+
+from dataclasses import dataclass, replace
+from typing import TypeGuard
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..lines import squared
+from ..spectrum import Spectrum
+from .changing import ChangingSeparation, may_be_sought
+from .changing_fit import ChangingFit, Start, fit_changing
+from .comb import LEAST_REACH_MPS, OVER_BODY, Comb, find_comb, is_short
+from .comb_fit import CombFit
+from .drift import Straightened, ahead_left, straightened
+from .family_edge import edge_around, edge_of_lines, span_of
+from .helicopter import Gear, find_gear
+from .periodogram import Level, Periodogram, prepared
+from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
+from .turning import DEGREES, bend, is_sure
+from .unresolved import judged, not_all
+from .weak_lines import by_rotation, without_weak_lines
+
+#: What the lines tell of the rate grows by so much once its change is taken out, where several rotors were found that
+#: are one; and where these were told apart.
+SEVERAL_GAIN, BELIEVED_GAIN = 1.0, 1.5
+
+#: Gauss-Newton steps at most for both combs of a helicopter, whose change is known from one of them.
+GEARED_STEPS = 4
+
+#: Where the edge of the lines fitted and that of all about the orders differ by so many deviations, the fit of outer
+#: lines went astray.
+EDGE_DEVIATIONS = 4.0
+
+#: In a short dwell rotors that are not told apart show by so many flashes or orders what they have in common.
+LEAST_FLASHES, MANY_ORDERS = 5.5, 60
+
+#: A comb whose spacing is off by more than this, relative, from any multiple of another's is no part of that.
+FAR_OFF = 0.003
+
+#: Lines that reach so far from a body, in shares of its own speed, are a wheel's: spokes end a little within the rim.
+WHEEL = (0.8, OVER_BODY)
+
+
+@dataclass(frozen=True)
+class Family:
+    """What the lines of a record come to.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record that they were found in: as if the rotor had turned evenly, where that explains more of it, and
+        without a second comb.
+    comb : Comb
+        The comb; a helicopter's first one.
+    edge, edge_std : float
+        Its edge and the standard deviation [cycles a sample from the body].
+    fills_span : bool
+        True where the lines of the comb found first fill all that is searched.
+    gear : Gear or None
+        A helicopter's two combs.
+    rotors : Rotors
+        Single rotors of the comb.
+    gear_reason : str
+        Why there is no second comb; empty where there is one.
+    ahead : (ndarray, ndarray) or None
+        How far ahead of an even rotor each is, by the polynomials of `DEGREES`, and standard deviations, shape
+        (rotors, degrees) [samples]; None where they are not told apart.
+    """
+
+    data: Periodogram
+    comb: Comb
+    edge: float
+    edge_std: float
+    fills_span: bool
+    gear: Gear | None
+    rotors: Rotors
+    gear_reason: str
+    ahead: tuple[NDArray[np.float64], NDArray[np.float64]] | None
+
+    @property
+    def is_told_apart(self) -> bool:
+        """True where nothing is left that the rotors found do not explain."""
+        return self.gear is not None or self.rotors.resolved
+
+    @property
+    def drifts(self) -> NDArray[np.float64]:
+        """Even relative change of each rotor's rate, and standard deviations, shape (2, rotors) [1 / sample]."""
+        if self.ahead is None:
+            return np.full((2, len(self.rotors.rates)), np.nan)
+        return np.array([[bend(own, self.data.pulses) for own in values] for values in self.ahead])
+
+
+def slower_than_rotors(data: Periodogram, edge: float, edge_std: float) -> str:
+    """Why a line family of this edge [cycles a sample] is no rotor's; empty where it may be one's."""
+    edge_mps, edge_std_mps = (value * data.span_mps for value in (edge, edge_std))
+    if edge_mps + edge_std_mps < LEAST_REACH_MPS:
+        return f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
+    return ""
+
+
+def as_wheels(data: Periodogram, edge: float, velocity_mps: float) -> str:
+    """Why a line family of this edge [cycles a sample] about a body is a wheel's; empty where it may be a rotor's.
+
+    Seen from the body a wheel's rim is as fast as the body. A rotor's tips are 2.5 times as fast as it flies and more;
+    only of a propeller that flies at the radar, within a narrow range of angles, they seem to be as fast.
+    """
+    edge_mps = edge * data.span_mps
+    if WHEEL[0] * abs(velocity_mps) < edge_mps < WHEEL[1] * abs(velocity_mps):
+        return f"no rotor: lines as wheels have: they end {edge_mps:.1f} m/s from a body at {velocity_mps:.1f} m/s"
+    return ""
+
+
+def too_few_flashes(family: Family) -> str:
+    """Why rotors that are not told apart give no number, in so short a dwell; empty where they do.
+
+    Their lines, some bins apart, run into one another, and what that leaves may be strong at any spacing.
+    """
+    data, chopping = family.data, family.comb.chopping
+    shows = chopping * data.pulses > LEAST_FLASHES or family.comb.last > MANY_ORDERS
+    if family.is_told_apart or shows or not is_short(data):
+        return ""
+    return (
+        f"dwell too short: lines about {chopping * data.prf_hz:.0f} Hz apart are not one rotor's, "
+        f"to tell what they are takes {1e3 * LEAST_FLASHES / chopping / data.prf_hz:.0f} ms at least"
+    )
+
+
+def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None) -> tuple[Family | None, str]:
+    """Find the line family of a record.
+
+    Rates are taken to be steady first. Where one changes for sure, or rotors are not told apart, the record may be one
+    of a rotor that turns evenly, read at other times; if not that, of several that change, each in its own way.
+
+    Parameters
+    ----------
+    data : Periodogram
+        From `prepared`.
+    spectrum : Spectrum
+        What that was prepared with.
+    blades : int, optional
+        Of a rotor.
+
+    Returns
+    -------
+    family : Family or None
+        None where there is none.
+    reason : str
+        Why not; empty where there is one.
+    """
+    family, reason = _as_it_is(data, blades)
+    if family is None:
+        return None, reason
+    if family.ahead is not None and not is_sure(*family.ahead):
+        return family, ""
+    edge = min(family.edge, span_of(data, [family.comb.fit]))
+    several_gain = BELIEVED_GAIN if family.is_told_apart else SEVERAL_GAIN
+    least_gain = several_gain if len(family.rotors.rates) > 1 else 0.0
+
+    def evened(comb: Comb) -> tuple[Straightened | None, Family | None]:
+        even = straightened(data, comb, edge, least_gain=least_gain)
+        again = prepared((even.samples * np.sqrt(spectrum.floor)).astype(np.complex64), spectrum) if even else None
+        return even, _as_it_is(again, blades, even)[0] if again is not None else None
+
+    comb = by_rotation(family.comb)
+    even, other = evened(comb)
+    if even is None:
+        return _changing(data, spectrum, family, edge), ""
+    if _is_one(other) and other.comb.blades > comb.blades:  # narrow, its lines show weak ones that pulled at its rate
+        comb = by_rotation(replace(family.comb, blades=other.comb.blades))
+        finer = evened(comb)
+        if finer[0] is not None and _is_one(finer[1]):
+            even, other = finer
+    # what was straightened may be the tail's comb; but several rotors may pass for that one and a slower one as well
+    slower = other is not None and other.gear is not None and other.comb.chopping < (1 - FAR_OFF) * comb.chopping
+    if _is_one(other) and not slower:
+        return other, ""
+    apart = _changing(data, spectrum, family, edge)
+    # and several that are so but for a change that they share are believed where nothing better is found
+    if family.is_told_apart or apart.is_told_apart or other is None or not other.is_told_apart:
+        return apart, ""
+    return other, ""
+
+
+def _is_one(family: Family | None) -> TypeGuard[Family]:
+    """True where a family is that of one rotor, or of a helicopter, and nothing is left."""
+    return family is not None and family.is_told_apart and len(family.rotors.rates) == 1
+
+
+def _changing(data: Periodogram, spectrum: Spectrum, family: Family, edge: float) -> Family:
+    """A family of several rotors whose rates change; the one given where none do, or that does not tell them apart.
+
+    Rotors that were told apart as steady ones, and are not, must be told apart as such that change. Where one side of
+    the body lies in the other, lines cross and speak for anything.
+    """
+    known, comb = family.rotors, family.comb
+    if family.gear is not None or (known.resolved and len(known.rates) == 1):
+        return family
+    if known.resolved:
+        left = ahead_left(data, known.fits, known.rest)
+        if not is_sure(*left):
+            return replace(family, ahead=left)
+    unsure = replace(family, rotors=not_all(known, data)) if known.resolved else family
+    reach = max(round(edge / comb.chopping), 1)
+    if not may_be_sought(data, comb.chopping, reach) or data.one_channel:
+        return unsure
+    apart = separate_rotors(data, comb, edge, ChangingSeparation)
+    fits = [fit for fit in apart.fits if isinstance(fit, ChangingFit)]
+    if len(fits) < 2 or (known.resolved and len(fits) > len(known.rates)):
+        return unsure
+    powers = powers_of(fits)
+    own = edge_of_lines(data, apart.fits, apart.rest, 1, None)
+    around = edge_around(data, comb, apart, None, own)
+    fitted_to = max(float(np.abs(fit.orders).max()) * fit.spacing for fit in fits)
+    rotors = judged(apart, data, comb, max(min(own[0], span_of(data)), edge), fitted_to=fitted_to)
+    led_astray = abs(own[0] - around[0]) > EDGE_DEVIATIONS * np.hypot(own[1], around[1])
+    if led_astray or not rotors.resolved or min(powers) < LEAST_POWER_SHARE * max(powers):
+        return unsure
+    ahead = np.array([fit.ahead for fit in fits]), np.array([fit.ahead_std for fit in fits])
+    return replace(family, rotors=rotors, ahead=ahead)
+
+
+def _known_as(fit: CombFit, changing: ChangingFit) -> CombFit:
+    """A comb of lines found in a record that was straightened, its rate that of the fit to the record as it is."""
+    lines = fit.spacing / changing.spacing
+    whole = round(lines) if lines > 1 else 1 / max(round(1 / lines), 1)  # it may be every so many-th line, or between
+    std = max(changing.spacing_std / changing.spacing, fit.spacing_std / fit.spacing) * fit.spacing
+    off = abs(whole / lines - 1) > FAR_OFF
+    return replace(fit, spacing=fit.spacing if off else whole * changing.spacing, spacing_std=std)
+
+
+def _as_it_is(data: Periodogram, blades: int | None, even: Straightened | None = None) -> tuple[Family | None, str]:
+    """`find_family` of rotors that turn evenly, or were made to."""
+    comb, why = find_comb(data, blades)
+    if comb is None:
+        return None, why
+    edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades)
+    if slow := slower_than_rotors(data, edge, std):
+        return None, slow
+    fills_span = bool(np.isinf(edge))
+    furthest = min(edge, span_of(data, [comb.fit]))
+    gear, rotors, reason = find_gear(data, comb, furthest)
+    if gear is None and len(rotors.rates) == 1:  # of several the lines lie anywhere
+        without, alike = without_weak_lines(data, comb, blades)
+        again = find_gear(without, alike, furthest) if without is not data else None
+        if again is not None and again[0] is None and len(again[1].rates) == 1:
+            data, comb, (_, rotors, reason) = without, alike, again
+    if gear is not None:
+        data, comb = gear.alone, gear.first
+        edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades, gear.second.spacing)
+    if len(rotors.rates) > 1 or not (gear or rotors.resolved):
+        return Family(data, comb, edge, std, fills_span, gear, rotors, reason, None), ""
+    if even is None:
+        ahead = ahead_left(data, [comb.fit], comb.rest)
+        return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead), ""
+    # the mean rate is told from how it changes
+    changing = even.fit
+    if gear is not None:
+        gear, changing = _geared(gear, even, data.level_of(comb.rest))
+    comb = replace(comb, fit=_known_as(comb.fit, changing))
+    rotors = replace(rotors, rates=np.array([comb.chopping]), stds=np.array([comb.chopping_std]), fits=[comb.fit])
+    ahead = changing.ahead[None], changing.ahead_std[None]
+    return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead), ""
+
+
+def _geared(gear: Gear, even: Straightened, level_about: Level) -> tuple[Gear, ChangingFit]:
+    """Two combs of a straightened record as they are in the record itself.
+
+    One turn drives both: where one was led astray, the other tells how far ahead they are.
+    """
+    combs = (gear.first.fit, gear.second)
+
+    def fitted(ahead: NDArray[np.float64]) -> tuple[float, list[ChangingFit]]:
+        starts = [Start(comb.spacing, int(np.abs(comb.orders).max()), ahead) for comb in combs]
+        found = fit_changing(
+            even.record, starts, even.fit.centre, degrees=len(DEGREES), steps=GEARED_STEPS, level_about=level_about
+        )
+        return (float(squared(found[1]).mean()), found[0]) if found else (np.inf, [])
+
+    best = fitted(even.fit.ahead)
+    if not best[1]:
+        return gear, even.fit
+    one, other = best[1]
+    if is_sure(one.ahead - other.ahead, np.hypot(one.ahead_std, other.ahead_std)):
+        best = min(best, *(fitted(fit.ahead) for fit in best[1]), key=lambda found: found[0])
+    first, second = (_known_as(comb, fit) for comb, fit in zip(combs, best[1], strict=True))
+    return replace(gear, first=replace(gear.first, fit=first), second=second), best[1][0]

@@ -1,0 +1,375 @@
+"""Where the line families of one or several rotors end, from the lines that were fitted or from all about them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..lines import LineSpace
+from .comb import Comb
+from .comb_fit import CombFit
+from .folding import fastest_tip, outermost_orders
+from .periodogram import Periodogram
+from .rotor_band import LEAK_SHARE, fit_edge
+from .rotors import Rotors
+
+#: Rates nearer than this at an order [bins] have one line there.
+MERGED_BINS = 1.0
+
+#: The edge of several rotors' fitted lines holds if that of all about them agrees within so many of its deviations. It
+#: may be chance that both agree: the first is known no better than this share of what they differ by, or of the
+#: deviation.
+AGREED_DEVIATIONS, APART_SHARE, CHANCE_SHARE = 2.0, 0.7, 0.25
+
+#: All about the orders holds those lines too: where it ends before this share of their edge, known to that share of it,
+#: it says nothing of that. (A background's skirt may be so strong that what a rotor has past it is none beside it.)
+ASTRAY_SHARE, ASTRAY_SURE = 0.6, 0.02
+
+#: Share of the power of several rotors' family that does not count past its edge: what their inner lines leave between
+#: them lifts the level that the outer ones are read against.
+SEVERAL_LEAK = 0.005
+
+#: Of the sums of all about an order: variance over the square, beyond what the fit finds by itself, where the rotors'
+#: lines lie in one another, and what an edge is off by at least [lines].
+AROUND_SCATTER, AROUND_LINES = 0.2, 0.035
+
+#: The orders mix at the edge where the tips of the fastest and of the slowest rotor lie more than twice so far apart
+#: [lines].
+MIXED_LINES = 0.25
+
+#: With fewer orders seen below an edge the level is not known from which a family falls there.
+LEVEL_ORDERS = 4
+
+#: Lines of unlike orders nearer than this [bins] cover one another.
+COVERED_BINS = 1.5
+
+#: Lines stronger by this than the one on the other side and than most of so many beside it are another target's.
+FOREIGN_FACTOR, FOREIGN_ORDERS = 10.0, 8
+
+#: Lines are looked for so far from the body [cycles a sample], or further where those past the span are told from the
+#: others. A family that still stands there at this share of its mean power, by so many deviations of the noise, has no
+#: edge to be seen: what lies beyond has been folded back between its lines.
+SPAN, SPAN_SHARE, SPAN_DEVIATIONS = 0.49, 0.05, 4.0
+
+#: The orders beyond this share of the span are those asked whether it ends there.
+SPAN_OUTER = 0.9
+
+#: Of the sums of all about an order, this share lies beyond the edge: the noise is no more than they have. So many
+#: deviations below its mean lies the lowest such share of what is noise alone.
+NOISE_ORDERS, NOISE_BELOW = 0.1, 1.28
+
+#: From so many times the edge on there is noise alone. Where its nearer and its further half differ by more than this
+#: and three deviations [nats], and by more than the share of the family's power that leaks there, the receiver's band
+#: is not flat.
+NOISE_FROM, UNEVEN_NATS, UNEVEN_SHARE = 1.15, 0.1, 5e-4
+
+#: The noise shows between the lines of rotors not told apart where these are spread over less than this [orders].
+GAPS_SHOW = 0.4
+
+#: Rotors that are not told apart differ by about so much in their rates, relative.
+LEAST_SPREAD = 0.02
+
+
+def span_of(data: Periodogram, fits: Sequence[CombFit] = ()) -> float:
+    """How far from the body lines of a rotor are looked for [cycles a sample].
+
+    `SPAN`, or further for one rotor whose fitted lines come back from the other end of it; up to the fastest tip's.
+    """
+    span = SPAN
+    if len(fits) == 1 and fits[0].is_folded:
+        span = 2 * SPAN * int(outermost_orders(data, fits[0].spacing)) * fits[0].spacing
+    return min(span, fastest_tip(data))
+
+
+def _orders(spacing: float, span: float) -> NDArray[np.intp]:
+    """Orders of the lines within a span, the first at least."""
+    return np.arange(1, max(int(span / spacing), 1) + 1)
+
+
+def edge_of_lines(
+    data: Periodogram,
+    fits: list[CombFit],
+    rest: NDArray[np.complex128],
+    per_turn: int,
+    blades: int | None,
+    tail: float | None = None,
+) -> tuple[float, float]:
+    """Edge of the line family by the fitted lines, both sides together.
+
+    Each line's power is what is seen there with all other fitted lines taken out; an order's is the mean over both
+    sides and the single rotors, since their lines part at the outer orders.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    fits : list of CombFit
+        The rotors' combs.
+    rest : ndarray of complex128, shape (pulses,)
+        Samples that these leave.
+    per_turn : int
+        Strong lines are this many spacings of a fit apart.
+    blades : int, optional
+        Of a rotor.
+    tail : float, optional
+        Spacing of another comb about the same centre [cycles a sample], whose outer lines may not have been fitted.
+
+    Returns
+    -------
+    edge, edge_std : float
+        The tip's Doppler frequency and its standard deviation [cycles a sample from the body]; 0 and infinity where
+        no lines part, infinity both where they fill the span.
+    """
+    spacings = np.array([fit.spacing * per_turn for fit in fits])
+    fastest = float(spacings.max())
+    span = span_of(data, fits)
+    order = _orders(fastest, span)
+    sides = np.array([[-1], [1]]) * order
+    centres = np.array([fit.centre for fit in fits])
+    frequency = np.asarray(centres[:, None, None] + spacings[:, None, None] * sides, np.float64)
+    fitted = np.stack([_amplitudes_at(fit, per_turn * sides) for fit in fits])
+    left = LineSpace(rest).at(frequency.ravel())[0].reshape(frequency.shape)
+    every = spacings if tail is None else np.append(spacings, tail)
+    usable = data.usable(frequency) & ~_covered(every, order, data.pulses)[: len(fits), None]
+    power = np.abs(left + fitted) ** 2 * data.pulses
+    usable &= ~_foreign(np.where(usable, power, 0.0).sum(axis=0), usable.sum(axis=0))
+    total = np.where(usable, power, 0.0).sum(axis=(0, 1))
+    noise = np.where(usable, data.level_of(rest, evened=True)(frequency), 0.0).sum(axis=(0, 1))
+    number = usable.sum(axis=(0, 1)).astype(float)
+    # where the single rotors' lines lie in one another they add up: those orders stand too high beside the outer ones
+    nearest = float(np.diff(np.sort(spacings)).min()) if len(fits) > 1 else 1.0
+    seen = (number > 0) & (order * nearest * data.pulses >= MERGED_BINS)
+    if not seen.any():
+        return 0.0, np.inf
+    count = number[seen]
+    if _fills_span(order[seen] * fastest, total[seen], noise[seen], count, span):
+        return np.inf, np.inf
+    leak = SEVERAL_LEAK if len(fits) > 1 else LEAK_SHARE
+    edge, std = fit_edge(order[seen], total[seen] / count, noise[seen] / count, count, blades, leak=leak)
+    std = float(np.hypot(std, _unseen_about(order[seen], edge) / np.sqrt(12)))
+    return edge * fastest, std * fastest
+
+
+def _unseen_about(seen: NDArray[np.intp], edge: float) -> int:
+    """How many orders that are not seen lie in one row about an edge, or below it: it may be anywhere among them."""
+    above = int(np.searchsorted(seen, edge))
+    if above < LEVEL_ORDERS:
+        return int(seen[0]) - 1
+    return int(seen[above] - seen[above - 1]) - 1 if above < len(seen) else 0
+
+
+def _covered(spacings: NDArray[np.float64], order: NDArray[np.intp], pulses: int) -> NDArray[np.bool_]:
+    """True where another order of another rotor lies on a rotor's, shape (rotors, orders).
+
+    Past a slower rotor's edge it would pass for a line of its own, and what both hold is shared out between them.
+    """
+    own, others = spacings[:, None, None], spacings[:, None]
+    there = np.rint(order * own / others)
+    away = np.abs(order * own - there * others) * pulses
+    return np.asarray(((there != order) & (away < COVERED_BINS)).any(axis=1))
+
+
+def _foreign(power: NDArray[np.float64], number: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """True where another target's echo lies on an order, shape (sides, orders).
+
+    Parameters
+    ----------
+    power : ndarray, shape (2, orders)
+        Power of the lines on each side of the body, summed over so many as `number`.
+    """
+    known = number > 0
+    mean = np.where(known, power / np.maximum(number, 1e-9), np.inf)
+    around = np.pad(mean, ((0, 0), (FOREIGN_ORDERS, FOREIGN_ORDERS)), constant_values=np.inf)
+    near = np.sort(np.lib.stride_tricks.sliding_window_view(around, 2 * FOREIGN_ORDERS + 1, axis=-1), axis=-1)
+    middle = np.isfinite(near).sum(axis=-1) // 2
+    median = np.take_along_axis(near, middle[..., None], axis=-1)[..., 0]
+    # a rotor's lines are about as strong as their neighbours on one side, or as those on the other
+    return np.asarray(known & (mean > FOREIGN_FACTOR * np.maximum(median, mean[::-1])))
+
+
+def _fills_span(
+    away: NDArray[np.float64],
+    total: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    bins: NDArray[np.float64],
+    span: float,
+) -> bool:
+    """True where a line family still stands at the end of the span.
+
+    Parameters
+    ----------
+    away : ndarray, shape (orders,)
+        Distance of each order from the body, rising [cycles a sample].
+    total, noise : ndarray, shape (orders,)
+        Power of its lines with their noise, and of that alone, summed over so many `bins`.
+    span : float
+        From `span_of`.
+    """
+    outer = (away > SPAN_OUTER * span) | (away == away[-1])
+    excess, about = total - noise, float(noise[outer].sum())
+    # a sum of so few exponentials is often far above its mean: Wilson and Hilferty's cube root is nearly normal
+    number = about**2 / float((noise[outer] ** 2 / bins[outer]).sum())
+    deviations = 3 * np.sqrt(number) * (np.cbrt(total[outer].sum() / about) - 1 + 1 / (9 * number))
+    mean, outer_mean = float(excess.sum() / bins.sum()), float(excess[outer].sum() / bins[outer].sum())
+    return bool(away[-1] > span / 2 and deviations > SPAN_DEVIATIONS and outer_mean > SPAN_SHARE * mean)
+
+
+def _amplitudes_at(fit: CombFit, orders: NDArray[np.intp]) -> NDArray[np.complex128]:
+    """Amplitudes of a fit's lines of these orders, 0 where it has none, same shape."""
+    widest = int(max(np.abs(orders).max(), np.abs(fit.orders).max()))
+    table = np.zeros(2 * widest + 1, np.complex128)
+    table[widest + fit.orders] = fit.amplitudes
+    return table[widest + orders]
+
+
+def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple[float, float]:
+    """Of unresolved rotors, the edge of the lines and its deviation, if it is the surer one; or that of all about them.
+
+    Rotors that were not told apart show in the second alone. It is known to its own deviation, whatever the first says;
+    the first no better than both agree, since lines of rotors that were not found may pass for some past the edge.
+
+    Parameters
+    ----------
+    lines, around : (float, float)
+        From `edge_of_lines` and `edge_around`.
+    """
+    if not np.isfinite(lines[0] + around[0]):
+        return np.inf, np.inf
+    if around[0] < ASTRAY_SHARE * lines[0] and lines[1] < ASTRAY_SURE * lines[0]:
+        return lines
+    apart = abs(around[0] - lines[0])
+    std = float(np.hypot(lines[1], max(APART_SHARE * apart, CHANCE_SHARE * around[1])))
+    return (lines[0], std) if apart < AGREED_DEVIATIONS * around[1] and std < around[1] else around
+
+
+def _uneven_past(order: NDArray[np.intp], mean: NDArray[np.float64], bins: NDArray[np.float64], edge: float) -> bool:
+    """True where what lies about the orders past an edge is no flat noise, by more than leaks there from within.
+
+    Parameters
+    ----------
+    order : ndarray of int, shape (orders,)
+        Rising.
+    mean, bins : ndarray, shape (orders,)
+        Mean power about each, and of how many bins.
+    edge : float
+        Where a family is said to end [orders].
+    """
+    past = np.flatnonzero(order > NOISE_FROM * edge)
+    if len(past) < 2:
+        return False
+    parts = np.array_split(past, 2)
+    near, far = (max(float(np.average(mean[part], weights=bins[part])), 1e-9) for part in parts)
+    deviation = float(np.sqrt(sum(1 / bins[part].sum() for part in parts)))
+    within = float(mean[: max(int((order < edge).sum()), 1)].mean())
+    return abs(np.log(near / far)) > UNEVEN_NATS + 3 * deviation and abs(near - far) > UNEVEN_SHARE * within
+
+
+def _noise_about(smear: NDArray[np.float64], level: NDArray[np.float64], flat: float) -> NDArray[np.float64]:
+    """Noise of a receiver whose band is not flat, about each order of rotors that are not told apart.
+
+    The local level tells it; but where the lines fill all that lies between the orders they lift that. There it is no
+    more than what leads from the last level that is sure to the lowest of all.
+
+    Parameters
+    ----------
+    smear : ndarray, shape (orders,)
+        How far the lines about each order are spread, rising [orders].
+    level : ndarray, same shape
+        Local level.
+    flat : float
+        The lowest of all.
+    """
+    last = int((smear < GAPS_SHOW).sum())
+    if last in (0, len(level)):
+        return level if last else np.full(len(level), flat)
+    start = float(np.log(level[max(last - 3, 0) : last].mean()))
+    way = np.linspace(start, min(float(np.log(flat)), start), len(level) - last + 1)[1:]
+    return np.concatenate([level[:last], np.minimum(level[last:], np.exp(way))])
+
+
+def edge_around(
+    data: Periodogram, comb: Comb, rotors: Rotors, blades: int | None, lines: tuple[float, float]
+) -> tuple[float, float]:
+    """Edge of the line family by all that lies about each order: rotors that are not told apart count too.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    comb : Comb
+        The comb found in it.
+    rotors : Rotors
+        What was told apart of it.
+    blades : int, optional
+        Of a rotor.
+    lines : (float, float)
+        From `edge_of_lines`, infinite too: where noise and lines may be taken for one another, it tells which is which.
+
+    Returns
+    -------
+    edge, edge_std : float
+        As from `edge_of_lines`, of the fastest rotor.
+    """
+    nominal, centre = float(np.mean([rotors.rates.min(), rotors.rates.max()])), rotors.fits[0].centre
+    size, pulses = len(data.power), data.pulses
+    span = span_of(data)
+    order = _orders(nominal, span)
+    spread = max(rotors.spread, LEAST_SPREAD * nominal)
+    half_bins = min(nominal * pulses / 2, 1 + comb.last / comb.per_turn * spread * pulses)
+    half = int(half_bins * size / pulses)
+    middle = np.rint((centre + np.array([[-1], [1]]) * order * nominal) * size).astype(np.intp)
+    frequency = (middle[..., None] + np.arange(-half, half + 1)) / size
+    usable = data.usable(frequency) & data.in_band(frequency)
+    sides = np.where(usable, data.at(frequency) * data.level_at(frequency), 0.0).sum(axis=-1) * pulses / size
+    numbers = usable.sum(axis=-1) * pulses / size
+    own = ~_foreign(sides, numbers)
+    total, number = (sides * own).sum(axis=0), (numbers * own).sum(axis=0)
+    seen = number > 2
+    if not seen.any():
+        return 0.0, np.inf
+    count = number[seen]
+    # what lies between the lines lifts the local level, and lines that fill most of the span the floor; the lowest
+    # means of so many exponentials are those of Wilson and Hilferty's cube
+    lowest = (1 - 1 / (9 * count) - NOISE_BELOW / (3 * np.sqrt(count))) ** 3
+    mean = total[seen] / count
+    flat = min(float(np.quantile(mean / lowest, NOISE_ORDERS)), 1.0)
+    noise = np.full(len(count), flat)
+    if _fills_span(np.asarray(order[seen] * nominal, np.float64), total[seen], noise * count, count, span):
+        return np.inf, np.inf
+    # once the lines part, what they have of one another falls with the square of their distance
+    scatter = np.asarray(AROUND_SCATTER / (1 + (2 * order[seen] * rotors.spread * pulses) ** 2), np.float64)
+    relative = spread / nominal
+
+    def fitted(noise: NDArray[np.float64]) -> tuple[float, float]:
+        return fit_edge(
+            order[seen],
+            mean,
+            noise,
+            count,
+            blades,
+            scatter=scatter,
+            leak=SEVERAL_LEAK,
+            plain=True,
+            spread=relative,
+        )
+
+    edge, std = fitted(noise)
+    fastest = float(max(nominal, rotors.rates.max()))
+    if _uneven_past(order[seen], mean, count, edge):
+        level = np.where(usable, data.level_at(frequency), 0.0).sum(axis=-1) * pulses / size
+        other = fitted(_noise_about(order[seen] * relative, (level * own).sum(axis=0)[seen] / count, flat))
+        # strong lines near one another lift the level between them as a receiver's band does: the lines tell, if any
+        one, another = (
+            abs(tried * fastest - lines[0]) / np.hypot(its_std * fastest, lines[1]) if np.isfinite(lines[0]) else np.inf
+            for tried, its_std in ((edge, std), other)
+        )
+        apart = abs(edge - other[0])
+        if not (one < AGREED_DEVIATIONS and another > 2 * AGREED_DEVIATIONS):
+            edge, std = other
+            if not (another < AGREED_DEVIATIONS and one > 2 * AGREED_DEVIATIONS):
+                std = float(np.hypot(std, CHANCE_SHARE * apart))
+    # where the orders mix at the edge, the tips of the fastest and of the slowest are all that is told apart
+    mixed = edge * relative / np.sqrt(12)
+    # and the fastest of rotors that were not found turns by so much faster than any that was
+    hidden = edge * max(spread - float(np.ptp(rotors.rates)), 0.0) / nominal / 2
+    return edge * fastest, float(np.hypot(std, mixed if mixed > MIXED_LINES else max(hidden, AROUND_LINES))) * fastest

@@ -1,0 +1,445 @@
+"""The rates of single rotors whose combs lie in one another: found in turn, fitted together.
+
+Rotors of nearly one rate part at the high orders, where the lines lie further from one another than the dwell's bin.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bodies import LINE_DB
+from ..lines import squared
+from .comb import MOST_BLADES, Comb, strong_multiple
+from .comb_fit import CombFit, fit_combs
+from .comb_search import even_scores
+from .flashes import flash_nats
+from .periodogram import Level, Periodogram
+
+#: Rotors looked for at most.
+MAX_ROTORS = 8
+
+#: How far the rates of one airframe's rotors lie from those known, relative, in hover; and in a manoeuvre or where they
+#: are not alike, from the comb found first: these are sought by their inner orders, which part such rates already.
+RATE_SPREAD, FURTHEST_SPREAD, INNER_ORDERS = 0.05, (-0.25, 0.33), 10
+
+#: A rotor that turns slower still has lines at twice its rate, which may lie among these: those at halves of that, out
+#: to so many orders, which other rotors' lines have not filled yet, have this share of their power and so many times
+#: that of noise, all but so large a share of them.
+HALF_ORDERS, HALF_SHARE, HALF_POWER, HALF_QUANTILE = 6, 0.05, 4.0, 0.3
+
+#: Unlike blades' lines have between those of a comb this share of its lines' power and more than so many times that of
+#: noise, all but as many of them: half and more where they passed for a rotor's, beside one's a fiftieth.
+BETWEEN_SHARE, BETWEEN_POWER = 0.25, 1.0
+
+#: A comb may be every second to fifth line of a rotor whose rate is one of these times its own.
+RATIOS = np.array([2 / 3, 3 / 4, 4 / 5, 5 / 4, 4 / 3])
+
+#: What lies within so many bins of a line that is known says nothing of these; so many must be left.
+NEAR_BINS, LEAST_BETWEEN = 2.0, 4
+
+#: The lines of one of these reach this share of what the others' do: else they are what rotors not told apart leave.
+APART_REACH = 0.5
+
+#: Lines that are fitted together at most, memory and time growing with their square and cube; rotors that would have
+#: more are not told apart.
+MOST_LINES = 2000
+
+#: A second rotor must have this much evidence, and a further one, as two that were fitted leave more by chance [nats];
+#: and this share of the first one's. With less than so large a share of the most that any had it may be what is left of
+#: those found, which are fitted to the end first.
+LEAST_EVIDENCE, FURTHER_EVIDENCE = 13.0, 28.0
+LEAST_SHARE, DOUBTFUL_SHARE = 0.1, 0.5
+
+#: A comb weaker than this share of the strongest is what a rate that changed within the dwell leaves behind.
+LEAST_POWER_SHARE = 0.12
+
+#: A comb of so many times the power of the weakest one may be that many rotors, nearer to one another than the dwell
+#: tells apart: where four of a kind were told apart their powers are within 1.7 in 94 of 100 records, where two passed
+#: for one they were not in 92.
+TWO_POWER = 1.7
+
+#: Steps of the joint fit each time a rotor is added, and once all are found: only then their deviations matter. And at
+#: most where what they leave would be called unresolved: strong lines not fitted to the end leave some of themselves.
+JOINT_STEPS, LAST_STEPS, FURTHER_STEPS = 2, 1, 4
+
+#: A helicopter's tail rotor turns at most so many times as fast as its main rotor: at a fraction of its rate every so
+#: many-th line is there, and that fraction may lie among the rates of rotors like the first one. By so much are these
+#: stronger: 20 times and more where a tail is 8 dB under a main rotor of 5 dB, up to 8 where rotors' lines cross.
+MOST_GEAR, GEAR_FACTOR = 9, 12.0
+
+#: Lines are looked for so far past the edge of the line family: what strong ones leave there may pass for more.
+FURTHEST = 1.5
+
+#: Rates nearer than this are one: so many bins apart at the outermost order.
+RESOLVED_BINS = 0.9
+
+
+@dataclass(frozen=True)
+class Rotors:
+    """Single rotors of one record.
+
+    Parameters
+    ----------
+    rates, stds : ndarray, shape (rotors,)
+        Chopping frequency of each, rising, and its standard deviation [cycles a sample].
+    resolved : bool
+        False where something is left between the combs that is no further comb: the rates lie nearer than the dwell
+        tells apart, or they changed within it. The number of rotors is then a lower bound.
+    spread : float
+        Range of the rates [cycles a sample], of the unresolved ones as far as they show; 0 for a single rotor.
+    fits : list of CombFit
+        Their lines.
+    rest : ndarray of complex128, shape (pulses,)
+        Samples that these leave.
+    next_rate : float
+        The rate near those found that spoke loudest when a further one was last sought, be it a rotor's or not
+        [cycles a sample].
+    """
+
+    rates: NDArray[np.float64]
+    stds: NDArray[np.float64]
+    resolved: bool
+    spread: float
+    fits: list[CombFit]
+    rest: NDArray[np.complex128]
+    next_rate: float
+
+
+def _low_power(rest: Periodogram, places: NDArray[np.float64], fits: Sequence[CombFit]) -> float:
+    """Power that most places have which are not beside a line that is known; 0 where few are not."""
+    known = np.concatenate([fit.frequencies for fit in fits])
+    near = np.abs(places[:, None] - known).min(axis=1) * rest.pulses
+    places = places[rest.usable(places) & (near > NEAR_BINS)]
+    return float(np.quantile(rest.at(places), HALF_QUANTILE)) if len(places) >= LEAST_BETWEEN else 0.0
+
+
+def _is_twice(rest: Periodogram, centre: float, rate: float, fits: Sequence[CombFit]) -> bool:
+    """True where a comb has its inner lines at halves of its rate too, which then is twice a rotor's."""
+    order = np.arange(-HALF_ORDERS, HALF_ORDERS, dtype=float)
+    own, half = (_low_power(rest, centre + rate * tried, fits) for tried in (order, order + 0.5))
+    return half > max(HALF_SHARE * own, HALF_POWER)
+
+
+def _is_between(rest: Periodogram, centre: float, rate: float, fits: Sequence[CombFit]) -> bool:
+    """True where a comb's lines are some of those that a known rotor's unlike blades have at its rotation rate.
+
+    These stand at every multiple of that rate, a rotor's own only at its own multiples. Rotors like the known one, not
+    found yet, have them too: rates are compared as those are sought.
+    """
+    for known in (fit.spacing for fit in fits):
+        for parts in range(2, MOST_BLADES + 1):
+            times = round(rate / known * parts)
+            if np.gcd(times, parts) > 1 or abs(rate * parts / (times * known) - 1) > RATE_SPREAD:
+                continue
+            order = np.arange(-HALF_ORDERS * parts, HALF_ORDERS * parts + 1)
+            order = order[order % parts != 0]
+            is_own = order % times == 0
+            own, other = (_low_power(rest, centre + rate / times * order[some], fits) for some in (is_own, ~is_own))
+            if own > 0 and other > max(BETWEEN_SHARE * own, BETWEEN_POWER):
+                return True
+    return False
+
+
+def _holds_another(fit: CombFit, pulses: int) -> bool:
+    """True where only every so many-th line of a comb is there: a tail rotor's, whose rate is that multiple."""
+    return (
+        strong_multiple(fit.orders, 1 + pulses * np.abs(fit.amplitudes) ** 2, range(2, MOST_GEAR + 1), GEAR_FACTOR) > 1
+    )
+
+
+def powers_of(fits: Sequence[CombFit]) -> list[float]:
+    """Powers of combs' lines, over the orders that all of them reach.
+
+    Not their means: where lines of two rotors lie in one another they may come out as large ones that cancel.
+    """
+    return [float(np.median(powers)) for powers in _line_powers(fits)]
+
+
+def _line_powers(fits: Sequence[CombFit]) -> list[NDArray[np.floating]]:
+    """Power of each line of combs, over the orders that all of them reach."""
+    common = min(int(np.abs(fit.orders).max()) for fit in fits)
+    return [squared(fit.amplitudes[np.abs(fit.orders) <= common]) for fit in fits]
+
+
+def hidden_shift(fits: Sequence[CombFit]) -> float:
+    """How far the mean of combs' rates is off, if those that may be several rotors are [cycles a sample]."""
+    powers = np.array([powers.mean() for powers in _line_powers(fits)])
+    times = np.minimum(powers / powers.min(), MAX_ROTORS)
+    rates = np.array([fit.spacing for fit in fits])
+    return float(np.average(rates, weights=np.where(times > TWO_POWER, np.rint(times), 1)) - rates.mean())
+
+
+def _meet(fits: Sequence[CombFit], resolution: float) -> bool:
+    """True where rates lie nearer than the dwell tells apart."""
+    rates = np.sort([fit.spacing for fit in fits])
+    return len(rates) > 1 and float(np.diff(rates).min()) < resolution
+
+
+@dataclass(frozen=True)
+class _Verdict:
+    """What came of a rate that spoke for a further rotor: it came in, or is not told apart, or is no rotor's.
+
+    `spread` is the range of the rates that are not told apart [cycles a sample].
+    """
+
+    added: bool = False
+    unresolved: bool = False
+    spread: float = 0.0
+
+
+_ADDED, _NO_ROTOR = _Verdict(added=True), _Verdict()
+
+
+@dataclass(frozen=True)
+class Sought:
+    """What speaks for a rotor.
+
+    Parameters
+    ----------
+    rate : float
+        [cycles a sample].
+    reach : int
+        Outermost order.
+    evidence : float
+        [nats].
+    is_apart : bool
+        Whether it is far from the first one.
+    change : float
+        By how much the rate changes over the dwell, relative.
+    """
+
+    rate: float
+    reach: int
+    evidence: float
+    is_apart: bool
+    change: float = 0.0
+
+
+class Separation:
+    """The rotors found so far, which grow by one at a time."""
+
+    def __init__(self, data: Periodogram, comb: Comb, centre: float, reach: int) -> None:
+        self.data, self.comb, self.centre = data, comb, centre
+        self.nominal = comb.chopping
+        self.reach = reach
+        self.resolution = RESOLVED_BINS / (reach * data.pulses)
+        self.furthest = min(FURTHEST * self.nominal * reach, 0.5)
+        self.fits: Sequence[CombFit] = []
+        self.reaches: list[int] = []
+        self.rest = data
+        self.level: Level | None = None  # of the rest, once it was asked for
+        self.fitted_out = True  # nothing to gain by fitting these once more
+        self.seeks_apart = True
+
+    @property
+    def rates(self) -> list[float]:
+        """Of the rotors found [cycles a sample]."""
+        return [fit.spacing for fit in self.fits]
+
+    def sought(self) -> list[Sought]:
+        """What speaks loudest for a further rotor, near the rates known and far from them; the loudest first."""
+        ends = [self.nominal, *self.rates]
+        rates = np.arange(min(ends) * (1 - RATE_SPREAD), max(ends) * (1 + RATE_SPREAD), self.resolution / 4)
+        out = [self._strongest(rates)]
+        if self.fits and self.seeks_apart:
+            apart = self._strongest_apart()
+            known = max(reach * rate for reach, rate in zip(self.reaches, self.rates, strict=True))
+            if apart.rate * apart.reach > APART_REACH * known:
+                out.append(apart)
+        return sorted(out, key=lambda one: -one.evidence)
+
+    def _strongest(self, rates: NDArray[np.float64], *, is_apart: bool = False) -> Sought:
+        """The rate of some, rising, whose lines speak loudest."""
+        return self._loudest_in(self.rest, rates, is_apart=is_apart)
+
+    def _loudest_in(self, data: Periodogram, rates: NDArray[np.float64], *, is_apart: bool) -> Sought:
+        """The same in a record, by the powers of the lines and their flashes."""
+        size = len(data.power)
+        powers, reach = even_scores(data.contrast, rates, np.full(len(rates), self.centre), self.furthest)
+        order = np.arange(1, reach.max() + 1)
+        frequency = self.centre + np.array([-1, 1])[:, None, None] * rates[:, None] * order
+        seen = data.usable(frequency) & (order <= reach[:, None])
+        place = np.rint(frequency * size).astype(np.intp) % size
+        flashes = flash_nats(np.where(seen, data.amplitude[place], 0)).sum(axis=0)
+        sums = powers + flashes
+        best = int(sums.argmax())
+        return Sought(float(rates[best]), int(reach[best]), float(sums[best]), is_apart)
+
+    def _strongest_apart(self) -> Sought:
+        """The same among rates further from the nominal one than those of rotors in hover.
+
+        Were these not sought, their lines would pass for those of rates in between at which only every third or fourth
+        line is there. Where lines not told apart fill all places, none of these speaks for one.
+        """
+        step = max(RESOLVED_BINS / (4 * INNER_ORDERS * self.data.pulses), self.resolution / 4)
+        low, high = FURTHEST_SPREAD
+        rates = np.arange(self.nominal * (1 + low), self.nominal * (1 + high), step)
+        rates = rates[np.abs(rates / self.nominal - 1) > RATE_SPREAD]
+        inner_reach = min(INNER_ORDERS * self.nominal, self.furthest)
+        inner, _ = even_scores(self.rest.contrast, rates, np.full(len(rates), self.centre), inner_reach)
+        near = np.arange(-step, step * 1.01, self.resolution / 4)
+        return self._strongest(float(rates[inner.argmax()]) + near, is_apart=True)
+
+    def in_turn(self, sought: list[Sought]) -> Iterator[Sought]:
+        """These, and where none of them came in the rotor of which they may hold every so many-th line."""
+        yield from sought
+        if self.fits:
+            yield from self._louder_whole(sought[0])
+
+    def _louder_whole(self, one: Sought) -> list[Sought]:
+        """A rotor far from the first of which a comb holds every so many-th line: at most one, if that is louder."""
+        low, high = FURTHEST_SPREAD
+        rates = one.rate * RATIOS
+        away = rates / self.nominal - 1
+        rates = rates[(away > low - RATE_SPREAD) & (away < high + RATE_SPREAD)]
+        near = np.arange(-1, 1.01, 0.25) * self.resolution
+        tried = np.sort((rates[:, None] + near).ravel())
+        if not len(tried):
+            return []
+        found = self._strongest(tried, is_apart=True)
+        return [found] if found.evidence > one.evidence else []
+
+    def join(self, one: Sought) -> _Verdict:
+        """Take a rate in, if it is a rotor's."""
+        if one.is_apart and _is_twice(self.rest, self.centre, one.rate, self.fits):
+            one = replace(one, rate=one.rate / 2, reach=2 * one.reach)
+        if one.is_apart and _is_between(self.rest, self.centre, one.rate, self.fits):
+            return _NO_ROTOR
+        rate, reach = one.rate, one.reach
+        same = [abs(rate - known) < self.resolution for known in self.rates]
+        if any(same):  # lines of a rotor that is known, perhaps past those that were fitted
+            further = [max(r, reach) if own else r for r, own in zip(self.reaches, same, strict=True)]
+            if further != self.reaches and self._may_fit(further):
+                self.reaches, self.fitted_out = further, False
+            return self._unresolved(rate)
+        if not self.fits and self._is_the_comb(rate):
+            self.fits, self.reaches = [self.comb.fit], [reach]
+            self.rest, self.level = self.data.left(self.comb.rest), None
+            return _ADDED
+        if not self._may_fit([*self.reaches, reach]):
+            return self._unresolved(rate)
+        fitted = self._fitted(one, JOINT_STEPS)
+        if fitted is None:
+            return _NO_ROTOR
+        together, _ = fitted
+        if self.fits and _holds_another(together[-1], self.data.pulses):
+            self.seeks_apart &= not one.is_apart
+            return _NO_ROTOR
+        if _meet(together, self.resolution):
+            return self._unresolved(rate)
+        powers = powers_of(together)
+        if powers[-1] < LEAST_POWER_SHARE * max(powers):  # beside several, nobody's rate
+            return self._unresolved(rate) if len(self.fits) == 1 else _Verdict(unresolved=True)
+        self.reaches = [*self.reaches, reach]
+        self._take(*fitted)
+        self.fitted_out = False
+        return _ADDED
+
+    def _unresolved(self, rate: float) -> _Verdict:
+        return _Verdict(unresolved=True, spread=float(np.ptp([rate, *self.rates])))
+
+    def fit_out(self, steps: int) -> bool:
+        """Fit what was found once more, if there is anything to gain by it; whether that was done."""
+        if self.fitted_out:
+            return False
+        self.fitted_out = True
+        fitted = self._fitted(None, steps)
+        if fitted is None or _meet(fitted[0], self.resolution):
+            return False
+        self._take(*fitted)
+        return True
+
+    def _take(self, fits: Sequence[CombFit], samples: NDArray[np.complex128]) -> None:
+        """Hold these fits and what they leave."""
+        self.fits, self.level = fits, self.data.level_of(samples)
+        self.rest = self.data.left(samples, self.level)
+
+    def _is_the_comb(self, rate: float) -> bool:
+        """True where a rate is that of the comb found, whose fit is known."""
+        return self.comb.per_turn == 1 and abs(rate - self.nominal) < self.resolution
+
+    def _may_fit(self, reaches: list[int]) -> bool:
+        """True where combs of these outermost orders are not too many lines to be fitted together."""
+        return 2 * sum(reaches) <= MOST_LINES
+
+    def _level_about(self) -> Level:
+        """Local level without what is known of the combs already."""
+        self.level = self.level or self.data.level_of(self.rest.samples)
+        return self.level
+
+    def _fitted(self, further: Sought | None, steps: int) -> tuple[Sequence[CombFit], NDArray[np.complex128]] | None:
+        """Fit those found together, with a further one if there is one: as from `fit_combs`."""
+        centre = self.centre if further else self.fits[0].centre
+        rates = [*self.rates, further.rate] if further else self.rates
+        reaches = [*self.reaches, further.reach] if further else self.reaches
+        outermost = [(-reach, reach) for reach in reaches]
+        return fit_combs(self.data, centre, rates, outermost, steps, level_about=self._level_about())
+
+
+def separate_rotors(data: Periodogram, comb: Comb, edge: float, how: type[Separation] = Separation) -> Rotors:
+    """Separate the rotors of one record.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    comb : Comb
+        The comb found in it.
+    edge : float
+        Edge of the line family [cycles a sample from the body].
+    how : type
+        How they are sought and fitted.
+
+    Returns
+    -------
+    Rotors
+        At least one.
+    """
+    nominal, centre = comb.chopping, comb.fit.centre
+    # one comb fitted to several finds its centre between them: a strong line near it tells better, if it is a body's
+    for line, level_db in zip(data.strong.centres, data.strong.centres_db, strict=True):
+        if level_db > LINE_DB and abs(line - centre) * data.pulses < 1.5 and abs(line) > data.rest_half:
+            centre = line
+    reach = max(comb.last // comb.per_turn, int(np.clip(round(edge / nominal), 1, 0.45 / nominal)))
+    alone = Rotors(np.array([nominal]), np.array([comb.chopping_std]), True, 0.0, [comb.fit], comb.rest, nominal)
+    if reach * RATE_SPREAD * nominal * data.pulses < 2:
+        return alone
+    found = how(data, comb, centre, reach)
+    first, most, rate, last = 0.0, 0.0, nominal, _NO_ROTOR
+    while len(found.fits) < MAX_ROTORS:
+        sought = found.sought()
+        evidence = sought[0].evidence
+        rate = next(one.rate for one in sought if not one.is_apart)
+        most = max(most, evidence)
+        if not found.fits:
+            first = evidence
+        least = max(FURTHER_EVIDENCE if len(found.fits) > 1 else LEAST_EVIDENCE, LEAST_SHARE * first)
+        if evidence < least:
+            break
+        if evidence < DOUBTFUL_SHARE * most and found.fit_out(FURTHER_STEPS):
+            continue
+        said = []
+        for one in found.in_turn(sought):
+            verdict = found.join(one) if one.evidence >= least else _NO_ROTOR
+            if verdict.added:
+                break
+            # a tail's lines far from the first comb say nothing of the rotors about it
+            if one in sought and (verdict.unresolved or not one.is_apart):
+                said.append(verdict)
+        else:
+            if found.fit_out(FURTHER_STEPS):
+                continue
+            last = said[0]
+            break
+    if not found.fits:
+        return replace(alone, resolved=not last.unresolved, spread=found.resolution if last.unresolved else 0.0)
+    found.fit_out(LAST_STEPS)
+    fits = sorted(found.fits, key=lambda fit: fit.spacing)
+    rates = np.array([fit.spacing for fit in fits])
+    spread = float(np.ptp(rates))
+    if last.unresolved:
+        spread = max(last.spread, spread, found.resolution)
+    stds = np.array([fit.spacing_std for fit in fits])
+    return Rotors(rates, stds, not last.unresolved, spread, fits, found.rest.samples, rate)

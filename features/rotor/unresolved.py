@@ -1,0 +1,197 @@
+"""Whether the single rotors found in a record are all that there are."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from ..lines import squared
+from .comb import Comb
+from .comb_fit import CombFit
+from .left_flashes import others_flash
+from .periodogram import Periodogram
+from .rotors import RATE_SPREAD, RESOLVED_BINS, Rotors
+
+#: A rotor flashes once a period on each side of the body. A second flash of this share of the first one's power is
+#: another rotor's, of a rate that the dwell does not tell apart; so far from the first it is no part of it [1 / lines].
+SECOND_FLASH_SHARE, FLASH_WIDTH, FLASH_PADDING = 0.3, 2.5, 16
+LEAST_FLASH_LINES = 6
+
+#: Blades that reflect at their tips are taken for this many, at most.
+MOST_TIPS = 6
+
+#: What is left between the lines within the band, over what is left beyond it, and as a share of the lines' power,
+#: speaks of rotors that were not found where it exceeds both of these.
+LEFT_OVER, LEFT_SHARE = 0.3, 0.05
+LEAST_BINS = 100
+
+#: What a lone rotor leaves may be a change of its rate; from this share of its lines' power on they say little of it.
+LEFT_ALONE = 0.25
+
+#: As does what is left where it comes, with so many of its deviations, to the mean rotor found: one more like it would
+#: not have been seen.
+HIDDEN_DEVIATIONS = 1.5
+
+#: What stands past the edge of a lone rotor's family, out to so many times it, speaks of rotors whose outer lines part
+#: where it comes to so many deviations, and to this share of the lines' power.
+PAST_EDGE, PAST_DEVIATIONS, PAST_SHARE = 4.0, 4.0, 0.2
+
+
+def _flashes_twice(fit: CombFit, per_turn: int, tip: float) -> bool:
+    """True where a comb's phases show the flashes of two rotors in each period.
+
+    A blade that reflects along its length flashes once on each side. One that reflects at its tip alone is seen twice
+    at every speed below the tip's, before and after that comes straight on: its lines are J_n(Gamma) (the paper's eq.
+    24), and flash once when these are taken for what they are; `tip` is the order its edge has.
+    """
+    blades = [None, *((number, tip) for number in range(1, MOST_TIPS + 1))]
+    return all(_second_flashes(fit, per_turn, blade) for blade in blades)
+
+
+def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) -> bool:
+    """True where the second flashes on both sides are as strong as another rotor's, for blades of one kind.
+
+    Parameters
+    ----------
+    fit, per_turn
+        The comb, and the strong lines' spacing in lines of it.
+    tip : (int, float), optional
+        Blades that reflect at their tips, and the tip's order; else they reflect along their length.
+    """
+    from scipy.special import jv  # here, because predicting needs no such import
+
+    shares = []
+    for sign in (-1, 1):
+        side = np.flatnonzero((sign * fit.orders > 0) & (fit.orders % per_turn == 0))
+        order = np.abs(fit.orders[side]) // per_turn
+        if len(side) < LEAST_FLASH_LINES:
+            continue
+        lines = np.zeros(order.max() + 1, np.complex128)
+        lines[order] = fit.amplitudes[side]
+        size = FLASH_PADDING * len(lines)
+        alone = np.zeros(size)
+        if tip is not None:
+            shape = jv(tip[0] * np.arange(len(lines)), tip[0] * tip[1])
+            lines *= shape
+            shape[np.setdiff1d(np.arange(len(lines)), order)] = 0.0
+            alone = np.abs(fft.fft(shape**2, size)) ** 2 / max(float((shape**2).sum()) ** 2, 1e-30)
+        power = np.abs(fft.fft(lines, size)) ** 2
+        first = int(power.argmax())
+        power = power / power[first] - np.roll(alone, first)  # few lines of unlike strength flash beside as well
+        lines_away = np.abs((np.arange(size) - first + size // 2) % size - size // 2) / FLASH_PADDING
+        other = lines_away > FLASH_WIDTH
+        for part in (2, 3):  # unequal blades of one rotor flash at fractions of the turn
+            other &= np.abs(lines_away - len(lines) / part) > 1
+        shares.append(float(power[other].max(initial=0.0)))
+    return len(shares) == 2 and min(shares) > SECOND_FLASH_SHARE / 2 and sum(shares) > 2 * SECOND_FLASH_SHARE
+
+
+#: Of each bin: how far from a centre it is [cycles a sample], its power, whether it can be seen.
+_About = tuple[NDArray[np.float64], NDArray[np.floating], NDArray[np.bool_]]
+
+
+def _power_about(data: Periodogram, rest: NDArray[np.complex128], centre: float) -> _About:
+    """Of each bin of what is left: how far from a centre it is [cycles a sample], its power, whether it can be seen.
+
+    A background's skirt is nothing that rotors leave: there the power is in units of that, or what is so loud would
+    outweigh all others by chance.
+    """
+    frequency = fft.fftfreq(data.pulses)
+    away = np.abs(frequency - centre)
+    seen = data.usable(frequency) & data.in_band(frequency)
+    power = squared(fft.fft(rest)) / data.pulses
+    skirt = data.in_skirt(frequency)
+    if skirt.any():
+        power[skirt] /= np.maximum(data.level_of(rest)(frequency[skirt]), 1.0)
+    return np.abs(away - np.rint(away)), power, seen
+
+
+def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[float, bool]:
+    """What is left within the band: its share of the lines' power, and whether it may be a rotor.
+
+    The share is 0 where that is not clearly more than the noise beyond the band.
+
+    Fitted lines take noise out with them: each as much as it was let free, those that lie in one another only once.
+    """
+    away, power, usable = about
+    pulses = len(power)
+    low, high = 2 * fits[0].spacing, 0.9 * edge
+    within = usable & (away < high) & (away > low)
+    beyond = usable & (away > 1.1 * edge)
+    nothing_beyond = edge > 0.5  # where lines come back from the other end of the span the floor tells the noise
+    if within.sum() < LEAST_BINS or (beyond.sum() < LEAST_BINS and not nothing_beyond):
+        return 0.0, False
+    noise = 1.0 if nothing_beyond else float(power[beyond].mean())
+    over = float(power[within].mean()) - noise
+    lines = sum(float((np.abs(fit.amplitudes) ** 2).sum()) for fit in fits) * pulses
+    share = over * within.sum() / lines if over > LEFT_OVER * noise else 0.0
+    range_bins = float(np.ptp([fit.spacing for fit in fits])) * pulses
+    held, taken = 0.0, 0.0
+    for fit in fits:
+        order = np.abs(fit.orders)
+        inside = (order * fit.spacing < high) & (order * fit.spacing > low)
+        held += float((np.abs(fit.amplitudes[inside]) ** 2).sum()) * pulses / len(fits)
+        apart = np.minimum(1.0, (1 + order[inside] * range_bins) / len(fits))
+        taken += float((apart * fit.snr[inside] / (1 + fit.snr[inside])).sum())
+    deviation = noise * float(np.sqrt(1 / within.sum() + 1 / max(beyond.sum(), LEAST_BINS)))
+    most = over + noise * taken / within.sum() + HIDDEN_DEVIATIONS * deviation
+    return share, most * within.sum() > held
+
+
+def _stands_past(about: _About, fits: Sequence[CombFit], edge: float) -> bool:
+    """True where more than noise stands past the edge of a line family: near the noise its inner lines alone are seen.
+
+    Rotors of unlike rates have their lines in one another at the inner orders, and apart at the outer ones.
+    """
+    away, power, usable = about
+    furthest = min(PAST_EDGE * edge, (edge + 0.5) / 2)
+    past = usable & (away > 1.1 * edge) & (away < furthest)
+    far = usable & (away > furthest)
+    if past.sum() < LEAST_BINS or far.sum() < LEAST_BINS:
+        return False
+    noise = float(power[far].mean())
+    over = float(power[past].mean()) - noise
+    lines = sum(float((np.abs(fit.amplitudes) ** 2).sum()) for fit in fits) * len(power)
+    deviation = noise * float(np.sqrt(1 / past.sum() + 1 / far.sum()))
+    least = PAST_SHARE if len(fits) == 1 else LEFT_SHARE
+    return over > PAST_DEVIATIONS * deviation and over * past.sum() > least * lines
+
+
+def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float, *, fitted_to: float | None = None) -> Rotors:
+    """Rotors, called unresolved where their flashes, or what they leave, speak of more than were found.
+
+    Parameters
+    ----------
+    rotors : Rotors
+        From `separate_rotors`.
+    data, comb, edge
+        As there.
+    fitted_to : float, optional
+        How far out lines were fitted [cycles a sample from the body], where that may not be as far as they reach.
+    """
+    if not rotors.resolved:
+        return rotors
+    several = len(rotors.fits) > 1
+    per_turn = comb.per_turn if rotors.fits[0] is comb.fit else 1
+    tip = edge / (per_turn * max(fit.spacing for fit in rotors.fits))  # an order is the same for all: blades are alike
+    twice = any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
+    about = _power_about(data, rotors.rest, rotors.fits[0].centre)
+    share, hidden = _left_over(about, rotors.fits, edge)
+    # lines that come back from the other end of the span are none of a family that ends within it
+    contradicted = not several and rotors.fits[0].is_folded and edge < 0.5
+    past = (not several or fitted_to is not None) and _stands_past(about, rotors.fits, fitted_to or edge)
+    if fitted_to is None and others_flash(data, rotors.rest, (fit.spacing for fit in rotors.fits), edge):
+        return not_all(rotors, data, 2 * RATE_SPREAD * float(rotors.rates.mean()))  # they may be any of one airframe
+    if not (twice or hidden or past or contradicted or share > (LEFT_SHARE if several else LEFT_ALONE)):
+        return rotors
+    apart = abs(rotors.next_rate - float(rotors.rates[0])) if hidden and not several else 0.0
+    return not_all(rotors, data, apart)
+
+
+def not_all(rotors: Rotors, data: Periodogram, apart: float = 0.0) -> Rotors:
+    """Rotors, called unresolved, spread by what the dwell tells apart at least, or by so much [cycles a sample]."""
+    reach = max(int(np.abs(rotors.fits[0].orders).max()), 1)
+    least = RESOLVED_BINS / (reach * data.pulses)
+    return replace(rotors, resolved=False, spread=max(rotors.spread, least, apart))

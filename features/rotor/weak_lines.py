@@ -1,0 +1,120 @@
+"""Weak lines between those of a comb: blades that are not quite alike have some at every multiple of the rotation rate.
+
+Left out of the fit they leak into the strong ones, all the same way, and what they pull there passes for another rate
+or for one that changes: of two blades 0.1 rad apart, a quarter of a millimetre at 10 GHz, by some ten deviations.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..lines import LineSpace, squared, sum_of_lines
+from .comb import LEAST_LINES, UNEQUAL_NATS, Comb, blade_numbers, two_means_nats
+from .comb_fit import CombFit, fit_combs
+from .comb_search import MIRROR_BINS, from_mirror_bins
+from .folding import may_come_back
+from .periodogram import Level, Periodogram
+from .slow_lines import remove_bands
+
+#: They are fitted where so much speaks for them, beside what lies as far from any line [nats]: noise that is fitted
+#: does no harm. They must be so far from the strong ones and from one another [bins].
+LEAST_NATS, LEAST_BINS = 3.0, 2.5
+
+#: The mirror image of a comb, which an imbalance of both channels makes, is as much weaker as the body's is, within so
+#: large a factor.
+IMAGE_FACTOR = 6.0
+
+#: They are as even as noise: where the strongest of them holds so large a share of all, that is another's line.
+MOST_SHARE = 0.3
+
+
+def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None) -> tuple[Periodogram, Comb]:
+    """Fit a comb again with the lines that unlike blades have between its own, and take these out of the record.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    comb : Comb
+        The comb found in it.
+    blades : int, optional
+        Of a rotor: their number is else one of `blade_numbers`, if lines show it.
+
+    Returns
+    -------
+    data : Periodogram
+        The record without the lines between; the one given where there are none.
+    comb : Comb
+        The comb as it is fitted beside them.
+    """
+    fit, best, most, sure = comb.fit, 1, 0.0, True
+    if comb.per_turn > 1 or data.one_channel:
+        return data, comb
+    space, level = LineSpace(comb.rest), data.level_of(comb.rest)
+    last = int(np.abs(fit.orders).max())
+    image = _image_of_lines(data, fit, space, level)
+    for parts in blade_numbers(blades):
+        if fit.spacing * data.pulses < LEAST_BINS * parts:
+            continue
+        order = np.arange(-last * parts, last * parts)
+        own = order[np.gcd(order, parts) == 1]  # those of fewer blades may be there without them
+        places = (fit.centre + fit.spacing * tried / parts for tried in (own, order + 0.5))
+        seen = [place[data.usable(place)] for place in places]
+        there, beside = (squared(space.at(place)[0]) * data.pulses / level(place) for place in seen)
+        if min(len(there), len(beside)) < LEAST_LINES or there.max() > MOST_SHARE * there.sum():
+            continue
+        nats = two_means_nats(there, beside)
+        if there.mean() > beside.mean() and nats > LEAST_NATS:
+            best, most = parts, nats
+            sure = not _mirrored(fit, parts, data.pulses) or there.mean() - 1 > IMAGE_FACTOR * image
+            sure &= not may_come_back(last, fit.spacing)  # further lines fall between
+    if best == 1:
+        return data, comb
+    reach = (int(fit.orders.min()) * best, int(fit.orders.max()) * best)
+    fitted = fit_combs(data, fit.centre, [fit.spacing / best], [reach])
+    if fitted is None:
+        return data, comb
+    (whole,), rest = fitted
+    strong = whole.orders % best == 0
+    weak = sum_of_lines(data.pulses, whole.frequencies[~strong], whole.amplitudes[~strong])
+    own = CombFit(
+        whole.spacing * best,
+        whole.centre,
+        whole.spacing_std * best,
+        whole.centre_std,
+        whole.orders[strong] // best,
+        whole.amplitudes[strong],
+        whole.snr[strong],
+    )
+    told = replace(comb, fit=own, rest=rest, blades=best, blades_sure=sure and most > UNEQUAL_NATS)
+    return data.left(data.samples - remove_bands(weak, data.strong.bands)), told
+
+
+def _mirrored(fit: CombFit, parts: int, pulses: int) -> bool:
+    """True where the mirror image of a comb, about velocity zero, lies at so many parts of its spacing."""
+    part = fit.spacing / parts
+    return round(2 * fit.centre / part) % parts != 0 and bool(from_mirror_bins(part, fit.centre, pulses) < MIRROR_BINS)
+
+
+def _image_of_lines(data: Periodogram, fit: CombFit, space: LineSpace, level: Level) -> float:
+    """Mean power over noise of the mirror image of a comb's lines, if it is as weak as that of the body's line.
+
+    Infinite where nothing tells: one of both was taken out with what is at rest.
+    """
+
+    def line_at(place: float) -> float:
+        lines = zip(data.strong.centres, data.strong.centres_db, strict=True)
+        return max((10 ** (db / 10) for line, db in lines if abs(line - place) * data.pulses < 1), default=0.0)
+
+    body, mirror = line_at(fit.centre), np.array([-fit.centre])
+    if not body or not (line_at(-fit.centre) or data.usable(mirror)[0]):
+        return np.inf
+    left = float((squared(space.at(mirror)[0]) * data.pulses / level(mirror))[0])
+    return max(line_at(-fit.centre), left) / body * float(fit.snr.mean())
+
+
+def by_rotation(comb: Comb) -> Comb:
+    """The same comb counted in rotations, so that the weak lines between its own are of it too."""
+    parts, fit = comb.blades // comb.per_turn, comb.fit
+    finer = replace(fit, spacing=fit.spacing / parts, spacing_std=fit.spacing_std / parts, orders=fit.orders * parts)
+    return replace(comb, fit=finer, last=comb.last * parts, per_turn=comb.per_turn * parts)

@@ -1,0 +1,121 @@
+"""Tips faster than the unambiguous velocity: which comb it is, and how fast they are."""
+
+import numpy as np
+import pytest
+from bladewing.features import measure
+from bladewing.features.rotor.comb_fit import fit_combs
+from bladewing.features.rotor.folding import FASTEST_TIP_MPS, FOLDED_BINS, outermost_orders
+from bladewing.features.rotor.periodogram import prepare
+from bladewing.simulate import RotorMotion, rotor_echo
+
+from ..signals import CARRIER_HZ, WAVELENGTH_M, rotors_by_chance, tone, white
+
+BLADE_M = 0.15
+
+
+def folded(seed, times, *, count=1, spread=0.0, snr_db=15.0, velocity_mps=5.0):
+    """Rotors whose tips are so many times as fast as the unambiguous velocity: record, radar, rates, tip speed."""
+    rng = np.random.default_rng(seed)
+    rates_hz = rng.uniform(75, 130) * (1 + spread * np.linspace(-1, 1, count) if count > 1 else np.ones(1))
+    tip_mps = 2 * np.pi * rates_hz.max() * BLADE_M
+    prf_hz = 4 * tip_mps / times / WAVELENGTH_M * rng.uniform(0.95, 1.05)
+    times_s = np.arange(int(0.1 * prf_hz)) / prf_hz
+    echo = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=WAVELENGTH_M, length_m=BLADE_M)
+    iq = (echo + 5) * np.exp(-4j * np.pi * velocity_mps * times_s / WAVELENGTH_M)
+    iq = iq + 10 ** (-snr_db / 20) * white(rng, len(times_s))
+    return iq.astype(np.complex64), {"carrier_hz": CARRIER_HZ, "prf_hz": prf_hz}, rates_hz, tip_mps
+
+
+@pytest.mark.parametrize(("times", "least"), [(1.2, 17), (1.6, 13), (1.9, 8)])
+def test_the_chopping_frequency_and_the_tip_are_told_where_lines_come_back(times, least):
+    right, tips, errors = 0, 0, []
+    for seed in range(20):
+        iq, radar, (rate_hz,), tip_mps = folded(seed, times)
+        found = measure(iq, **radar)
+        # where a few spans are nearly whole spacings the lines that come back lie on others
+        if found.rotors_resolved and abs(found.chopping_hz / (2 * rate_hz) - 1) < 1e-3:
+            right += 1
+            assert found.body_velocity_mps == pytest.approx(5.0, abs=0.1)
+            if np.isfinite(found.tip_speed_mps):
+                tips += 1
+                errors.append((found.tip_speed_mps - tip_mps) / found.tip_speed_mps_std)
+                assert found.tip_speed_mps == pytest.approx(tip_mps, rel=0.05)
+                assert found.bandwidth_hz > radar["prf_hz"]
+    # it was 14, 9 and 2, the others fractions of the chopping frequency or not told apart, and no tips at all
+    assert right >= least
+    assert tips >= least - 2
+    assert np.sqrt(np.mean(np.square(errors))) < 1.5
+
+
+def test_slow_rotors_whose_lines_come_back_are_not_slower_ones():
+    """What comes back lies between the lines, which passed for those of a rate at which no rotor chops."""
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        rate_hz, blade_m = rng.uniform(18, 26), 0.5
+        prf_hz = 4 * 2 * np.pi * rate_hz * blade_m / 2.3 / WAVELENGTH_M
+        times_s = np.arange(int(0.3 * prf_hz)) / prf_hz
+        echo = rotors_by_chance(rng, [rate_hz], times_s, wavelength_m=WAVELENGTH_M, length_m=blade_m)
+        iq = (4 * echo + 5) * np.exp(-4j * np.pi * 5 * times_s / WAVELENGTH_M) + white(rng, len(times_s))
+        found = measure(iq.astype(np.complex64), carrier_hz=CARRIER_HZ, prf_hz=prf_hz)
+        assert found.chopping_hz == pytest.approx(2 * rate_hz, rel=0.01)
+
+
+def test_a_rotor_within_the_span_whose_rate_changes_is_not_folded():
+    """Its smeared lines spoke for one that reaches far to one side, about another body."""
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        prf_hz, rate_hz, blade_m = 10e3, rng.uniform(80, 110), 0.1
+        times_s = np.arange(3000) / prf_hz
+        motion = RotorMotion(rate_hz, 0.0, drift_hz_per_s=rng.uniform(-0.05, 0.05) * rate_hz)
+        echo = rotor_echo(motion.angle_rad(times_s), wavelength_m=WAVELENGTH_M, blade_length_m=blade_m)
+        iq = (4 * echo / np.sqrt(np.mean(np.abs(echo) ** 2)) + 4) * np.exp(-4j * np.pi * 2 * times_s / WAVELENGTH_M)
+        found = measure((iq + white(rng, len(times_s))).astype(np.complex64), carrier_hz=CARRIER_HZ, prf_hz=prf_hz)
+        assert np.isnan(found.chopping_hz) or found.body_velocity_mps == pytest.approx(2.0, abs=0.5)
+
+
+def test_of_several_rotors_the_chopping_frequency_is_told_too():
+    right = 0
+    for seed in range(10):
+        iq, radar, rates_hz, _ = folded(seed, 1.4, count=4, spread=0.02)
+        found = measure(iq, **radar)
+        right += abs(found.chopping_hz / (2 * rates_hz.mean()) - 1) < 0.01
+    assert right >= 9
+
+
+def test_a_radar_fast_enough_finds_the_same_tip():
+    iq, radar, _, tip_mps = folded(4, 1.4)
+    fast, wide, _, same_mps = folded(4, 0.6)
+    assert tip_mps == same_mps
+    few, many = measure(iq, **radar), measure(fast, **wide)
+    assert abs(few.tip_speed_mps - many.tip_speed_mps) < 4 * np.hypot(few.tip_speed_mps_std, many.tip_speed_mps_std)
+
+
+@pytest.mark.parametrize("prf_hz", [8e3, 9e3, 10e3])
+def test_lines_count_as_far_out_as_they_are_told_from_the_others(prf_hz):
+    pulses = 1000
+    data = prepare(white(np.random.default_rng(0), pulses).astype(np.complex64), carrier_hz=CARRIER_HZ, prf_hz=prf_hz)
+    fastest = 2 * FASTEST_TIP_MPS / WAVELENGTH_M / prf_hz
+    for turns in np.random.default_rng(1).uniform(12, 90, 200):
+        outermost = int(outermost_orders(data, 1 / turns))
+        assert outermost >= int(turns / 2)
+        assert outermost <= max(fastest, 0.5) * turns
+        # by brute force: of all lines up to there none is so near to another on the circle
+        places = np.sort(np.arange(-outermost, outermost + 1) / turns % 1)
+        nearest_bins = np.diff(np.append(places, places[0] + 1)).min() * pulses
+        if outermost > turns / 2 + 1:
+            assert nearest_bins > 0.99 * FOLDED_BINS
+        elif fastest > 0.5 + 1 / turns:  # and the next half span of them would be
+            assert abs(turns - round(turns)) / turns * pulses < 1.01 * FOLDED_BINS
+
+
+def test_lines_that_come_back_are_fitted_as_they_stand():
+    pulses, spacing, centre = 1200, 0.0231, 0.013
+    rng = np.random.default_rng(3)
+    order = np.arange(-34, 35)
+    amplitudes = rng.standard_normal(len(order)) + 1j * rng.standard_normal(len(order))
+    iq = (amplitudes[:, None] * tone(centre + spacing * order, pulses, 1.0)).sum(axis=0) + 0.1 * white(rng, pulses)
+    data = prepare(iq.astype(np.complex64), carrier_hz=CARRIER_HZ, prf_hz=10e3)
+    (fit,), rest = fit_combs(data, centre + 1e-5, [spacing + 2e-6], [(-34, 34)])
+    assert np.abs(fit.orders).max() > 0.5 / spacing
+    assert abs(fit.spacing - spacing) < 4 * fit.spacing_std < 1e-6
+    assert np.mean(np.abs(rest) ** 2) < 2 * np.mean(np.abs(white(rng, pulses)) ** 2)

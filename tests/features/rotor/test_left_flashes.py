@@ -1,0 +1,40 @@
+"""Rotors whose lines fill the span: what is left of those not found is no noise, and they are not said to be all."""
+
+from dataclasses import replace
+
+import numpy as np
+from bladewing.features import measure
+from bladewing.features.rotor.left_flashes import others_flash
+from bladewing.features.rotor.periodogram import prepare
+
+from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, rotors_by_chance, white
+
+
+def test_what_is_left_of_a_rotor_is_none_and_that_of_others_is():
+    rng = np.random.default_rng(0)
+    found, others = rotors([57.3], body=0.0), rotors([55.1, 56.4, 59.2], body=0.0)
+    noise = white(rng, PULSES)
+    data = prepare((found + noise).astype(np.complex64), carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
+
+    def said(rest, edge=0.49):
+        return others_flash(replace(data, samples=found + rest), rest, [2 * 57.3 / PRF_HZ], edge)
+
+    assert said(noise + others)
+    assert not said(noise + others, edge=0.3)  # past the lines' edge what is there tells the noise
+    assert not said(noise)
+    assert not said(noise + 0.7 * found)  # weak lines are not fitted to the end
+    assert not said(0.2 * (noise + others))  # as are strong ones
+
+
+def test_rotors_that_fill_the_span_are_not_all_where_most_of_the_power_is_left():
+    """Three were said to be all of four, and their mean known to a third of what it was off by."""
+    rng = np.random.default_rng(2)
+    rates_hz = rng.uniform(75, 110) * (1 + 0.05 * np.sort(rng.uniform(-1, 1, 4)))
+    prf_hz = 2 * rates_hz.mean() * 60 * rng.uniform(0.95, 1.05)
+    times_s = np.arange(360) / prf_hz
+    echo = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=WAVELENGTH_M, length_m=0.15)
+    iq = 6.3 * (echo + 5) * np.exp(-4j * np.pi * rng.uniform(-10, 10) * times_s / WAVELENGTH_M)
+    found = measure((iq + white(rng, 360)).astype(np.complex64), carrier_hz=CARRIER_HZ, prf_hz=prf_hz)
+    assert found.rotor_count < 4
+    assert not found.rotors_resolved
+    assert abs(found.chopping_hz - 2 * rates_hz.mean()) < 2 * found.chopping_hz_std < 0.08 * found.chopping_hz

@@ -1,0 +1,66 @@
+"""The comb of several rotors is that of their chopping frequency, not of a fraction or a multiple of it."""
+
+import numpy as np
+import pytest
+from bladewing.features.rotor.comb import find_comb, strong_multiple
+from bladewing.features.rotor.octaves import coarsest, over_neighbours
+from bladewing.features.rotor.periodogram import prepare
+
+from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors_by_chance, white
+
+RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+TIMES_S = np.arange(PULSES) / PRF_HZ
+ROTOR = {"wavelength_m": WAVELENGTH_M, "length_m": 0.15}
+
+
+def four_rotors(seed):
+    """Rates within 3 %, 20 dB over the noise, at phases and a velocity of chance; with the mean rate [Hz]."""
+    rng = np.random.default_rng(seed)
+    rates_hz = 57.5 * (1 + rng.uniform(-0.015, 0.015, 4))
+    iq = rotors_by_chance(rng, rates_hz, TIMES_S, **ROTOR) * 10 + 100
+    iq *= np.exp(-4j * np.pi * rng.uniform(-30, 30) * TIMES_S / WAVELENGTH_M)
+    return (iq + white(rng, PULSES)).astype(np.complex64), rates_hz.mean()
+
+
+SEEDS = (1, 2, 4, 21, 23, 44, 51, 72)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_four_rotors_have_no_comb_at_a_fraction_or_a_multiple(seed):
+    # their lines fill all places between the high orders: a third of the spacing finds three times as many there
+    iq, rate_hz = four_rotors(seed)
+    comb, reason = find_comb(prepare(iq, **RADAR))
+    assert comb is not None, reason
+    assert comb.chopping * PRF_HZ == pytest.approx(2 * rate_hz, rel=0.02)
+
+
+def test_tips_of_rotors_that_turn_evenly_apart_have_no_comb_at_a_third():
+    # at 0 dB, a third of the spacing had 55 nats where the whole had 53
+    rng = np.random.default_rng(60)
+    rates_hz = (np.array([3400.0, 3424.0, 3448.0, 3472.0]) + rng.uniform(0, 20, 4)) / 60
+    iq = rotors_by_chance(rng, rates_hz, TIMES_S, **ROTOR, points=1) + 10 + white(rng, PULSES)
+    comb, reason = find_comb(prepare(iq.astype(np.complex64), **RADAR))
+    assert comb is not None, reason
+    assert comb.chopping * PRF_HZ == pytest.approx(2 * rates_hz.mean(), rel=0.02)
+
+
+def test_what_any_place_has_is_no_evidence_and_single_lines_keep_theirs():
+    evidence = np.full((1, 4000), -1.0, np.float32)
+    evidence[0, ::40] = 5.0  # lines ten bins apart
+    np.testing.assert_array_equal(over_neighbours(evidence, 96), evidence)
+    full = over_neighbours(np.full((1, 4000), 4.0, np.float32), 96)
+    np.testing.assert_allclose(full, 0, atol=1e-5)
+
+
+def test_the_coarser_of_two_combs_that_speak_alike():
+    assert coarsest([3.3, 10.0, 7.0], [200.0, 190.0, 195.0]) == 1
+    # a fraction whose lines are there has far more; near the noise the likelihood decides
+    assert coarsest([3.3, 10.0], [200.0, 70.0]) == 0
+    assert coarsest([3.3, 10.0], [30.0, 28.5]) == 0
+    assert coarsest([3.3, 10.0], [55.3, 53.4]) == 1
+
+
+def test_lines_that_cancel_at_the_low_orders_only_make_no_unequal_blades():
+    orders = np.arange(-20, 21)
+    power = np.where((orders % 2 == 0) | (np.abs(orders) > 12), 100.0, 2.0)
+    assert strong_multiple(orders, power, range(2, 5)) == 1
