@@ -259,4 +259,4 @@ def fit_changing(
         level = data.level_of(rest)
     # the noise is what the last step leaves, not what the one before it left
     left = float(np.average(np.maximum(data.level_of(rest)(frequency), least), weights=counts))
-    return turning.fits(std * np.sqrt(left / mean_noise), amplitudes, snr), rest
+    return turning.fits(std * np.sqrt(left / mean_noise * data.ends_noise), amplitudes, snr), rest

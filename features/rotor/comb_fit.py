@@ -247,7 +247,7 @@ def fit_combs(
             break
         # what the lines leak lifts the level between them: as they are fitted, it is taken from what they leave
         level = np.maximum(data.level_of(left_by(frequency, amplitudes))(frequency), least)
-    std = np.sqrt(np.maximum(np.diag(np.linalg.inv(fisher)), 0))
+    std = np.sqrt(np.maximum(np.diag(np.linalg.inv(fisher)), 0) * data.ends_noise)
     out = []
     for number in range(count):
         own = (comb == number) & used

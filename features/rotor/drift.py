@@ -226,6 +226,6 @@ def ahead_left(
     )
     information, score = 2 * own[:, :-1].real / level, 2 * own[:, -1].real / level
     covariance = inverse_of(information)
-    step, std = covariance @ score, np.sqrt(np.diag(covariance))
+    step, std = covariance @ score, np.sqrt(np.diag(covariance) * data.ends_noise)
     each = (len(fits), len(DEGREES))
     return step[:-2].reshape(each), std[:-2].reshape(each)

@@ -14,6 +14,7 @@ from .comb import LEAST_REACH_MPS, OVER_BODY, Comb, find_comb, is_short
 from .comb_fit import CombFit
 from .drift import Straightened, ahead_left, straightened
 from .family_edge import edge_around, edge_of_lines, span_of
+from .gain import Evened
 from .helicopter import Gear, find_gear
 from .periodogram import Level, Periodogram, prepared
 from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
@@ -24,6 +25,13 @@ from .weak_lines import by_rotation, without_weak_lines
 #: What the lines tell of the rate grows by so much once its change is taken out, where several rotors were found that
 #: are one; and where these were told apart.
 SEVERAL_GAIN, BELIEVED_GAIN = 1.0, 1.5
+
+#: A gain over the dwell is that of all lines where it explains so much of what one comb leaves, and of what all rotors
+#: found leave, which two nearer than the dwell tells apart come to a twentieth of. It is taken out so many times, each.
+ONE_GAIN_SHARE, GAIN_SHARE, GAIN_STEPS = 0.3, 0.05, 2
+
+#: Lines that swell and fall pass for two rotors whose outermost lines are so near to one another, at most [bins].
+TWIN_BINS = 1.5
 
 #: Gauss-Newton steps at most for both combs of a helicopter, whose change is known from one of them.
 GEARED_STEPS = 4
@@ -129,8 +137,8 @@ def too_few_flashes(family: Family) -> str:
 def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None) -> tuple[Family | None, str]:
     """Find the line family of a record.
 
-    Rates are taken to be steady first. Where one changes for sure, or rotors are not told apart, the record may be one
-    of a rotor that turns evenly, read at other times; if not that, of several that change, each in its own way.
+    A gain over the dwell that all lines share is divided out: what it makes of them passes for more rotors. It is told
+    from the first comb where that is nearly alone, from all rotors found, and from those whose rates change.
 
     Parameters
     ----------
@@ -148,11 +156,68 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
     reason : str
         Why not; empty where there is one.
     """
-    family, reason = _as_it_is(data, blades)
-    if family is None:
+    even, found = _evened_by_one(Evened.of(data, spectrum), blades)
+    first, reason = _as_it_is(even.record, found, blades)
+    if first is None:
         return None, reason
+    by_rotors = _evened_by_rotors(even, first, blades)
+    if by_rotors is not None:
+        family = _turned(by_rotors[0].record, spectrum, by_rotors[1], blades)
+        if family.is_told_apart:
+            return family, ""
+    return _turned(even.record, spectrum, first, blades), ""
+
+
+def _evened_by_one(even: Evened, blades: int | None) -> tuple[Evened, tuple[Comb | None, str]]:
+    """A record evened by its first comb, as often as the gain explains much of what that leaves; and the comb."""
+    found = find_comb(even.record, blades)
+    for _ in range(GAIN_STEPS):
+        comb = found[0]
+        further = even.further(even.record, comb.rest, comb.chopping, ONE_GAIN_SHARE) if comb is not None else None
+        again = find_comb(further.record, blades) if further is not None else (None, "")
+        if further is None or again[0] is None:
+            break
+        even, found = further, again
+    return even, found
+
+
+def _evened_by_rotors(even: Evened, family: Family, blades: int | None) -> tuple[Evened, Family] | None:
+    """A record evened by all its rotors, and what is then found in it; None where they have no gain."""
+    out = None
+    for _ in range(GAIN_STEPS):
+        further = even.further(family.data, family.rotors.rest, family.comb.chopping, GAIN_SHARE)
+        if further is None:
+            break
+        even = further.fitted_to(_not_twins(family), GAIN_SHARE)
+        again, _ = _as_it_is(even.record, find_comb(even.record, blades), blades)
+        if again is None:
+            break
+        family = again
+        out = even, family
+    return out
+
+
+def _not_twins(family: Family) -> list[CombFit]:
+    """Combs of a family, where not told apart the strongest of those as near to one another as a gain splits lines."""
+    fits = sorted(family.rotors.fits, key=lambda fit: -float(squared(fit.amplitudes).sum()))
+    if family.is_told_apart:
+        return fits
+    out: list[CombFit] = []
+    for fit in fits:
+        reach = float(np.abs(fit.orders).max()) * family.data.pulses
+        if all(abs(fit.spacing - other.spacing) * reach > TWIN_BINS for other in out):
+            out.append(fit)
+    return out
+
+
+def _turned(data: Periodogram, spectrum: Spectrum, family: Family, blades: int | None) -> Family:
+    """A family of rates that were taken to be steady, or another where they are not.
+
+    Where one changes for sure, or rotors are not told apart, the record may be one of a rotor that turns evenly, read
+    at other times; if not that, of several that change, each in its own way.
+    """
     if family.ahead is not None and not is_sure(*family.ahead):
-        return family, ""
+        return family
     edge = min(family.edge, span_of(data, [family.comb.fit]))
     several_gain = BELIEVED_GAIN if family.is_told_apart else SEVERAL_GAIN
     least_gain = several_gain if len(family.rotors.rates) > 1 else 0.0
@@ -160,12 +225,15 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
     def evened(comb: Comb) -> tuple[Straightened | None, Family | None]:
         even = straightened(data, comb, edge, least_gain=least_gain)
         again = prepared((even.samples * np.sqrt(spectrum.floor)).astype(np.complex64), spectrum) if even else None
-        return even, _as_it_is(again, blades, even)[0] if again is not None else None
+        if again is None:
+            return even, None
+        steady, found = _evened_by_one(Evened.of(replace(again, ends_noise=data.ends_noise), spectrum), blades)
+        return even, _as_it_is(steady.record, found, blades, even)[0]
 
     comb = by_rotation(family.comb)
     even, other = evened(comb)
     if even is None:
-        return _changing(data, spectrum, family, edge), ""
+        return _changing(data, spectrum, family, edge)
     if _is_one(other) and other.comb.blades > comb.blades:  # narrow, its lines show weak ones that pulled at its rate
         comb = by_rotation(replace(family.comb, blades=other.comb.blades))
         finer = evened(comb)
@@ -174,12 +242,12 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
     # what was straightened may be the tail's comb; but several rotors may pass for that one and a slower one as well
     slower = other is not None and other.gear is not None and other.comb.chopping < (1 - FAR_OFF) * comb.chopping
     if _is_one(other) and not slower:
-        return other, ""
+        return other
     apart = _changing(data, spectrum, family, edge)
     # and several that are so but for a change that they share are believed where nothing better is found
     if family.is_told_apart or apart.is_told_apart or other is None or not other.is_told_apart:
-        return apart, ""
-    return other, ""
+        return apart
+    return other
 
 
 def _is_one(family: Family | None) -> TypeGuard[Family]:
@@ -229,9 +297,11 @@ def _known_as(fit: CombFit, changing: ChangingFit) -> CombFit:
     return replace(fit, spacing=fit.spacing if off else whole * changing.spacing, spacing_std=std)
 
 
-def _as_it_is(data: Periodogram, blades: int | None, even: Straightened | None = None) -> tuple[Family | None, str]:
-    """`find_family` of rotors that turn evenly, or were made to."""
-    comb, why = find_comb(data, blades)
+def _as_it_is(
+    data: Periodogram, found: tuple[Comb | None, str], blades: int | None, even: Straightened | None = None
+) -> tuple[Family | None, str]:
+    """`find_family` of rotors that turn evenly, or were made to, with the comb found, or why there is none."""
+    comb, why = found
     if comb is None:
         return None, why
     edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades)

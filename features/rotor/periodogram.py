@@ -76,6 +76,8 @@ class Periodogram:
         Of the radar.
     one_channel : bool
         Whether one side of the spectrum is empty: both sides of all lines lie on the other, see `half_empty`.
+    ends_noise : float
+        Noise power over the dwell, weighed by the time from its middle squared, as rates are told, over its mean.
     """
 
     samples: NDArray[np.complex128]
@@ -86,6 +88,7 @@ class Periodogram:
     wavelength_m: float
     prf_hz: float
     one_channel: bool
+    ends_noise: float = 1.0
 
     @property
     def blocked(self) -> tuple[tuple[float, float], ...]:

@@ -64,9 +64,13 @@ def record(
     velocity_mps: float,
     ground_db: float | None = None,
     tail: np.ndarray | None = None,
+    gain: ArrayLike = 1.0,
     **rotor: ArrayLike,
 ) -> np.ndarray:
-    """One record: blades at `snr_db` over the noise, body and ground so many dB over the blades; or a tail rotor."""
+    """One record: blades at `snr_db` over the noise, body and ground so many dB over the blades; or a tail rotor.
+
+    The gain over the dwell is that of target and ground, not of the noise.
+    """
     amplitude = 10 ** (snr_db / 20)
     blades = rotors(rng, rates_hz, **rotor)
     if tail is not None:
@@ -76,7 +80,7 @@ def record(
     iq = amplitude * target * np.exp(-4j * np.pi * velocity_mps * TIMES_S / WAVELENGTH_M)
     if ground_db is not None:
         iq = iq + amplitude * 10 ** (ground_db / 20) * ground(rng)
-    return (iq + white(rng, PULSES)).astype(np.complex64)
+    return (iq * gain + white(rng, PULSES)).astype(np.complex64)
 
 
 def bound_hz(echo: np.ndarray, chopping_hz: float, snr_db: float) -> float:
