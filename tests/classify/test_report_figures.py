@@ -49,6 +49,9 @@ def test_a_changed_figure_is_a_changed_text(figures: ModuleType, report: dict[st
     other["scores"]["spectrum-cnn"]["balanced_accuracy"]["value"] += 0.01
     assert figures.filled(text, other) != text
     assert model_card(other) != model_card(report)
+    slower = copy.deepcopy(report)
+    next(row for row in slower["cost"]["batches"][-1]["stages"] if row["stage"] == "chain")["ratio_to_fft"] *= 2
+    assert figures.filled(text, slower) != text
 
 
 def test_committed_report_is_of_the_shipped_models(report: dict[str, Any]) -> None:
