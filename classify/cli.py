@@ -286,7 +286,7 @@ def report(
 ) -> None:
     """Measure models on fresh synthetic records: what each choice costs; interrupted, the same command goes on."""
     from .parts import REPORT_PARTS
-    from .report import run_report
+    from .report.run import run_report
 
     with _goes_on(out / REPORT_PARTS):
         run_report(out, models=models, quick=quick, seed=seed, config=config, progress=True)
