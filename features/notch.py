@@ -105,7 +105,7 @@ def notch_mask(spectrum: Spectrum, body: Body, notch_mps: float = NOTCH_MPS) -> 
     -------
     ndarray of bool, shape (..., bins)
     """
-    keep, away = _notches(spectrum.bins, half_width_bins(spectrum, notch_mps))
+    keep, away = notches(spectrum.bins, half_width_bins(spectrum, notch_mps))
     return away[spectrum.bins - body.index] & keep
 
 
@@ -117,7 +117,7 @@ def half_width_bins(spectrum: Spectrum, notch_mps: float = NOTCH_MPS) -> int:
 
 
 @lru_cache(maxsize=64)
-def _notches(bins: int, half: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def notches(bins: int, half: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Mask about the middle bin, and the mask about bin i in row bins - i."""
     position = np.arange(2 * bins)
     distance = position % bins
