@@ -36,6 +36,8 @@ ADAM = 0.3
 TAUGHT = 0.75
 """Share of a teacher's answer in what a network is to say, beside the label."""
 
+_AT_ONCE = 1024  # records that a network is asked about in one call
+
 
 @dataclass(frozen=True)
 class TrainingResult:
@@ -215,7 +217,7 @@ def train_network(
     return TrainingResult(work.best_epoch, place.type, seconds, tuple(work.history), len(work.history) < epochs)
 
 
-def network_scores(net: EvidenceNet, inputs: Inputs, batch: int = 1024) -> NDArray[np.float32]:
+def network_scores(net: EvidenceNet, inputs: Inputs) -> NDArray[np.float32]:
     """Return the raw scores of a network, and leave it in the state for inference.
 
     Parameters
@@ -224,8 +226,6 @@ def network_scores(net: EvidenceNet, inputs: Inputs, batch: int = 1024) -> NDArr
         The network, on any device.
     inputs
         Input name to array (n, *shape), finite.
-    batch
-        Records a call, at least 1.
 
     Returns
     -------
@@ -242,8 +242,8 @@ def network_scores(net: EvidenceNet, inputs: Inputs, batch: int = 1024) -> NDArr
     net.eval()
     scores = []
     with torch.inference_mode():
-        for start in range(0, count, batch):
-            part = (_tensor(inputs[name][start : start + batch]).to(place).float() for name in net.input_shapes)
+        for start in range(0, count, _AT_ONCE):
+            part = (_tensor(inputs[name][start : start + _AT_ONCE]).to(place).float() for name in net.input_shapes)
             scores.append(net(*part).cpu())
     return torch.cat(scores).numpy()
 
