@@ -11,7 +11,7 @@ from bladewing.models import LADDER
 from bladewing.simulate.dataset import KIND_CLASS
 from numpy.typing import NDArray
 
-from .gather import Gathered, Sets
+from .gather import Gathered, TrainingSets
 from .labels import CLASSES
 from .parts import Parts
 from .training_config import TrainingConfig
@@ -51,7 +51,7 @@ def epochs_of(name: str) -> str:
 def train_net(
     name: str,
     settings: TrainingConfig,
-    sets: Sets,
+    sets: TrainingSets,
     on_fraction: OnFraction,
     parts: Parts | None,
     taught: Taught | None = None,
@@ -87,7 +87,7 @@ def _trained(
     name: str,
     taught: Taught | None,
     settings: TrainingConfig,
-    sets: Sets,
+    sets: TrainingSets,
     on_fraction: OnFraction,
     parts: Parts | None,
 ) -> tuple["EvidenceNet", "TrainingResult"]:
