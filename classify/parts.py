@@ -68,14 +68,14 @@ class Parts:
         """Whether a part was finished before."""
         return (self._folder / f"{name}.json").exists()
 
-    def take(self, name: str, measure: Callable[[], Any]) -> Any:
-        """Give a part as it was finished before, or measure and keep it.
+    def take(self, name: str, make: Callable[[], Any]) -> Any:
+        """Give a part as it was finished before, or make and keep it.
 
         Parameters
         ----------
         name : str
             Of the part; a file name.
-        measure : callable
+        make : callable
             Gives plain numbers, strings, lists and dictionaries.
 
         Raises
@@ -85,7 +85,7 @@ class Parts:
         """
         file = self._folder / f"{name}.json"
         if not file.exists():
-            self._write(file, json.dumps(measure(), allow_nan=False).encode())
+            self._write(file, json.dumps(make(), allow_nan=False).encode())
         try:
             return json.loads(read_bounded(file, _MOST_BYTES))
         except (OSError, ValueError, RecursionError) as error:

@@ -205,7 +205,7 @@ def test_interrupted_run_leaves_the_old_files_whole(
         (tmp_path / name).write_bytes(content)
     body = json.loads(old["report.json"])
     if where != "scores.score":
-        monkeypatch.setattr(run, "measure", lambda *_, **__: body)
+        monkeypatch.setattr(run, "measured_report", lambda *_, **__: body)
     monkeypatch.setattr(f"bladewing.classify.report.run.{where}", interrupt)
     with pytest.raises(KeyboardInterrupt):
         run.run_report(tmp_path, models=tiny_models, quick=True, seed=1, config=tiny_settings, progress=False)

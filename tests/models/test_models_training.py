@@ -344,7 +344,7 @@ def test_the_best_state_is_kept_when_the_last_epochs_are_ruined():
 def test_training_measures_its_records_and_not_those_of_the_validation():
     net, _ = _trained(epochs=1)
     fresh = SpectrumNet(SHAPES, seed=0)
-    fresh.measure(_spectra(300, 1)[0])
+    fresh.standardise_by(_spectra(300, 1)[0])
     for name, values in fresh.standardise.state_dict().items():
         assert torch.equal(net.standardise.state_dict()[name], values), name
 
@@ -376,7 +376,7 @@ def test_half_precision_in_memory_gives_what_its_values_give_in_full():
 def test_scaled_inputs_measured_anew_give_the_same_scores(scale, shift):
     inputs, _ = _spectra(64, 1)
     net = SpectrumNet(SHAPES, seed=0)
-    net.measure(inputs)
+    net.standardise_by(inputs)
     scores = network_scores(net, inputs)
     column = np.array([scale]).T
     moved = {
@@ -385,7 +385,7 @@ def test_scaled_inputs_measured_anew_give_the_same_scores(scale, shift):
     }
     if not np.allclose(scale, 1, atol=0.2):
         assert np.abs(network_scores(net, moved) - scores).max() > 1e-3  # the old buffers are the wrong ones
-    net.measure(moved)
+    net.standardise_by(moved)
     assert network_scores(net, moved) == pytest.approx(scores, abs=1e-4)
 
 
@@ -394,7 +394,7 @@ def test_scaled_inputs_measured_anew_give_the_same_scores(scale, shift):
 def test_a_constant_input_is_only_centred(level, count):
     layer = Standardise(2, 0)
     values = np.stack([np.full(count, level), np.arange(count) % 2], axis=1).astype(np.float32)
-    layer.measure(values)
+    layer.standardise_by(values)
     result = layer(torch.from_numpy(values))
     assert torch.isfinite(result).all()
     assert result[:, 0].abs().max() < 1e-3
@@ -402,7 +402,7 @@ def test_a_constant_input_is_only_centred(level, count):
 
 def test_an_outlier_is_clipped_to_very_much():
     layer = Standardise(1, 0)
-    layer.measure(np.array([[-1.0], [1.0]], np.float32))
+    layer.standardise_by(np.array([[-1.0], [1.0]], np.float32))
     assert layer(torch.tensor([[3.0], [1e30]])).tolist() == [[3.0], [8.0]]
 
 
