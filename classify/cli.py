@@ -12,9 +12,9 @@ from typing import Annotated, Any
 
 import typer
 
-from .bounds import LEAST_RECORDS
 from .errors import BadInput, Interrupted
 from .exits import complain, exit_code, mend_streams
+from .limits import LEAST_RECORDS
 from .terminal import console
 
 app = typer.Typer(

@@ -20,9 +20,9 @@ from ..labels import CLASSES
 from ..ladder import non_dominated
 from ..parts import Parts
 from . import choices, metrics
-from .bounds import detection_bounds
 from .choices import DWELLS_S, FEATURES, STORED_BINS, STORED_BITS, FrontSet, OnDone
 from .cost import BATCHES, in_turn
+from .detection_bound import detection_bounds
 from .memory import peak_bytes
 from .operations import counted_transforms, network_operations
 from .pictures import PICTURES
@@ -80,11 +80,11 @@ def measure_front(
     -------
     dict
         ``dwells_s``, ``train_records``, ``test_records`` (of each dwell), ``epochs``; ``declared`` (``shares`` and
-        ``snr_db``), ``quoted_dwell_s``; ``bounds``: see `bounds.detection_bounds`; ``choices``: one a picture, one for
-        the measurements and one a model, see `_row`; ``budgets``: for each batch size and budget the choice most
-        accurate on half of the test records and what it gives on the other half, or None; ``stored``: for each number
-        of bins and bits ``bytes``, ``bytes_per_million``, the accuracy and whether nothing is as small and as good
-        (``front``).
+        ``snr_db``), ``quoted_dwell_s``; ``bounds``: see `detection_bound.detection_bounds`; ``choices``: one a picture,
+        one for the measurements and one a model, see `_row`; ``budgets``: for each batch size and budget the choice
+        most accurate on half of the test records and what it gives on the other half, or None; ``stored``: for each
+        number of bins and bits ``bytes``, ``bytes_per_million``, the accuracy and whether nothing is as small and as
+        good (``front``).
     """
     _score(models, config, reference, parts=parts, phase=phase)
     entries = [("picture", name) for name in PICTURES] + [("features", FEATURES)]

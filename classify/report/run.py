@@ -21,7 +21,6 @@ from bladewing.models.seal import seal
 from bladewing.simulate import Radar, Records, draw_records
 from numpy.typing import NDArray
 
-from ..bounds import MOST_MODEL_BYTES, MOST_TEXT_BYTES
 from ..dataset import simulator_digest
 from ..errors import BadInput, unreadable
 from ..files import read_bounded, result_folder, settle, write_together
@@ -29,6 +28,7 @@ from ..gather import inputs_digest
 from ..inference import Classifier
 from ..labels import CLASSES
 from ..ladder import CASCADE, STAGES_KEY
+from ..limits import MOST_MODEL_BYTES, MOST_TEXT_BYTES
 from ..parts import REPORT_PARTS, Parts
 from ..progress import Progress
 from ..stability.run import worst_of_each

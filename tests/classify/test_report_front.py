@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scipy.fft
 from bladewing.classify.report import front, pictures, stft
-from bladewing.classify.report.bounds import detection_bound
+from bladewing.classify.report.detection_bound import detection_bound
 from bladewing.classify.report.memory import peak_bytes
 from bladewing.classify.report.operations import counted_transforms, network_operations
 from bladewing.classify.report.timing import Laps, quote, ratio

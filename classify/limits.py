@@ -1,4 +1,4 @@
-"""Bounds on what is read and asked for: what a file may hold, what a packed one may unpack to, the fewest records."""
+"""Limits of what is read and asked for: what a file may hold, what a packed one may unpack to, the fewest records."""
 
 import bz2
 import io
