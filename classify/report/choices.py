@@ -187,7 +187,7 @@ def train_picture(
     """
     from bladewing.models.augment import VelocityMirror
     from bladewing.models.calibration import Calibration
-    from bladewing.models.training import network_scores, train_network
+    from bladewing.models.training import Course, Lessons, network_scores, train_network
 
     picture = pictures_of([name])[name]
     net = network_for(picture, seed=config.seed)
@@ -198,12 +198,10 @@ def train_picture(
 
     result = train_network(
         net,
-        inputs("train"),
-        sets["train"].labels,
+        Lessons(inputs("train"), sets["train"].labels),
         (inputs("validate"), sets["validate"].labels),
+        Course(config.front_epochs, batch=_BATCH),
         seed=config.seed,
-        epochs=config.front_epochs,
-        batch=_BATCH,
         augment=VelocityMirror(axes={signal: 2}, odd={}) if picture.has_velocity else None,
         on_epoch=lambda epoch, epochs, _: on_done(epoch / epochs),
     )
