@@ -13,8 +13,8 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from .bounds import open_zip, require_size
 from .errors import BadInput, unreadable
+from .limits import open_zip, require_size
 from .mat_file import require_sound
 
 ARRAY_SUFFIXES = (".npy", ".npz", ".mat")

@@ -4,16 +4,17 @@ import json
 import sys
 import warnings
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from .bounds import LEAST_RECORDS
 from .errors import BadInput, Interrupted
 from .exits import complain, exit_code, mend_streams
+from .limits import LEAST_RECORDS
 from .terminal import console
 
 app = typer.Typer(
@@ -118,9 +119,10 @@ def predict(
     """Say of each dwell of each recording: uav, bird, clutter or unknown, with probabilities and the reason."""
     from . import predict as work
     from .inference import Classifier
+    from .recording import of_each
     from .samples import positive
 
-    dwell_s = work.checked_dwell_s(dwell)
+    dwell_s = positive(dwell, "--dwell [s]")
     rule = {"--budget-us": budget_us, "--max-false-alarm": max_false_alarm, "--coverage": coverage}
     for option, value in rule.items():
         if value is not None:
@@ -130,22 +132,11 @@ def predict(
         complain(f"the budget of {budget_us:g} us buys the model {classifier.name}", kind="note")
     if classifier.operating_point is not None:
         complain(work.terms(classifier.operating_point, by_sets=coverage is not None), kind="note")
-    said: Counter[str] = Counter()
-    unreadable = 0
-    for result in work.answers(
-        recordings, classifier, dwell_s=dwell_s, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable
-    ):
-        if isinstance(result, BadInput):
-            unreadable += 1
-            complain(str(result))
-            continue
-        said[result.track.label] += 1
-        if as_json:
-            for line in result.json_objects():
-                print(json.dumps(line, allow_nan=False))
-        else:
-            result.print(console())
-        sys.stdout.flush()
+    judge = partial(work.answer, classifier=classifier, dwell_s=dwell_s)
+    results = of_each(judge, recordings, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable)
+    printed = _print_each(results, lambda result: result.print(console()), as_json=as_json)
+    said = Counter("" if result is None else result.track.label for result in printed)
+    unreadable = said.pop("", 0)
     if not as_json and said.total() + unreadable > 1:
         print(work.summary(said, unreadable), flush=True)
     if unreadable:
@@ -179,23 +170,23 @@ def measure(
     """Measure the rotor in each dwell, with error bars: body velocity, chopping, single rotors, band, blade."""
     from . import measure as work
     from .measure_words import print_measured
+    from .progress import Progress
+    from .recording import Recording, of_each
 
     settings = work.Settings.checked(dwell_s=dwell, blades=blades, beta_deg=beta_deg)
     work.checked_plot(plot)
-    unreadable = 0
-    clearest = None
-    for result in work.measured(recordings, settings, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable):
-        if isinstance(result, BadInput):
+
+    def measured(recording: Recording) -> work.Measured:
+        with Progress(visible=True, passing=True) as bars:
+            return work.measure_recording(recording, settings, bars)
+
+    unreadable, clearest = 0, None
+    results = of_each(measured, recordings, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable)
+    for result in _print_each(results, lambda result: print_measured(result, console()), as_json=as_json):
+        if result is None:
             unreadable += 1
-            complain(str(result))
-            continue
-        if as_json:
-            for line in result.json_objects():
-                print(json.dumps(line, allow_nan=False))
         else:
-            print_measured(result, console())
-        sys.stdout.flush()
-        clearest = result.clearer(clearest)
+            clearest = result.clearer(clearest)
     if plot is not None and clearest is not None:
         clearest.write_plot(plot)
     if unreadable:
@@ -286,7 +277,7 @@ def report(
 ) -> None:
     """Measure models on fresh synthetic records: what each choice costs; interrupted, the same command goes on."""
     from .parts import REPORT_PARTS
-    from .report import run_report
+    from .report.run import run_report
 
     with _goes_on(out / REPORT_PARTS):
         run_report(out, models=models, quick=quick, seed=seed, config=config, progress=True)
@@ -367,6 +358,22 @@ def tables(
 
     print(markdown(run_tables(out, seed)), flush=True)
     print(f"Wrote {out / 'tables.md'} and {out / 'tables.json'}", flush=True)
+
+
+def _print_each(results: Iterable[Any], show: Callable[[Any], None], *, as_json: bool) -> Iterator[Any]:
+    """Print the result of each recording as it comes, and pass it on; None where the recording is bad."""
+    for result in results:
+        if isinstance(result, BadInput):
+            complain(str(result))
+            yield None
+            continue
+        if as_json:
+            for line in result.json_objects():
+                print(json.dumps(line, allow_nan=False))
+        else:
+            show(result)
+        sys.stdout.flush()
+        yield result
 
 
 @contextmanager

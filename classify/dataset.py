@@ -56,7 +56,7 @@ class Shard:
 
 
 @dataclass(frozen=True)
-class Plan:
+class DataSetPlan:
     """What a data set holds.
 
     Parameters
@@ -71,7 +71,7 @@ class Plan:
     records: dict[str, int]
 
     @classmethod
-    def of(cls, settings: TrainingConfig) -> "Plan":
+    def of(cls, settings: TrainingConfig) -> "DataSetPlan":
         """What `bladewing train` draws with these settings."""
         return cls(settings.seed, settings.sets)
 
@@ -95,7 +95,7 @@ class DataSet:
 
     Attributes
     ----------
-    plan : Plan
+    plan : DataSetPlan
         What it holds.
     simulator_sha256 : str
         `simulator_digest` of who wrote it.
@@ -129,7 +129,7 @@ def run_dataset(
     seed: int | None = None,
     config: Path | None = None,
     progress: bool = True,
-) -> Plan:
+) -> DataSetPlan:
     """Write the records that a training with these settings draws, or go on where an earlier run was interrupted.
 
     Parameters
@@ -143,7 +143,7 @@ def run_dataset(
 
     Returns
     -------
-    Plan
+    DataSetPlan
         What the folder now holds.
 
     Raises
@@ -151,7 +151,7 @@ def run_dataset(
     BadInput
         A setting is wrong, the folder holds something else or cannot be written, or the disk is too small.
     """
-    plan = Plan.of(training_config(config, records=records, seed=seed))
+    plan = DataSetPlan.of(training_config(config, records=records, seed=seed))
     with Progress(visible=progress) as bars:
         written = write_dataset(Path(out), plan, bars)
     count, shards = sum(plan.records.values()), len(plan.shards())
@@ -159,7 +159,7 @@ def run_dataset(
     return plan
 
 
-def write_dataset(folder: Path, plan: Plan, bars: Progress, *, workers: int | None = None) -> int:
+def write_dataset(folder: Path, plan: DataSetPlan, bars: Progress, *, workers: int | None = None) -> int:
     """Write what is missing of a data set; give the number of shards that were.
 
     Parameters
@@ -216,7 +216,7 @@ def _writable(folder: Path) -> Iterator[None]:
                 place.rmdir()
 
 
-def _begun(folder: Path, plan: Plan, bars: Progress) -> dict[str, Contents]:
+def _begun(folder: Path, plan: DataSetPlan, bars: Progress) -> dict[str, Contents]:
     """The shards that an earlier run left whole."""
     manifest = _read_manifest(folder)
     mixture: BadInput | None = None  # shards of two simulators are no data set; what is whole may be of another
@@ -247,7 +247,7 @@ def _begun(folder: Path, plan: Plan, bars: Progress) -> dict[str, Contents]:
     return contents
 
 
-def _require_room(folder: Path, plan: Plan, missing: list[Shard]) -> None:
+def _require_room(folder: Path, plan: DataSetPlan, missing: list[Shard]) -> None:
     """Refuse at once what the disk cannot hold: the radars, and so the sizes, are known before a record is drawn."""
     needed = 0
     for shard in missing:
@@ -272,7 +272,7 @@ def simulator_digest() -> str:
     return digest.hexdigest()
 
 
-def _write_manifest(folder: Path, plan: Plan, contents: dict[str, Contents]) -> None:
+def _write_manifest(folder: Path, plan: DataSetPlan, contents: dict[str, Contents]) -> None:
     manifest = {
         "product": "bladewing dataset",
         "format": _FORMAT,
@@ -286,7 +286,7 @@ def _write_manifest(folder: Path, plan: Plan, contents: dict[str, Contents]) -> 
     write_whole(folder / MANIFEST, json.dumps(manifest, indent=1, allow_nan=False) + "\n")
 
 
-def _read_manifest(folder: Path) -> tuple[Plan, dict[str, Contents], str] | None:
+def _read_manifest(folder: Path) -> tuple[DataSetPlan, dict[str, Contents], str] | None:
     """What a manifest says, every field checked; None where there is none."""
     path = folder / MANIFEST
     try:
@@ -303,7 +303,7 @@ def _read_manifest(folder: Path) -> tuple[Plan, dict[str, Contents], str] | None
         raise BadInput(f"{path}: not the manifest of a data set: {error}") from None
 
 
-def _checked(manifest: Any) -> tuple[Plan, dict[str, Contents], str]:
+def _checked(manifest: Any) -> tuple[DataSetPlan, dict[str, Contents], str]:
     if not isinstance(manifest, dict) or manifest.get("product") != "bladewing dataset":
         raise ValueError("its product is not 'bladewing dataset'")
     for field, expected in (("format", _FORMAT), ("shard_records", SHARD_RECORDS)):
@@ -312,7 +312,7 @@ def _checked(manifest: Any) -> tuple[Plan, dict[str, Contents], str]:
     records = manifest.get("records")
     if not isinstance(records, dict) or list(records) != list(PURPOSES):
         raise ValueError(f"records must hold {', '.join(PURPOSES)}")
-    plan = Plan(
+    plan = DataSetPlan(
         _whole(manifest.get("seed"), "seed", 0),
         {purpose: _whole(count, f"records of {purpose}", 1, _MOST) for purpose, count in records.items()},
     )

@@ -19,12 +19,12 @@ from bladewing.models.seal import SEAL_KEY, seal
 from onnx import TensorProto, helper
 from scipy import fft
 
-from .bounds import MOST_MODEL_BYTES
 from .errors import BadInput
 from .files import read_bounded, write_whole
 from .inference import Classifier
 from .labels import CLASSES, UNKNOWN
 from .ladder import CASCADE
+from .limits import MOST_MODEL_BYTES
 from .model_file import EXPORTED, chosen_name, read_model
 from .samples import positive
 

@@ -78,17 +78,20 @@ def only_writer(folder: str | os.PathLike[str], *, wait: bool = True) -> Iterato
     if fcntl is None:
         yield
         return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
+    while True:
+        descriptor = os.open(folder, os.O_RDONLY)
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-        except BlockingIOError:
-            raise
-        except OSError:  # a file system without locks: writers are not kept apart there
-            pass
-        yield
-    finally:
-        os.close(descriptor)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            except BlockingIOError:
+                raise
+            except OSError:  # a file system without locks: writers are not kept apart there
+                pass
+            if os.path.samestat(os.fstat(descriptor), os.stat(folder)):  # else its holder has removed it meanwhile
+                yield
+                return
+        finally:
+            os.close(descriptor)
 
 
 def clear_litter(folder: str | os.PathLike[str], pattern: str = ".bladewing-*.*") -> None:

@@ -123,7 +123,7 @@ class Gathered:
 
 
 @dataclass(frozen=True)
-class Sets:
+class TrainingSets:
     """Records for each step; they share no stream, so no scene stands in two of them."""
 
     train: Gathered

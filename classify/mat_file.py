@@ -6,7 +6,7 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from .bounds import inflate, require_size
+from .limits import inflate, require_size
 
 #: Bytes of a number by its type in the file: int8 to uint32, single, double, int64 and uint64.
 _NUMBER_BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}

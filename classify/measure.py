@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,9 @@ from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
 from .envelope import Envelope
 from .errors import BadInput
-from .predict import checked_dwell_s, distinct
 from .progress import Progress
-from .recording import Recording, load_recording
+from .recording import Recording
+from .samples import positive
 from .terminal import counted
 
 #: What a dwell's JSON object holds beside its times and the reason, in this order.
@@ -96,7 +96,7 @@ class Settings:
             raise BadInput(f"--blades is {blades}: it must be a whole number of 1 to {MOST_BLADES_GIVEN}")
         if beta_deg is not None and not 0 <= beta_deg < 90:
             raise BadInput(f"--beta-deg is {beta_deg:g}: it must be at least 0 and below 90 [deg]")
-        return cls(checked_dwell_s(dwell_s), blades, None if beta_deg is None else math.radians(beta_deg))
+        return cls(positive(dwell_s, "--dwell [s]"), blades, None if beta_deg is None else math.radians(beta_deg))
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,33 +305,6 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     stop_s = start_s + pulses / recording.prf_hz
     remarks = recording.remarks(settings.dwell_s, iq, measured=True)
     return Measured(recording, iq, start_s, stop_s, values, acceleration, acceleration_std, beat, remarks)
-
-
-def measured(
-    paths: Iterable[Path],
-    settings: Settings,
-    *,
-    carrier_hz: float | None = None,
-    prf_hz: float | None = None,
-    variable: str | None = None,
-) -> Iterator[Measured | BadInput]:
-    """Measure recordings one after another; one that is bad gives its error instead and does not stop the others.
-
-    Parameters
-    ----------
-    paths, carrier_hz, prf_hz, variable
-        As for `bladewing.classify.recording.load_recording`.
-    settings
-        What is asked.
-    """
-    for path in distinct(paths):
-        try:
-            recording = load_recording(path, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable)
-            with Progress(visible=True, passing=True) as bars:
-                result = measure_recording(recording, settings, bars)
-            yield result
-        except BadInput as error:
-            yield error
 
 
 def _number(value: Any, *, whole: bool = False) -> float | None:

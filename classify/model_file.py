@@ -13,12 +13,12 @@ from bladewing.models import DEFAULT_MODEL, KIND_SCORES
 from bladewing.models.operating import OperatingCurve, OperatingPoint
 from bladewing.models.session import quiet_session
 
-from .bounds import MOST_MODEL_BYTES
 from .envelope import Envelope
 from .errors import BadInput
 from .files import read_bounded
 from .labels import CLASSES
 from .ladder import CASCADE, PLACES, by_budget, by_place, measured_fft_us, shipped_account
+from .limits import MOST_MODEL_BYTES
 from .samples import positive
 
 CURVE_KEY = "operating_curve"

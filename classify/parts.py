@@ -55,29 +55,27 @@ class Parts:
             One is at work there.
         """
         self._all.mkdir(parents=True, exist_ok=True)
-        try:
-            with ExitStack() as held:
-                try:
-                    held.enter_context(only_writer(self._all, wait=False))
-                except BlockingIOError:
-                    busy = f"{self._all.parent}: another run is at work there"
-                    raise BadInput(f"{busy}: let it finish, or give another folder") from None
-                yield
-        finally:
-            self._clear()
+        with ExitStack() as held:
+            try:
+                held.enter_context(only_writer(self._all, wait=False))
+            except (BlockingIOError, FileNotFoundError):  # or one that ends at this very moment
+                busy = f"{self._all.parent}: another run is at work there"
+                raise BadInput(f"{busy}: let it finish, or give another folder") from None
+            held.callback(self._clear)  # while it is held, and by its holder alone: the folder is the lock
+            yield
 
     def have(self, name: str) -> bool:
         """Whether a part was finished before."""
         return (self._folder / f"{name}.json").exists()
 
-    def take(self, name: str, measure: Callable[[], Any]) -> Any:
-        """Give a part as it was finished before, or measure and keep it.
+    def take(self, name: str, make: Callable[[], Any]) -> Any:
+        """Give a part as it was finished before, or make and keep it.
 
         Parameters
         ----------
         name : str
             Of the part; a file name.
-        measure : callable
+        make : callable
             Gives plain numbers, strings, lists and dictionaries.
 
         Raises
@@ -87,7 +85,7 @@ class Parts:
         """
         file = self._folder / f"{name}.json"
         if not file.exists():
-            self._write(file, json.dumps(measure(), allow_nan=False).encode())
+            self._write(file, json.dumps(make(), allow_nan=False).encode())
         try:
             return json.loads(read_bounded(file, _MOST_BYTES))
         except (OSError, ValueError, RecursionError) as error:
@@ -121,9 +119,8 @@ class Parts:
         return BadInput(f"{self._folder / name}.{suffix}: not what this run kept: {why}: remove it and start again")
 
     def forget(self) -> None:
-        """Remove all parts of this run, whose result stands; those of others stay."""
+        """Remove all parts of this run, whose result stands; those of others stay, the folder until `alone` ends."""
         shutil.rmtree(self._folder, ignore_errors=True)
-        self._clear()
 
     def _clear(self) -> None:
         """Remove the folder of all runs, if nothing is in it."""

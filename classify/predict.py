@@ -1,10 +1,9 @@
 """The work behind `bladewing predict`: recordings in, one answer a dwell and one a recording out."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import groupby
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,10 +11,10 @@ from bladewing.features.heave import heave
 from bladewing.features.steady_comb import steady_comb
 from bladewing.features.wingbeat import wingbeat
 
-from .errors import BadInput, one_line
+from .errors import one_line
 from .fusion import LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
-from .recording import Recording, find_recording, load_recording
+from .recording import Recording
 from .samples import positive
 from .terminal import print_table
 from .track import Track, fuse
@@ -165,25 +164,6 @@ class Answer:
             console.print(Text(f"declared {self.track.declared} after {self.declared_s:.3g} s{later}"))
 
 
-def distinct(paths: Iterable[Path]) -> Iterator[Path]:
-    """Leave out every name that stands for a recording named before.
-
-    A shell pattern gives both files of a SigMF recording; it is answered once, under the first of its names. A name
-    for which no recording is found is passed on, so that reading it says what is wrong.
-    """
-    seen = set()
-    for path in paths:
-        try:
-            found = find_recording(path)
-            # a link is a name of its own: metadata of several recordings may be one file, its samples lie beside it
-            key = found.parent.resolve() / found.name
-        except BadInput:
-            key = path
-        if key not in seen:
-            seen.add(key)
-            yield path
-
-
 def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = DWELL_S) -> Answer:
     """Cut a recording into dwells and judge each, and all of them together.
 
@@ -242,32 +222,6 @@ def long_look(iq: np.ndarray, carrier_hz: float, prf_hz: float) -> dict[str, flo
     return {name: float(rate_hz) for name, rate_hz in rates_hz.items() if np.isfinite(rate_hz)}
 
 
-def answers(
-    paths: Iterable[Path],
-    classifier: "Classifier",
-    *,
-    dwell_s: float = DWELL_S,
-    carrier_hz: float | None = None,
-    prf_hz: float | None = None,
-    variable: str | None = None,
-) -> Iterator[Answer | BadInput]:
-    """Answer recordings one after another; one that is bad gives its error instead and does not stop the others.
-
-    Parameters
-    ----------
-    paths, carrier_hz, prf_hz, variable
-        As for `bladewing.classify.recording.load_recording`.
-    classifier, dwell_s
-        As for `answer`.
-    """
-    for path in distinct(paths):
-        try:
-            recording = load_recording(path, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable)
-            yield answer(recording, classifier, dwell_s=dwell_s)
-        except BadInput as error:
-            yield error
-
-
 def summary(labels: Counter[str], unreadable: int) -> str:
     """One line about many recordings.
 
@@ -280,17 +234,6 @@ def summary(labels: Counter[str], unreadable: int) -> str:
     if unreadable:
         parts.append(f"{unreadable} unreadable")
     return f"{labels.total() + unreadable} recordings: {', '.join(parts)}"
-
-
-def checked_dwell_s(dwell_s: float) -> float:
-    """Check the option --dwell.
-
-    Raises
-    ------
-    BadInput
-        It is not a finite number above 0.
-    """
-    return positive(dwell_s, "--dwell [s]")
 
 
 def _refused_alike(row: Mapping[str, Any]) -> Any:

@@ -1,9 +1,11 @@
 """Recordings: one range cell's IQ with the carrier and the PRF it was taken at."""
 
 import os
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from bladewing.features.one_channel import one_channel
@@ -15,6 +17,8 @@ from .dropouts import filled, longest_silence, lost_pulses
 from .errors import BadInput, unreadable
 from .samples import complex_samples, positive
 from .sigmf_file import find_sigmf, read_sigmf
+
+Result = TypeVar("Result")
 
 _SAME = 1e-9  # relative: an option that repeats the file's number may be rounded as text is
 
@@ -238,6 +242,51 @@ def find_recording(path: str | os.PathLike[str]) -> Path:
     if given.suffix.lower() not in ARRAY_SUFFIXES:
         raise BadInput(f"{path}: not a kind of recording known here: give SigMF, {', '.join(ARRAY_SUFFIXES)}")
     return given
+
+
+def of_each(
+    work: Callable[[Recording], Result],
+    paths: Iterable[Path],
+    *,
+    carrier_hz: float | None = None,
+    prf_hz: float | None = None,
+    variable: str | None = None,
+) -> Iterator[Result | BadInput]:
+    """Work on recordings one after another; one that is bad gives its error instead and does not stop the others.
+
+    Parameters
+    ----------
+    work
+        Makes a result of a recording, or raises `BadInput`.
+    paths
+        One that is named twice is worked on once.
+    carrier_hz, prf_hz, variable
+        As for `load_recording`.
+    """
+    for path in _distinct(paths):
+        try:
+            yield work(load_recording(path, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable))
+        except BadInput as error:
+            yield error
+
+
+def _distinct(paths: Iterable[Path]) -> Iterator[Path]:
+    """Leave out every name that stands for a recording named before.
+
+    A shell pattern gives both files of a SigMF recording; it is answered once, under the first of its names. A name
+    for which no recording is found is passed on, so that reading it says what is wrong.
+    """
+    seen = set()
+    for path in paths:
+        try:
+            found = find_recording(path)
+            # a link is a name of its own: metadata of several recordings may be one file, its samples lie beside it
+            key = found.parent.resolve() / found.name
+        except BadInput:
+            key = path
+        if key not in seen:
+            seen.add(key)
+            yield path
 
 
 def _one_range_cell(samples: NDArray[np.generic], name: str) -> NDArray[np.complex64]:

@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from .bounds import MOST_TEXT_BYTES
 from .errors import BadInput, unreadable
 from .files import read_bounded
+from .limits import MOST_TEXT_BYTES
 
 Settings = TypeVar("Settings", bound=BaseModel)
 

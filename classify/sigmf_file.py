@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .bounds import MOST_TEXT_BYTES, open_zip, require_size, unpacked
 from .errors import BadInput, unreadable
 from .files import read_bounded, settle
+from .limits import MOST_TEXT_BYTES, open_zip, require_size, unpacked
 from .samples import positive
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ LOBE_BINS, LINE_DB, ZERO_PADDING = 4.0, 15.0, 8
 
 
 @dataclass(frozen=True)
-class Measured:
+class PaperMeasures:
     """What is measured on one dwell [Hz]; NaN where nothing is found."""
 
     bandwidth_hz: float
@@ -29,7 +29,7 @@ class Measured:
     shift_hz: float
 
 
-def measure(rendering: Rendering, threshold_db: float) -> Measured:
+def by_the_papers_rules(rendering: Rendering, threshold_db: float) -> PaperMeasures:
     """Measure a dwell by the paper's rules, and the chopping frequency by the cepstrum too.
 
     Parameters
@@ -48,7 +48,7 @@ def measure(rendering: Rendering, threshold_db: float) -> Measured:
     body = body_line(spectrum)
     chopping = cepstral_chopping(spectrum, notch_mask(spectrum, body))
     shift = -2 * float(body.velocity_mps) / radar.wavelength_m
-    return Measured(float(high - low), first_lines_hz(rendering), float(chopping.frequency_hz), shift)
+    return PaperMeasures(float(high - low), first_lines_hz(rendering), float(chopping.frequency_hz), shift)
 
 
 def first_lines_hz(rendering: Rendering) -> float:

@@ -18,7 +18,7 @@ from bladewing.simulate.scene import Scene
 from .errors import BadInput
 from .files import result_folder, write_together
 from .measure_words import with_error
-from .table_measures import MEASURED_DB, SIMULATED_DB, Measured, measure, strongest_line_db, theory
+from .table_measures import MEASURED_DB, SIMULATED_DB, PaperMeasures, by_the_papers_rules, strongest_line_db, theory
 from .table_rotors import EXPLAINED, gear_rows, rotor_rows, velocity_rows
 
 #: Paper, Table III: bandwidth theory and measured, chopping theory and measured, Doppler shift measured [Hz].
@@ -71,13 +71,13 @@ def table_iii(seed: int) -> Iterator[Row]:
     """The six types: theory, the paper, on its bins, and off them."""
     for name, (band, band_seen, chop, chop_seen, shift_seen) in TABLE_III.items():
         scene = Scene.load(name)
-        expected, found = theory(scene), measure(scene.render(seed), SIMULATED_DB)
+        expected, found = theory(scene), by_the_papers_rules(scene.render(seed), SIMULATED_DB)
         bin_hz = scene.radar.prf_hz / scene.radar.pulses
         chop_errors, cepstral_errors, band_errors = [], [], []
         for step in range(OFF_BIN_STEPS):
             rates = 1 + (step + 0.5) / OFF_BIN_STEPS * bin_hz / expected[1]
             off = changed(scene, rates=rates)
-            seen, true = measure(off.render(seed), SIMULATED_DB), theory(off)
+            seen, true = by_the_papers_rules(off.render(seed), SIMULATED_DB), theory(off)
             chop_errors.append(seen.chopping_hz - true[1])
             cepstral_errors.append(abs(seen.cepstral_hz - true[1]))
             band_errors.append(100 * (seen.bandwidth_hz / true[0] - 1))
@@ -105,7 +105,7 @@ def table_vii(seed: int) -> Iterator[Row]:
     """The four measured UAVs, hovering."""
     for name, (band, chop, strongest, weakest) in TABLE_VII.items():
         scene = Scene.load(name)
-        expected, found = theory(scene), measure(scene.render(seed), MEASURED_DB)
+        expected, found = theory(scene), by_the_papers_rules(scene.render(seed), MEASURED_DB)
         yield {
             "scene": name,
             "bandwidth paper measured": band,
@@ -138,7 +138,7 @@ def table_ix(seed: int) -> Iterator[Row]:
         beta_deg = float(np.rad2deg(np.arccos(min(1.0, band / theory(level)[0]))))
         moving = changed(level, beta_deg=beta_deg)
         rendering = moving.render(seed)
-        expected, found = theory(moving), measure(rendering, MEASURED_DB)
+        expected, found = theory(moving), by_the_papers_rules(rendering, MEASURED_DB)
         rotor, fitted = rotor_rows(moving, rendering, band_hz=band, chopping_hz=chop)
         yield {
             "scene": name,
@@ -157,12 +157,12 @@ def table_x(seed: int) -> Iterator[Row]:
         scene = Scene.load(name)
         tilted = changed(scene, rates=chop / theory(scene)[1], beta_deg=beta_deg)
         rendering = tilted.render(seed)
-        found = measure(rendering, MEASURED_DB)
+        found = by_the_papers_rules(rendering, MEASURED_DB)
         rotor, _ = rotor_rows(tilted, rendering, band_hz=band, chopping_hz=chop)
         yield {"scene": name, "beta [deg]": beta_deg, **_with_rules(rotor, found)}
 
 
-def _with_rules(rotor: Row, found: Measured) -> Row:
+def _with_rules(rotor: Row, found: PaperMeasures) -> Row:
     """The rotor's rows with what the paper's rules find in the same samples."""
     there = rotor["chopping, truth"] is not None
     return {

@@ -16,11 +16,11 @@ from bladewing.models import LADDER
 from bladewing.simulate.dataset import KIND_CLASS
 from numpy.typing import NDArray
 
-from .dataset import SHARD_RECORDS, DataSet, Plan, simulator_digest
+from .dataset import SHARD_RECORDS, DataSet, DataSetPlan, simulator_digest
 from .envelope import Envelope
 from .errors import BadInput
 from .files import result_folder, write_together
-from .gather import TASK_RECORDS, Gathered, Sets, gather, gather_from, inputs_digest
+from .gather import TASK_RECORDS, Gathered, TrainingSets, gather, gather_from, inputs_digest
 from .inference import Classifier
 from .labels import CLASSES
 from .ladder import CASCADE
@@ -74,7 +74,7 @@ def run_training(
     stored = None if data is None else DataSet(data)
     held = None if stored is None else {"records": stored.plan.records["train"], "seed": stored.plan.seed}
     settings = training_config(config, records=records, seed=seed, quick=quick, stored=held)
-    if stored is not None and stored.plan != Plan.of(settings):
+    if stored is not None and stored.plan != DataSetPlan.of(settings):
         raise BadInput(f"{data}: holds sets of {stored.plan.records}, a training takes {settings.sets}: write it again")
     result_folder(out)
     _refuse_others(out, settings)
@@ -165,7 +165,9 @@ def _refuse_others(out: Path, settings: TrainingConfig) -> None:
         )
 
 
-def _gather(settings: TrainingConfig, stored: DataSet | None, bars: Progress, parts: Parts | None = None) -> Sets:
+def _gather(
+    settings: TrainingConfig, stored: DataSet | None, bars: Progress, parts: Parts | None = None
+) -> TrainingSets:
     """Draw or read the four sets, with only the inputs that the chosen models read."""
     names = tuple(name for name in INPUT_SHAPES if any(name in LADDER[model].inputs for model in settings.models))
     total, done = sum(settings.sets.values()), 0
@@ -180,11 +182,16 @@ def _gather(settings: TrainingConfig, stored: DataSet | None, bars: Progress, pa
 
             make = partial(gather, settings.seed) if stored is None else partial(gather_from, stored.sources(purpose))
             sets[purpose] = make(purpose, count, names=names, on_records=on_records, parts=parts)
-    return Sets(**sets)
+    return TrainingSets(**sets)
 
 
 def _take_or_train(
-    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction, parts: Parts, taught: Taught | None
+    name: str,
+    settings: TrainingConfig,
+    sets: TrainingSets,
+    on_fraction: OnFraction,
+    parts: Parts,
+    taught: Taught | None,
 ) -> tuple[bytes, dict[str, Any]]:
     """Give a model as it was finished before an interruption, or train and keep it."""
     kept = parts.arrays(name)
@@ -202,7 +209,7 @@ def _take_or_train(
 def train_one(
     name: str,
     settings: TrainingConfig,
-    sets: Sets,
+    sets: TrainingSets,
     on_fraction: OnFraction,
     parts: Parts | None = None,
     taught: Taught | None = None,
@@ -271,7 +278,7 @@ def train_one(
 
 
 def _tabular(
-    name: str, settings: TrainingConfig, sets: Sets, on_fraction: OnFraction
+    name: str, settings: TrainingConfig, sets: TrainingSets, on_fraction: OnFraction
 ) -> tuple[ScoresOf, Callable[[Any], bytes], dict[str, Any]]:
     from bladewing.models.export import export_tabular
     from bladewing.models.tabular import tabular_scores, train_boosted, train_linear

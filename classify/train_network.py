@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ from bladewing.models import LADDER
 from bladewing.simulate.dataset import KIND_CLASS
 from numpy.typing import NDArray
 
-from .gather import Gathered, Sets
+from .gather import Gathered, TrainingSets
 from .labels import CLASSES
 from .parts import Parts
 from .training_config import TrainingConfig
@@ -51,7 +52,7 @@ def epochs_of(name: str) -> str:
 def train_net(
     name: str,
     settings: TrainingConfig,
-    sets: Sets,
+    sets: TrainingSets,
     on_fraction: OnFraction,
     parts: Parts | None,
     taught: Taught | None = None,
@@ -87,13 +88,13 @@ def _trained(
     name: str,
     taught: Taught | None,
     settings: TrainingConfig,
-    sets: Sets,
+    sets: TrainingSets,
     on_fraction: OnFraction,
     parts: Parts | None,
 ) -> tuple["EvidenceNet", "TrainingResult"]:
     from bladewing.models.augment import VelocityMirror
     from bladewing.models.cnn import ImageNet, SpectrumNet
-    from bladewing.models.training import train_network
+    from bladewing.models.training import Course, Lessons, train_network
     from bladewing.models.training_state import ForeignSnapshot
 
     rung, seed = LADDER[name], settings.seed
@@ -109,20 +110,12 @@ def _trained(
     try:
         result = train_network(
             net,
-            _inputs(name, sets.train),
-            sets.train.labels,
+            Lessons(_inputs(name, sets.train), sets.train.labels, kinds_of(sets.train), taught() if taught else None),
             (_inputs(name, sets.validate), sets.validate.labels),
+            Course(**settings.model_dump(include={field.name for field in fields(Course)})),
             seed=seed,
-            epochs=settings.epochs,
-            patience=settings.patience,
-            batch=settings.batch,
-            learning_rate=settings.learning_rate,
-            weight_decay=settings.weight_decay,
-            bfloat16=settings.bfloat16,
             # no measurement is signed, so only the picture is mirrored
             augment=VelocityMirror(axes={signal: -2 if image else -1}, odd={}),
-            teacher=taught() if taught else None,
-            kinds=kinds_of(sets.train),
             snapshot=parts.arrays(epochs_part) if parts else None,
             on_snapshot=partial(parts.keep_arrays, epochs_part) if parts else None,
             on_epoch=lambda epoch, epochs, _: on_fraction(epoch / epochs),

@@ -6,8 +6,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from .bounds import LEAST_RECORDS, SEEDS
 from .errors import BadInput
+from .limits import LEAST_RECORDS, SEEDS
 from .settings_file import build_settings, named
 
 #: What `--quick` changes: enough to see every step work, not a model to use.

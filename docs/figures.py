@@ -10,11 +10,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from bladewing.classify.report.card import budgets, expectations, model_card
+from bladewing.classify.report.card import budgets, costs, expectations, model_card
 
 DOCS = Path(__file__).parent
 README, CARD, REPORT = DOCS.parent / "README.md", DOCS / "model-card.md", DOCS / "report.json"
-BLOCKS: dict[str, Callable[[Mapping[str, Any]], str]] = {"expect": expectations, "budgets": budgets}
+BLOCKS: dict[str, Callable[[Mapping[str, Any]], str]] = {"expect": expectations, "budgets": budgets, "costs": costs}
 
 
 def filled(text: str, report: Mapping[str, Any]) -> str:

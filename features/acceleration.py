@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .inputs import in_blocks
-from .lines import middle_times
+from .lines import middle_times, squared
 from .notch import parabola_offset
 from .spectrum import (
     LEAST_PART,
@@ -179,7 +179,7 @@ def _beside(
     pulses = len(samples)
     steady = _steadied(samples, np.asarray(acceleration_mps2), wavelength_m, prf_hz)
     spectrum = fft.fft(steady, n=size)
-    top = int((spectrum.real**2 + spectrum.imag**2).argmax())
+    top = int(squared(spectrum).argmax())
     offset = parabola_offset(*np.log(np.abs(spectrum[np.array([top - 1, top, top + 1]) % size])))
     still = steady * np.exp(-2j * np.pi * ((top + offset) / size) * np.arange(pulses))
     half = pulses // 2
@@ -207,4 +207,4 @@ def _sharpened(
     each = samples.shape[-1] // parts
     cut = steady[..., : each * parts].reshape(*samples.shape[:-1], parts, each)
     spectrum = fft.fft(cut, n=fft.next_fast_len(-(-size // parts)))
-    return np.asarray(spectrum.real**2 + spectrum.imag**2)
+    return squared(spectrum)

@@ -10,6 +10,9 @@ from .spectrum import Spectrum, ones, sums
 #: Share of the residual energy left out on each side of the energy band.
 TAIL_SHARE = 0.025
 
+#: Share of the spectra in which noise alone exceeds the threshold.
+FALSE_ALARM = 1e-2
+
 #: Bins summed together before the energy is followed bin by bin, where it matters.
 _BLOCK = 32
 _WITHIN_BLOCK = np.arange(_BLOCK)
@@ -18,9 +21,9 @@ _TAILS = np.array([[TAIL_SHARE], [1 - TAIL_SHARE]])
 
 
 @lru_cache(maxsize=64)
-def noise_threshold_db(bins: int, false_alarm: float = 1e-2) -> float:
-    """Level that noise alone exceeds in any of so many bins with that probability [dB over the floor]."""
-    return float(10 * np.log10(np.log(bins / false_alarm)))
+def noise_threshold_db(bins: int) -> float:
+    """Level that noise alone exceeds in any of so many bins with probability `FALSE_ALARM` [dB over the floor]."""
+    return float(10 * np.log10(np.log(bins / FALSE_ALARM)))
 
 
 def threshold_band_hz(

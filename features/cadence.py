@@ -66,13 +66,13 @@ class CadencePlan:
         return expected_peak(self.spans[1], _HANN_LINES)
 
 
-def cadence_edges_hz(bins: int = CADENCE_BINS) -> NDArray[np.float64]:
-    """Edges of the shared axis of rates [Hz], rising by equal ratios, shape (bins + 1,)."""
-    return np.geomspace(*CADENCE_RANGE_HZ, bins + 1)
+def cadence_edges_hz() -> NDArray[np.float64]:
+    """Edges of the shared axis of rates [Hz], rising by equal ratios, shape (CADENCE_BINS + 1,)."""
+    return np.geomspace(*CADENCE_RANGE_HZ, CADENCE_BINS + 1)
 
 
 @lru_cache(maxsize=64)
-def cadence_plan(pulses: int, prf_hz: float, bins: int = CADENCE_BINS) -> CadencePlan:
+def cadence_plan(pulses: int, prf_hz: float) -> CadencePlan:
     """Plan for a dwell.
 
     Parameters
@@ -81,8 +81,6 @@ def cadence_plan(pulses: int, prf_hz: float, bins: int = CADENCE_BINS) -> Cadenc
         Pulses of the dwell, at least 8.
     prf_hz : float
         Pulse repetition frequency [Hz].
-    bins : int
-        Length of the shared axis.
 
     Returns
     -------
@@ -97,7 +95,7 @@ def cadence_plan(pulses: int, prf_hz: float, bins: int = CADENCE_BINS) -> Cadenc
     hann /= np.sqrt(np.sum(hann**2))
 
     line_hz, last = prf_hz / count, count // 2
-    edges = cadence_edges_hz(bins) / line_hz  # in lines
+    edges = cadence_edges_hz() / line_hz  # in lines
     middle = np.sqrt(edges[:-1] * edges[1:])
     within = np.flatnonzero((middle >= 1) & (middle <= last))
     seen = slice(int(within[0]), int(within[-1]) + 1) if len(within) else slice(0, 0)
@@ -105,9 +103,8 @@ def cadence_plan(pulses: int, prf_hz: float, bins: int = CADENCE_BINS) -> Cadenc
     nearest = np.rint(middle[seen]).astype(np.intp)
     starts = np.minimum(np.where(high > low, low, nearest), last)
     counts = np.maximum(np.minimum(high, last + 1) - starts, 1) if len(starts) else starts
-    return CadencePlan(
-        span, (1 / window[span] ** 2).astype(np.float32), hann.astype(np.float32), (starts, counts), seen, bins
-    )
+    per_taper, spans = (1 / window[span] ** 2).astype(np.float32), (starts, counts)
+    return CadencePlan(span, per_taper, hann.astype(np.float32), spans, seen, CADENCE_BINS)
 
 
 def power_over_time(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:

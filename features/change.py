@@ -33,14 +33,14 @@ def frames(iq: NDArray[np.complex64], length: int, count: int) -> NDArray[np.com
     count : int
         Frames, at least 2. Where the record is too short for a hop of one sample, the last frame repeats.
     """
-    starts, hop = _frame_starts(iq.shape[-1], length, count)
+    starts, hop = frame_starts(iq.shape[-1], length, count)
     if hop:
         return windows(iq, (count, length), (hop, 1))
     return np.lib.stride_tricks.sliding_window_view(iq, length, axis=-1)[..., starts, :]
 
 
 @lru_cache(maxsize=64)
-def _frame_starts(pulses: int, length: int, count: int) -> tuple[NDArray[np.intp], int]:
+def frame_starts(pulses: int, length: int, count: int) -> tuple[NDArray[np.intp], int]:
     """First sample of each frame, and the hop between them if it is the same for all, else 0."""
     starts = np.rint(np.linspace(0, pulses - length, count)).astype(np.intp)
     hops = set(np.diff(starts).tolist())

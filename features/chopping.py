@@ -122,7 +122,7 @@ def prominence(heights: NDArray[np.float32]) -> NDArray[np.float32]:
         noise keeps its level; 0 at periods too short to have surroundings.
     """
     count = heights.shape[-1]
-    edges, shares = _surroundings(count)
+    edges, shares = surroundings(count)
     before = _sums_before(heights)
     means = before.take(edges[1], axis=-1, mode="wrap")  # all lie within: to wrap is cheapest
     means -= before.take(edges[0], axis=-1, mode="wrap")
@@ -148,7 +148,7 @@ def _sums_before(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 @lru_cache(maxsize=64)
-def _surroundings(count: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+def surroundings(count: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
     """First and last of the periods below and above each, shape (2, 2, count), and 1 / their number, (2, count)."""
     period = np.arange(count)
     low, high = (np.array(shares)[:, None] for shares in ((0.6, 1.15), (0.85, 1.4)))
@@ -222,12 +222,12 @@ def _evidence(peaks: NDArray[np.float32], first: int, last: int) -> NDArray[np.f
         np.maximum(again, twice[:, 1:-1:2], out=again)
         again *= np.float32(REPEAT_SHARE)
         out[:, : stop - first + 1] += again
-    out *= _length_weights(first, last)
+    out *= length_weights(first, last)
     return out
 
 
 @lru_cache(maxsize=64)
-def _length_weights(first: int, last: int) -> NDArray[np.float32]:
+def length_weights(first: int, last: int) -> NDArray[np.float32]:
     """How much a period counts for its length alone, 1 for the longest."""
     return ((np.arange(first, last + 1) / last) ** LENGTH_POWER).astype(np.float32)
 

@@ -35,6 +35,9 @@ ENDS = (1, 2, 4, 6)
 #: What is alike over this much of the spectrum is no comb [Hz], nor over so few bins.
 BLOCK_HZ, BLOCK_BINS = 800.0, 64
 
+#: Laguerre coefficients of the evidence that tell how alike it is in neighbouring bins.
+_TERMS = 24
+
 #: Mean and standard deviation of a Rayleigh magnitude of unit mean square.
 MEAN_HEIGHT, HEIGHT_DEVIATION = float(np.sqrt(np.pi) / 2), float(np.sqrt(1 - np.pi / 4))
 
@@ -76,9 +79,9 @@ class CombPlan:
     seen: slice
 
 
-def comb_edges_hz(bins: int = COMB_BINS) -> NDArray[np.float64]:
-    """Edges of the axis of chopping frequencies [Hz], rising by equal ratios, shape (bins + 1,)."""
-    return np.geomspace(*CHOPPING_RANGE_HZ, bins + 1)
+def comb_edges_hz() -> NDArray[np.float64]:
+    """Edges of the axis of chopping frequencies [Hz], rising by equal ratios, shape (COMB_BINS + 1,)."""
+    return np.geomspace(*CHOPPING_RANGE_HZ, COMB_BINS + 1)
 
 
 def line_nats(relative_power: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -87,7 +90,7 @@ def line_nats(relative_power: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 @lru_cache(maxsize=1)
-def _covariance_series(terms: int = 24) -> NDArray[np.float64]:
+def _covariance_series() -> NDArray[np.float64]:
     """Squares of the Laguerre coefficients of `line_nats` under the exponential law, from the first order on.
 
     Two bins of noise whose amplitudes correlate by r have evidences of covariance sum over k of these times |r|^2k.
@@ -96,7 +99,7 @@ def _covariance_series(terms: int = 24) -> NDArray[np.float64]:
     weight = np.exp(-power) * (power[1] - power[0])
     weight[0] /= 2
     held = line_nats(power) * weight
-    return np.array([float(held @ laguerre.lagval(power, np.eye(terms + 1)[k])) ** 2 for k in range(1, terms + 1)])
+    return np.array([float(held @ laguerre.lagval(power, np.eye(_TERMS + 1)[k])) ** 2 for k in range(1, _TERMS + 1)])
 
 
 def _noise_rms(pulses: int, bins: int, length: int) -> NDArray[np.float64]:

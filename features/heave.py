@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .following import by_recording, followed, normed, standing
+from .lines import squared
 from .spectrum import SPEED_OF_LIGHT_MPS
 from .wingbeat import GAIT_HZ, GAIT_MPS, LEAST_S, WING_MPS
 
@@ -95,7 +96,7 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[f
     size = fft.next_fast_len(_PADDING * len(velocity), real=True)
     taper = np.hanning(len(velocity) + 2)[1:-1]
     lines = fft.rfft(velocity * taper, size)
-    power, rates = lines.real**2 + lines.imag**2, fft.rfftfreq(size, 1 / rate_hz)
+    power, rates = squared(lines), fft.rfftfreq(size, 1 / rate_hz)
     sought = np.flatnonzero((rates >= SOUGHT_HZ[0]) & (rates <= SOUGHT_HZ[1]))
     top = int(sought[power[sought].argmax()])
     found = float(rates[top])

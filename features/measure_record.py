@@ -171,7 +171,7 @@ def _band(family: Family, edge: tuple[float, float], beta_rad: float | None) -> 
         why = (
             f"no band: lines may fill the unambiguous span, tips of {furthest * mps:.1f} m/s and more: raise the PRF"
             if span < fastest_tip(data)
-            else f"no band: lines reach {furthest * mps:.0f} m/s and more from the body, faster than any blade's tip"
+            else f"no band: lines reach some {FASTEST_TIP_MPS:.0f} m/s from the body, faster than any blade's tip"
         )
     if why:
         away = std = np.nan

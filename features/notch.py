@@ -86,11 +86,12 @@ def parabola_offset(
     return np.minimum(np.maximum(offset, np.float32(-0.5)), np.float32(0.5))
 
 
-def notch_mask(spectrum: Spectrum, body: Body, notch_mps: float = NOTCH_MPS) -> NDArray[np.bool_]:
+def notch_mask(spectrum: Spectrum, body: Body) -> NDArray[np.bool_]:
     """True outside the notches about the body line and about velocity zero, shape (..., bins).
 
-    Distances are taken around the circle of the unambiguous velocities. The bin at half the PRF does not count: it is
-    on neither side, and what is measured shall not depend on the sign of the velocity.
+    They reach `NOTCH_MPS` to each side. Distances are taken around the circle of the unambiguous velocities. The bin at
+    half the PRF does not count: it is on neither side, and what is measured shall not depend on the sign of the
+    velocity.
 
     Parameters
     ----------
@@ -98,26 +99,24 @@ def notch_mask(spectrum: Spectrum, body: Body, notch_mps: float = NOTCH_MPS) -> 
         Spectra, shape (..., bins).
     body : Body
         Their strongest lines.
-    notch_mps : float
-        Half width [m/s], > 0.
 
     Returns
     -------
     ndarray of bool, shape (..., bins)
     """
-    keep, away = _notches(spectrum.bins, half_width_bins(spectrum, notch_mps))
+    keep, away = notches(spectrum.bins, half_width_bins(spectrum))
     return away[spectrum.bins - body.index] & keep
 
 
-def half_width_bins(spectrum: Spectrum, notch_mps: float = NOTCH_MPS) -> int:
+def half_width_bins(spectrum: Spectrum) -> int:
     """Bins to each side of a notch's middle that it takes out."""
     step = spectrum.prf_hz / spectrum.bins * spectrum.wavelength_m / 2
     # At least the main lobe, at most a third of the span: a slow radar must keep something to look at.
-    return min(max(LOBE_BINS, int(np.ceil(notch_mps / step))), max(1, spectrum.bins // 6))
+    return min(max(LOBE_BINS, int(np.ceil(NOTCH_MPS / step))), max(1, spectrum.bins // 6))
 
 
 @lru_cache(maxsize=64)
-def _notches(bins: int, half: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def notches(bins: int, half: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Mask about the middle bin, and the mask about bin i in row bins - i."""
     position = np.arange(2 * bins)
     distance = position % bins

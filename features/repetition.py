@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .lines import squared
+
 #: Multiples of the rate that are looked at.
 HARMONICS = 6
 
@@ -86,7 +88,7 @@ class LevelSpectrum:
 
     def excess(self, amplitudes: NDArray[np.complex128]) -> NDArray[np.float64]:
         """Weighted power of the cells at each rate over that of chance [standard deviations], shape (rates,)."""
-        over = (amplitudes.real**2 + amplitudes.imag**2 - 1) @ self.weight
+        over = (squared(amplitudes) - 1) @ self.weight
         return np.asarray(over / np.sqrt(2 * (self.weight**2).sum() + 1e-9), np.float64)
 
     def at(self, rate_hz: float) -> float:
@@ -137,13 +139,13 @@ def level_spectrum(
     step_hz = frame_rate_hz / size
     taper = np.hanning(len(level) + 2)[1:-1, None]
     spectrum = fft.rfft(level * taper, size, axis=0)[: int(highest_hz / step_hz) + 2]
-    squared = spectrum.real**2 + spectrum.imag**2
+    lines = squared(spectrum)
     slowest = int(_SLOWEST_HZ / step_hz)
-    own = np.median(squared[slowest:], axis=0) + 1e-12
-    squared /= own
-    course = median_filter(squared.mean(axis=1), size=int(_CONTINUUM_HZ / step_hz) | 1, mode="nearest")
+    own = np.median(lines[slowest:], axis=0) + 1e-12
+    lines /= own
+    course = median_filter(lines.mean(axis=1), size=int(_CONTINUUM_HZ / step_hz) | 1, mode="nearest")
     # the median of an exponential is log 2 of its mean
-    course *= np.median(squared[slowest:] / course[slowest:, None]) / np.log(2)
+    course *= np.median(lines[slowest:] / course[slowest:, None]) / np.log(2)
     whole = spectrum / np.sqrt(own * course[:, None])
     # a common gain shows in a cell by as much as its echo is over the noise
     common = mean / (mean + floor) / np.sqrt(own)

@@ -178,7 +178,7 @@ def _velocities_mps(bins: int, prf_hz: float, wavelength_m: float) -> NDArray[np
 
 
 @lru_cache(maxsize=64)
-def _window(pulses: int, centred_by_sign: bool) -> NDArray[np.float32]:
+def packed_window(pulses: int, centred_by_sign: bool) -> NDArray[np.float32]:
     """Kaiser window of unit noise gain, each value twice, for a sample's two parts, shape (2 pulses,).
 
     With alternating signs it also centres the spectrum, which saves the shift.
@@ -231,7 +231,7 @@ def centred_transform(iq: NDArray[np.complex64], bins: int | None = None) -> NDA
     bins = fft.next_fast_len(pulses) if bins is None else bins
     even = bins % 2 == 0
     parts = iq.astype(np.complex64, copy=False).view(np.float32)
-    tapered = (parts * _window(pulses, even)).view(np.complex64)
+    tapered = (parts * packed_window(pulses, even)).view(np.complex64)
     transform = fft.fft(tapered, bins if bins != pulses else None, overwrite_x=True)
     return transform if even else fft.fftshift(transform, axes=-1)
 

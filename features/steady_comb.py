@@ -46,9 +46,6 @@ class SteadyComb:
 def steady_comb(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float) -> SteadyComb:
     """Seek one comb in several dwells of each recording.
 
-    On simulated tracks of 2.5 s at 0 dB and above it is found in 0.68 of UAVs and in 0.02 of birds and clutter, whose
-    receivers tick.
-
     Parameters
     ----------
     iq : ndarray of complex, shape (..., pulses)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .chopping import CHOPPING_RANGE_HZ
+from .lines import squared
 from .notch import NOTCH_MPS, parabola_offset
 from .spectrum import SPEED_OF_LIGHT_MPS, as_complex, require_radar
 
@@ -119,7 +120,7 @@ def stft(
     cut = np.lib.stride_tricks.sliding_window_view(samples, window, axis=-1)[..., ::hop, :]
     taper = (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(window) / window)).astype(np.float32)
     spectra = fft.fftshift(fft.fft(cut * taper, axis=-1), axes=-1)
-    return Stft(spectra.real**2 + spectra.imag**2, carrier_hz, prf_hz, hop)
+    return Stft(squared(spectra), carrier_hz, prf_hz, hop)
 
 
 def _window(pulses: int, prf_hz: float, window_s: float, overlap: float) -> tuple[int, int]:

@@ -31,7 +31,7 @@ _CHANGE_MPS = (3.0, 20.0)
 
 
 @lru_cache(maxsize=4)
-def _axis_plan(bins: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def axis_plan(bins: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """The shared axis [m/s], and each bin's share in the mean over the slow, middle and fast ones, shape (3, bins)."""
     axis_mps = axis_velocities_mps(bins)
     part = np.searchsorted(_CHANGE_MPS, np.abs(axis_mps))
@@ -125,7 +125,7 @@ def feature_vector(
     width_hz = high_hz - low_hz
     low, high, occupancy = energy_band_mps(spectrum, energy)
 
-    axis_mps, change_shares = _axis_plan(axis_db.shape[-1])
+    axis_mps, change_shares = axis_plan(axis_db.shape[-1])
     change = change_db(parts) if change is None else change
     changes = (change_shares @ change[..., None])[..., 0]
     centroid = centroid_mps(parts, axis_mps)

@@ -9,10 +9,15 @@ tabular
     Logistic regression and boosted trees on a vector of measurements.
 cnn
     Small convolutional networks on the velocity spectrum or on the joint image, most beside a vector of measurements.
-training, augment
-    The loop that trains a network, and the mirrored radial velocity it may train on.
+training, training_state, augment
+    The loop that trains a network, where it stands between two epochs as plain arrays, and the mirrored radial velocity
+    it may train on.
+muon
+    The optimiser of matrices and kernels.
 calibration
     From scores to probabilities that mean what they say, and the thresholds below which the answer is "unknown".
+operating
+    The threshold for a false-alarm rate, and what detection remains.
 export, seal
     ONNX with the calibration inside, and the seal that shows any later change of a byte.
 session

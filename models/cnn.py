@@ -3,7 +3,8 @@
 Both have the same anatomy: strided convolutions over the signal, their mean and their maximum along the axes (how much
 there is of a pattern, and whether it is there at all), a small branch over each other input (a cadence, a vector of
 measurements), and a common head.
-The inputs are standardised inside, by buffers that `EvidenceNet.measure` fills: the exported model eats raw inputs.
+The inputs are standardised inside, by buffers that `EvidenceNet.standardise_by` fills: the exported model eats raw
+inputs.
 A network may learn kinds, of which each belongs to a class, and tell the classes: what sets a rotor's comb apart from a
 turbine's and from a wheel's is more than three words can teach.
 """
@@ -45,7 +46,7 @@ class Standardise(nn.Module):
         self.register_buffer("mean", torch.zeros(shape))
         self.register_buffer("deviation", torch.ones(shape))
 
-    def measure(self, values: NDArray[np.floating]) -> None:
+    def standardise_by(self, values: NDArray[np.floating]) -> None:
         """Take mean and standard deviation of each channel from a training set.
 
         Parameters
@@ -148,7 +149,7 @@ class EvidenceNet(nn.Module):
         # no dropout: with drawn records by the hundred thousand nothing is learned by heart, and it costs accuracy
         self.head = nn.Sequential(nn.Linear(seen, _HEAD), nn.ReLU(), nn.Linear(_HEAD, len(self.kinds)))
 
-    def measure(self, inputs: Mapping[str, NDArray[np.floating]]) -> None:
+    def standardise_by(self, inputs: Mapping[str, NDArray[np.floating]]) -> None:
         """Fill the buffers that standardise the inputs from a training set.
 
         Parameters
@@ -164,7 +165,7 @@ class EvidenceNet(nn.Module):
         self.require(inputs)
         for name, module in self.standardise.items():
             assert isinstance(module, Standardise)
-            module.measure(inputs[name])
+            module.standardise_by(inputs[name])
 
     def require(self, inputs: Mapping[str, NDArray[np.floating]]) -> int:
         """Refuse inputs that the network cannot read.

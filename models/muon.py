@@ -5,6 +5,9 @@ from collections.abc import Iterable
 import torch
 from torch import Tensor
 
+#: Share of the past in the average of the gradients, with Nesterov's look ahead.
+MOMENTUM = 0.95
+
 _NEWTON_SCHULZ = (3.4445, -4.7750, 2.0315)  # Jordan's: not exact, singular values end between 0.7 and 1.2
 _STEPS = 5
 
@@ -21,16 +24,12 @@ class Muon(torch.optim.Optimizer):
         Tensors of two dimensions or more, outputs first.
     lr
         Learning rate: about how far a step moves a layer's outputs, whatever its shape.
-    momentum
-        Share of the past in the average of the gradients, 0 to below 1, with Nesterov's look ahead.
     weight_decay
         Share of the weights that a step of rate 1 would take away.
     """
 
-    def __init__(
-        self, parameters: Iterable[Tensor], *, lr: float, momentum: float = 0.95, weight_decay: float = 0.0
-    ) -> None:
-        super().__init__(parameters, {"lr": lr, "momentum": momentum, "weight_decay": weight_decay})
+    def __init__(self, parameters: Iterable[Tensor], *, lr: float, weight_decay: float = 0.0) -> None:
+        super().__init__(parameters, {"lr": lr, "weight_decay": weight_decay})
         for group in self.param_groups:
             for weights in group["params"]:
                 self.state[weights]["average"] = torch.zeros_like(weights)
@@ -40,8 +39,8 @@ class Muon(torch.optim.Optimizer):
         """Take one step."""
         for group in self.param_groups:
             for weights in group["params"]:
-                average = self.state[weights]["average"].lerp_(weights.grad, 1 - group["momentum"])
-                ahead = weights.grad.lerp(average, group["momentum"])
+                average = self.state[weights]["average"].lerp_(weights.grad, 1 - MOMENTUM)
+                ahead = weights.grad.lerp(average, MOMENTUM)
                 outputs, inputs = len(weights), weights[0].numel()
                 step = orthogonal(ahead.reshape(outputs, inputs)).reshape(weights.shape)
                 weights.mul_(1 - group["lr"] * group["weight_decay"])

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 Progress = Callable[[int, int], None]
 """Called with the steps done and the steps at most."""
 
+LEARNING_RATE = 0.15
+"""Share of each tree that is added."""
+
 _ITERATIONS_A_CALL = 10
 
 
@@ -64,7 +67,6 @@ def train_boosted(
     seed: int,
     iterations: int = 80,
     leaves: int = 15,
-    learning_rate: float = 0.15,
     progress: Progress | None = None,
 ) -> "HistGradientBoostingClassifier":
     """Fit gradient-boosted trees; a tenth of the records, drawn by the seed, tells when to stop.
@@ -82,8 +84,6 @@ def train_boosted(
         about 3 * iterations * (2 * leaves - 1) * 32 bytes.
     leaves
         Leaves a tree at most, at least 2.
-    learning_rate
-        Share of each tree that is added, above 0.
     progress
         Called with the iterations done and the iterations at most.
 
@@ -102,7 +102,7 @@ def train_boosted(
     _require_training_set(x, y)
     model = HistGradientBoostingClassifier(
         max_leaf_nodes=leaves,
-        learning_rate=learning_rate,
+        learning_rate=LEARNING_RATE,
         l2_regularization=1.0,
         early_stopping=True,
         validation_fraction=0.1,

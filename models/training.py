@@ -36,6 +36,86 @@ ADAM = 0.3
 TAUGHT = 0.75
 """Share of a teacher's answer in what a network is to say, beside the label."""
 
+SMOOTHING = 0.02
+"""Share of the target that is spread over the classes."""
+
+_AT_ONCE = 1024  # records that a network is asked about in one call
+
+
+@dataclass(frozen=True)
+class Lessons:
+    """What a network is trained on.
+
+    Parameters
+    ----------
+    inputs
+        Input name to array (n, *shape).
+    labels
+        Shape (n,), whole numbers 0 to 2, at least two records of each.
+    kinds
+        Kind of each record, shape (n,), a place in the network's `kinds`, of the class that its label says. Where
+        given, the network is to tell these as well: half of the loss is theirs.
+    teacher
+        Probabilities that another network gives each kind of the records, shape (n, kinds), as from `network_shares`;
+        the targets take the share `TAUGHT` of them. A label is one draw from what a record leaves open and its
+        teacher's answer near the mean of them, so that a step errs less (Hinton, Vinyals and Dean, arXiv:1503.02531),
+        also where the teacher is as small as its pupil (Furlanello and others, arXiv:1805.04770).
+    """
+
+    inputs: Inputs
+    labels: NDArray[np.integer]
+    kinds: NDArray[np.integer] | None = None
+    teacher: NDArray[np.floating] | None = None
+
+    def require(self, net: EvidenceNet) -> int:
+        """Check that a network can be trained on these, and give their number."""
+        count = net.require(self.inputs)
+        require_labels(self.labels, count, "labels")
+        require_every_class(self.labels, "labels")
+        if self.teacher is not None:
+            require_shares(self.teacher, count, len(net.kinds), "teacher")
+        if self.kinds is not None:
+            require_kinds(self.kinds, self.labels, net.kinds)
+        return count
+
+
+@dataclass(frozen=True)
+class Course:
+    """How long a network is trained, and how fast.
+
+    Parameters
+    ----------
+    epochs
+        Passes over the records, at least 1.
+    batch
+        Records a step, at least 2. The rest of an epoch that fills no batch is left out of it.
+    learning_rate
+        Peak of the schedule, of Muon; Adam's is `ADAM` times as high.
+    weight_decay
+        Of Muon.
+    patience
+        Epochs in a row without a lower validation loss after which the training stops; 0: never. The schedule is laid
+        out for all epochs: one that stops early has not seen its end.
+    bfloat16
+        Compute the scores and their gradients in bfloat16, weights and steps in float32 as ever: on processors that
+        multiply such numbers in hardware (AVX-512 BF16, AMX) a step takes 0.6 of the time, and networks of 96 000
+        records learned no worse (docs/ablation.md); on others it takes longer.
+    """
+
+    epochs: int
+    batch: int = 256
+    learning_rate: float = 0.02
+    weight_decay: float = 0.3
+    patience: int = 0
+    bfloat16: bool = False
+
+    def __post_init__(self) -> None:
+        if self.epochs < 1 or self.batch < 2 or self.patience < 0:
+            raise ValueError(
+                f"epochs is {self.epochs}, batch {self.batch}, patience {self.patience}; they must be at least 1, 2 "
+                "and 0"
+            )
+
 
 @dataclass(frozen=True)
 class TrainingResult:
@@ -65,22 +145,13 @@ class TrainingResult:
 
 def train_network(
     net: EvidenceNet,
-    inputs: Inputs,
-    y: NDArray[np.integer],
+    lessons: Lessons,
     validation: tuple[Inputs, NDArray[np.integer]],
+    course: Course,
     *,
     seed: int,
-    epochs: int,
-    batch: int = 256,
-    learning_rate: float = 0.02,
-    weight_decay: float = 0.3,
-    label_smoothing: float = 0.02,
-    bfloat16: bool = False,
     device: str = "auto",
     augment: Augment | None = None,
-    teacher: NDArray[np.floating] | None = None,
-    kinds: NDArray[np.integer] | None = None,
-    patience: int = 0,
     snapshot: Snapshot | None = None,
     on_snapshot: OnSnapshot | None = None,
     on_epoch: OnEpoch | None = None,
@@ -95,43 +166,18 @@ def train_network(
     ----------
     net
         The network; its present weights are where it starts.
-    inputs
-        Training inputs, name to array (n, *shape).
-    y
-        Training labels, shape (n,), whole numbers 0 to 2, at least two records of each.
+    lessons
+        What it is trained on.
     validation
         Inputs and labels of other records, which choose the best epoch.
+    course
+        How long, and how fast.
     seed
         Draws the order of the records and the augmentation.
-    epochs
-        Passes over the records, at least 1.
-    batch
-        Records a step, at least 2. The rest of an epoch that fills no batch is left out of it.
-    learning_rate
-        Peak of the schedule, of Muon; Adam's is `ADAM` times as high.
-    weight_decay
-        Of Muon.
-    label_smoothing
-        Share of the target that is spread over the classes, 0 to below 1.
-    bfloat16
-        Compute the scores and their gradients in bfloat16, weights and steps in float32 as ever: on processors that
-        multiply such numbers in hardware (AVX-512 BF16, AMX) a step takes 0.6 of the time, and networks of 96 000
-        records learned no worse (docs/ablation.md); on others it takes longer.
     device
         "auto" (a GPU where there is one), or any that torch knows: "cpu", "cuda", ...
     augment
         Changes each training batch.
-    teacher
-        Probabilities that another network gives each kind of the training records, shape (n, kinds), as from
-        `network_shares`; the targets take the share `TAUGHT` of them. A label is one draw from what a record leaves
-        open and its teacher's answer near the mean of them, so that a step errs less (Hinton, Vinyals and Dean,
-        arXiv:1503.02531), also where the teacher is as small as its pupil (Furlanello and others, arXiv:1805.04770).
-    kinds
-        Kind of each training record, shape (n,), a place in the network's `kinds`, of the class that `y` says. Where
-        given, the network is to tell these as well: half of the loss is theirs.
-    patience
-        Epochs in a row without a lower validation loss after which the training stops; 0: never. The schedule is laid
-        out for all epochs: one that stops early has not seen its end.
     snapshot
         Where to go on: what `on_snapshot` was given by a training with the same arguments.
     on_snapshot
@@ -147,38 +193,30 @@ def train_network(
     Raises
     ------
     ValueError
-        Where an array has the wrong shape or values, or a parameter is out of range.
+        Where an array has the wrong shape or values.
     ForeignSnapshot
         Where the snapshot is of another training.
     FloatingPointError
         Where no epoch gave a finite validation loss.
     """
-    count = net.require(inputs)
-    require_labels(y, count, "y")
-    require_every_class(y, "y")
+    count = lessons.require(net)
     require_labels(validation[1], net.require(validation[0]), "validation labels")
-    if teacher is not None:
-        require_shares(teacher, count, len(net.kinds), "teacher")
-    if kinds is not None:
-        require_kinds(kinds, y, net.kinds)
-    if epochs < 1 or batch < 2 or patience < 0:
-        raise ValueError(f"epochs is {epochs}, batch {batch}, patience {patience}; they must be at least 1, 2 and 0")
     started = time.perf_counter()
     place = torch.device(("cuda" if torch.cuda.is_available() else "cpu") if device == "auto" else device)
-    batch = min(batch, count)
+    epochs, batch = course.epochs, min(course.batch, count)
     steps = count // batch
-    net.measure(inputs)
+    net.standardise_by(lessons.inputs)
     # the stubs do not know this argument; channels last, a step takes a fifth less time on a CPU
     net.to(place, memory_format=torch.channels_last)  # type: ignore[call-overload]
-    tensors = {name: _tensor(inputs[name]).to(place) for name in net.input_shapes}
-    loss_of = _Loss(net, y, kinds, teacher, label_smoothing, place)
-    optimisers, schedules = _scheduled(net, max(3, epochs * steps), learning_rate, weight_decay)
+    tensors = {name: _tensor(lessons.inputs[name]).to(place) for name in net.input_shapes}
+    loss_of = _Loss(net, lessons, place)
+    optimisers, schedules = _scheduled(net, max(3, epochs * steps), course)
     rng = torch.Generator().manual_seed(seed)
     work = Work(net, optimisers, schedules, rng)
     if snapshot is not None:
         work.restore(snapshot, epochs=epochs, steps=steps)
         started -= work.history[-1]["seconds"]
-    while len(work.history) < epochs and not 0 < patience <= len(work.history) - work.best_epoch:
+    while len(work.history) < epochs and not 0 < course.patience <= len(work.history) - work.best_epoch:
         net.train()
         total = torch.zeros((), device=place)
         order = torch.randperm(count, generator=rng)[: steps * batch].to(place)
@@ -186,7 +224,7 @@ def train_network(
             part: Mapping[str, Tensor] = {name: values[rows].float() for name, values in tensors.items()}
             if augment:
                 part = augment(part, rng)
-            with torch.autocast(place.type, torch.bfloat16, enabled=bfloat16):
+            with torch.autocast(place.type, torch.bfloat16, enabled=course.bfloat16):
                 kind_scores = net.kind_scores(*(part[name] for name in net.input_shapes))
             loss = loss_of(kind_scores.float(), rows)
             net.zero_grad(set_to_none=True)
@@ -208,14 +246,16 @@ def train_network(
         if on_epoch:
             on_epoch(len(work.history), epochs, metrics)
     if not work.best:
-        raise FloatingPointError(f"no epoch gave a finite validation loss; learning_rate {learning_rate} is too high")
+        raise FloatingPointError(
+            f"no epoch gave a finite validation loss; learning_rate {course.learning_rate} is too high"
+        )
     net.to("cpu", memory_format=torch.contiguous_format).load_state_dict(work.best)  # type: ignore[call-overload]
     net.eval()
     seconds = time.perf_counter() - started
     return TrainingResult(work.best_epoch, place.type, seconds, tuple(work.history), len(work.history) < epochs)
 
 
-def network_scores(net: EvidenceNet, inputs: Inputs, batch: int = 1024) -> NDArray[np.float32]:
+def network_scores(net: EvidenceNet, inputs: Inputs) -> NDArray[np.float32]:
     """Return the raw scores of a network, and leave it in the state for inference.
 
     Parameters
@@ -224,8 +264,6 @@ def network_scores(net: EvidenceNet, inputs: Inputs, batch: int = 1024) -> NDArr
         The network, on any device.
     inputs
         Input name to array (n, *shape), finite.
-    batch
-        Records a call, at least 1.
 
     Returns
     -------
@@ -242,8 +280,8 @@ def network_scores(net: EvidenceNet, inputs: Inputs, batch: int = 1024) -> NDArr
     net.eval()
     scores = []
     with torch.inference_mode():
-        for start in range(0, count, batch):
-            part = (_tensor(inputs[name][start : start + batch]).to(place).float() for name in net.input_shapes)
+        for start in range(0, count, _AT_ONCE):
+            part = (_tensor(inputs[name][start : start + _AT_ONCE]).to(place).float() for name in net.input_shapes)
             scores.append(net(*part).cpu())
     return torch.cat(scores).numpy()
 
@@ -251,22 +289,14 @@ def network_scores(net: EvidenceNet, inputs: Inputs, batch: int = 1024) -> NDArr
 class _Loss:
     """What a network is to say of the training records, their classes and, where it is told them, their kinds."""
 
-    def __init__(
-        self,
-        net: EvidenceNet,
-        y: NDArray[np.integer],
-        kinds: NDArray[np.integer] | None,
-        teacher: NDArray[np.floating] | None,
-        label_smoothing: float,
-        place: torch.device,
-    ) -> None:
-        self._net, self._criterion = net, nn.CrossEntropyLoss(label_smoothing=label_smoothing)
+    def __init__(self, net: EvidenceNet, lessons: Lessons, place: torch.device) -> None:
+        self._net, self._criterion = net, nn.CrossEntropyLoss(label_smoothing=SMOOTHING)
         said, classes_said = None, None
-        if teacher is not None:
-            said = torch.as_tensor(teacher, dtype=torch.float32)
+        if lessons.teacher is not None:
+            said = torch.as_tensor(lessons.teacher, dtype=torch.float32)
             classes_said = said @ nn.functional.one_hot(torch.tensor(net.kinds)).float()
-        self._classes = _target(y, classes_said, place)
-        self._kinds = None if kinds is None else _target(kinds, said, place)
+        self._classes = _target(lessons.labels, classes_said, place)
+        self._kinds = None if lessons.kinds is None else _target(lessons.kinds, said, place)
 
     def __call__(self, kind_scores: Tensor, rows: Tensor) -> Tensor:
         loss = self._criterion(self._net.class_scores(kind_scores), self._classes[rows])
@@ -282,14 +312,14 @@ def _target(labels: NDArray[np.integer], said: Tensor | None, place: torch.devic
 
 
 def _scheduled(
-    net: EvidenceNet, planned: int, learning_rate: float, weight_decay: float
+    net: EvidenceNet, planned: int, course: Course
 ) -> tuple[tuple[torch.optim.Optimizer, ...], tuple[OneCycleLR, ...]]:
     """Muon for matrices and kernels, Adam for all else, and their rates over so many steps."""
     matrices = [weights for weights in net.parameters() if weights.ndim > 1]
     others = [weights for weights in net.parameters() if weights.ndim <= 1]
     optimisers = (
-        Muon(matrices, lr=learning_rate, weight_decay=weight_decay),
-        torch.optim.Adam(others, lr=ADAM * learning_rate),
+        Muon(matrices, lr=course.learning_rate, weight_decay=course.weight_decay),
+        torch.optim.Adam(others, lr=ADAM * course.learning_rate),
     )
     rise = max(RISE, 2 / planned)  # a rise of one step has no length
     schedules = tuple(

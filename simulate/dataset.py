@@ -267,9 +267,9 @@ def _render(
     for kind in np.unique(kinds):
         rows = np.flatnonzero(kinds == kind)
         own = Draws(uniforms[rows, 1 + draws.taken :])
-        target = _target(own, radar, str(kind), normals_of, rows)
+        target = draw_target(own, radar, str(kind), normals_of, rows)
         snr_db = target.snr_db(common[rows, 0])
-        signal[rows] += _powered(target, snr_db)
+        signal[rows] += powered(target, snr_db)
         columns = dict(target.truth)
         if target.body_db is not None:
             columns["body_db"] = target.body_db
@@ -294,7 +294,7 @@ def _kind_of(index: int, u: float, only: str | None) -> str:
     return list(kinds)[min(int(np.searchsorted(edges, u * edges[-1], side="right")), len(kinds) - 1)]
 
 
-def _target(draws: Draws, radar: Radar, kind: str, normals_of: NormalsOf, rows: NDArray[np.intp]) -> Target:
+def draw_target(draws: Draws, radar: Radar, kind: str, normals_of: NormalsOf, rows: NDArray[np.intp]) -> Target:
     """Draw and render the rows of one kind."""
     if kind in ROTORS:
         return draw_uav(draws, radar, kind)
@@ -305,7 +305,7 @@ def _target(draws: Draws, radar: Radar, kind: str, normals_of: NormalsOf, rows: 
     return draw_clutter(draws, radar, kind, normals_of(rows))
 
 
-def _powered(target: Target, snr_db: NDArray[np.float64]) -> NDArray[np.complex64]:
+def powered(target: Target, snr_db: NDArray[np.float64]) -> NDArray[np.complex64]:
     """Scale a target so that its micro-motion has the SNR and its body the power that was drawn."""
 
     def scaled(iq: NDArray[np.complex64], level_db: NDArray[np.float64]) -> NDArray[np.complex64]:

@@ -1,6 +1,6 @@
 """The report: what the models get right, what an answer costs, what a record weighs, drawn as one page.
 
-Everything heavy is imported when a report is made. ``report.json`` holds every number of the page:
+`run` makes it; this package alone imports nothing. ``report.json`` holds every number of the page:
 
 ==================== ==============================================================================================
 ``schema_version``   "3"; a page is drawn from this version alone
@@ -26,25 +26,3 @@ Everything heavy is imported when a report is made. ``report.json`` holds every 
 ``config``           the settings of the run: see `settings.ReportConfig`
 ==================== ==============================================================================================
 """
-
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
-__all__ = ["run_report"]
-
-
-def run_report(
-    out: Path,
-    *,
-    models: Path | None,
-    quick: bool,
-    seed: int | None = None,
-    config: Path | None = None,
-    progress: bool = True,
-) -> dict[str, Any]:
-    """Measure models and write ``report.json`` and ``report.html``; see `bladewing.classify.report.run.run_report`."""
-    from .run import run_report as run
-
-    return run(out, models=models, quick=quick, seed=seed, config=config, progress=progress)

@@ -106,6 +106,18 @@ def budgets(report: Mapping[str, Any]) -> str:
     return "\n".join(f"- {line}" for line in front_budgets(report, batch=batch)).replace("\u00a0", " ")
 
 
+def costs(report: Mapping[str, Any]) -> str:
+    """Write what an answer costs in batches, samples to probabilities."""
+    timed = report["cost"]["batches"][-1]
+    models = ", ".join(
+        f"`{row['name']}` {number(row['ratio_to_fft'])}" for row in timed["stages"] if row["stage"] == "chain"
+    )
+    return (
+        f"In batches of {timed['batch']} records of {report['reference']['pulses']} pulses an answer takes so many "
+        f"times as long as the bare FFT: {models}."
+    )
+
+
 def _section(title: str, lines: list[str]) -> list[str]:
     return [f"## {title}", "", *[f"- {line}" for line in lines], ""]
 

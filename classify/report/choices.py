@@ -38,7 +38,7 @@ OnDone = Callable[[float], None]
 
 
 @dataclass(frozen=True)
-class Sets:
+class FrontSet:
     """What the choices are trained on and asked, as inputs by name; the samples themselves are not kept.
 
     Attributes
@@ -89,7 +89,7 @@ def draw_sets(
     seed: int,
     on_done: OnDone,
     ask: Callable[[str, NDArray[np.complex64], Radar], None] | None = None,
-) -> dict[str, Sets]:
+) -> dict[str, FrontSet]:
     """Draw records of every dwell and keep the named inputs of them.
 
     Parameters
@@ -107,7 +107,7 @@ def draw_sets(
 
     Returns
     -------
-    dict of str to Sets
+    dict of str to FrontSet
         By purpose; the dwells one after the other.
     """
     pictures = pictures_of(names)
@@ -138,7 +138,7 @@ def draw_sets(
                     ask(purpose, records.iq, radar)
                 done += some * dwell_s
                 on_done(done / total)
-        sets[purpose] = Sets(
+        sets[purpose] = FrontSet(
             {name: np.concatenate(values) for name, values in kept.items()},
             np.concatenate(labels),
             np.concatenate(snr_db),
@@ -164,7 +164,7 @@ def network_bytes(net: Any) -> bytes:
 
 
 def train_picture(
-    name: str, sets: Mapping[str, Sets], config: ReportConfig, *, on_done: OnDone
+    name: str, sets: Mapping[str, FrontSet], config: ReportConfig, *, on_done: OnDone
 ) -> tuple[Callable[[int], NDArray[np.floating]], float]:
     """Train the network of a picture.
 
@@ -187,7 +187,7 @@ def train_picture(
     """
     from bladewing.models.augment import VelocityMirror
     from bladewing.models.calibration import Calibration
-    from bladewing.models.training import network_scores, train_network
+    from bladewing.models.training import Course, Lessons, network_scores, train_network
 
     picture = pictures_of([name])[name]
     net = network_for(picture, seed=config.seed)
@@ -198,12 +198,10 @@ def train_picture(
 
     result = train_network(
         net,
-        inputs("train"),
-        sets["train"].labels,
+        Lessons(inputs("train"), sets["train"].labels),
         (inputs("validate"), sets["validate"].labels),
+        Course(config.front_epochs, batch=_BATCH),
         seed=config.seed,
-        epochs=config.front_epochs,
-        batch=_BATCH,
         augment=VelocityMirror(axes={signal: 2}, odd={}) if picture.has_velocity else None,
         on_epoch=lambda epoch, epochs, _: on_done(epoch / epochs),
     )
@@ -214,7 +212,7 @@ def train_picture(
     return answer, result.seconds
 
 
-def train_features(sets: Mapping[str, Sets], config: ReportConfig) -> tuple[NDArray[np.floating], bytes, float]:
+def train_features(sets: Mapping[str, FrontSet], config: ReportConfig) -> tuple[NDArray[np.floating], bytes, float]:
     """Train boosted trees on the measurements: the test records' probabilities, the ONNX file, the time it took [s]."""
     from bladewing.models.calibration import Calibration
     from bladewing.models.export import export_tabular

@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from .draw_scores import LEAST_RECORDS
+from .draw_scores import LEAST_SHOWN
 from .series import choice_looks
 from .svg import INK, MUTED, PAPER, SERIES, Panel, banded, drawing, panel
 from .ticks import log_ticks, percent_ticks, share_axis
@@ -137,14 +137,14 @@ def by_snr(report: Mapping[str, Any]) -> list[Panel]:
     panels = []
     front = report["front"]
     for slug, title, rows in _groups(report):
-        if not any(one["found"]["count"] >= LEAST_RECORDS for row, _ in rows for one in row["uav_by_snr"]):
+        if not any(one["found"]["count"] >= LEAST_SHOWN for row, _ in rows for one in row["uav_by_snr"]):
             continue
         with drawing(height_in=3.0) as (figure, axes):
             for curve, style in zip(front["bounds"], ((0, ()), (0, (5, 2)), (0, (1, 1.5))), strict=True):
                 axes.plot(curve["snr_db"], curve["found"], color=INK, linewidth=1.0, linestyle=style)
             words = []
             for row, look in rows:
-                slices = [one for one in row["uav_by_snr"] if one["found"]["count"] >= LEAST_RECORDS]
+                slices = [one for one in row["uav_by_snr"] if one["found"]["count"] >= LEAST_SHOWN]
                 if not slices:
                     continue
                 x = [(one["from"] + one["to"]) / 2 for one in slices]

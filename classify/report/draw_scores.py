@@ -17,7 +17,7 @@ from .words import percent, spoken
 GROUPS = ("all", "uav", "bird", "clutter")
 _TITLES = {"all": "All records", "uav": "UAV records", "bird": "Bird records", "clutter": "Clutter records"}
 # A point over fewer records than this says little: the lines break there; the tables keep it.
-LEAST_RECORDS = 10
+LEAST_SHOWN = 10
 _GAP = dict.fromkeys(("value", "low", "high"), math.nan)
 
 
@@ -56,7 +56,7 @@ def _lines(axes: Axes, report: Mapping[str, Any], by: str, group: str, *, centre
     words = []
     for name, look in looks(names).items():
         slices = report["scores"][name][by]
-        rates = [one[group] if one[group]["count"] >= LEAST_RECORDS else _GAP for one in slices]
+        rates = [one[group] if one[group]["count"] >= LEAST_SHOWN else _GAP for one in slices]
         known = [rate for rate in rates if rate is not _GAP]
         if not known:
             continue
@@ -77,7 +77,7 @@ def accuracy_by_beta(report: Mapping[str, Any]) -> list[Panel]:
         with drawing(height_in=2.7) as (figure, axes):
             words = []
             for name, look in looks(names).items():
-                slices = [one for one in report["scores"][name]["by_beta"] if one[key]["count"] >= LEAST_RECORDS]
+                slices = [one for one in report["scores"][name]["by_beta"] if one[key]["count"] >= LEAST_SHOWN]
                 if not slices:
                     continue
                 x = [(one["from"] + one["to"]) / 2 for one in slices]
@@ -123,7 +123,7 @@ def reliability(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def _worst_bin(bins: Sequence[Mapping[str, Any]]) -> str:
-    big = [one for one in bins if one["accuracy"]["count"] >= LEAST_RECORDS]
+    big = [one for one in bins if one["accuracy"]["count"] >= LEAST_SHOWN]
     if not big:
         return "no bin holds enough records to judge."
     worst = max(big, key=lambda one: abs(one["accuracy"]["value"] - one["confidence"]))

@@ -99,12 +99,12 @@ def _part(records: Gathered, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Gath
 
 def _trained(model: str, settings: TrainingConfig, sets: Mapping[str, Gathered]) -> Answer:
     """Train, and give what answers records: their probabilities and labels."""
-    from ..gather import Sets
+    from ..gather import TrainingSets
     from ..train import train_one
 
     # the account's own figures are not used here, so any records do
     few = _part(sets["validate"], np.arange(min(600, len(sets["validate"]))))
-    sealed, _ = train_one(model, settings, Sets(**sets, test=few), lambda _: None)
+    sealed, _ = train_one(model, settings, TrainingSets(**sets, test=few), lambda _: None)
     classifier = Classifier(sealed, source=model)
 
     def answer(test: Gathered) -> tuple[NDArray[np.floating], NDArray[np.str_]]:

@@ -20,9 +20,9 @@ from ..labels import CLASSES
 from ..ladder import non_dominated
 from ..parts import Parts
 from . import choices, metrics
-from .bounds import detection_bounds
-from .choices import DWELLS_S, FEATURES, STORED_BINS, STORED_BITS, OnDone, Sets
+from .choices import DWELLS_S, FEATURES, STORED_BINS, STORED_BITS, FrontSet, OnDone
 from .cost import BATCHES, in_turn
+from .detection_bound import detection_bounds
 from .memory import peak_bytes
 from .operations import counted_transforms, network_operations
 from .pictures import PICTURES
@@ -80,11 +80,11 @@ def measure_front(
     -------
     dict
         ``dwells_s``, ``train_records``, ``test_records`` (of each dwell), ``epochs``; ``declared`` (``shares`` and
-        ``snr_db``), ``quoted_dwell_s``; ``bounds``: see `bounds.detection_bounds`; ``choices``: one a picture, one for
-        the measurements and one a model, see `_row`; ``budgets``: for each batch size and budget the choice most
-        accurate on half of the test records and what it gives on the other half, or None; ``stored``: for each number
-        of bins and bits ``bytes``, ``bytes_per_million``, the accuracy and whether nothing is as small and as good
-        (``front``).
+        ``snr_db``), ``quoted_dwell_s``; ``bounds``: see `detection_bound.detection_bounds`; ``choices``: one a picture,
+        one for the measurements and one a model, see `_row`; ``budgets``: for each batch size and budget the choice
+        most accurate on half of the test records and what it gives on the other half, or None; ``stored``: for each
+        number of bins and bits ``bytes``, ``bytes_per_million``, the accuracy and whether nothing is as small and as
+        good (``front``).
     """
     _score(models, config, reference, parts=parts, phase=phase)
     entries = [("picture", name) for name in PICTURES] + [("features", FEATURES)]
@@ -153,18 +153,18 @@ def _score(models: Mapping[str, Given], config: ReportConfig, reference: Radar, 
             parts.take(f"front picture {name}", partial(measure, name, sets, config, share))
 
 
-def _picture(name: str, sets: Mapping[str, Sets], config: ReportConfig, done: OnDone) -> dict[str, Any]:
+def _picture(name: str, sets: Mapping[str, FrontSet], config: ReportConfig, done: OnDone) -> dict[str, Any]:
     answer, seconds = choices.train_picture(name, sets, config, on_done=done)
     return {"train_s": seconds, **_by_dwell(sets["test"], answer(32))}
 
 
-def _features(sets: Mapping[str, Sets], config: ReportConfig) -> dict[str, Any]:
+def _features(sets: Mapping[str, FrontSet], config: ReportConfig) -> dict[str, Any]:
     probabilities, content, seconds = choices.train_features(sets, config)
     onnx = base64.b64encode(content).decode()
     return {"train_s": seconds, "onnx": onnx, **_by_dwell(sets["test"], probabilities)}
 
 
-def _stored(name: str, sets: Mapping[str, Sets], config: ReportConfig, done: OnDone) -> list[dict[str, Any]]:
+def _stored(name: str, sets: Mapping[str, FrontSet], config: ReportConfig, done: OnDone) -> list[dict[str, Any]]:
     """Rows of one number of bins: trained on whole levels, asked about levels kept in fewer and fewer bits."""
     answer, _ = choices.train_picture(name, sets, config, on_done=done)
     channels, bins = sets["test"].inputs[name].shape[1:]
@@ -183,7 +183,7 @@ def _scores(labels: NDArray[np.int64], probabilities: NDArray[np.floating]) -> d
     return {"balanced_accuracy": metrics.mean_of_rates(recalls), "uav_found": found["detection"]}
 
 
-def _by_dwell(test: Sets, probabilities: NDArray[np.floating]) -> dict[str, Any]:
+def _by_dwell(test: FrontSet, probabilities: NDArray[np.floating]) -> dict[str, Any]:
     """The scores of each dwell, and the shortest dwells that find enough of the stronger UAVs."""
     dwells, declared = [], []
     for place in range(len(DWELLS_S)):

@@ -21,15 +21,13 @@ Z_95 = 1.959963984540054
 Rate = dict[str, Any]
 
 
-def wilson(right: int, count: int, *, z: float = Z_95) -> tuple[float, float]:
-    """Wilson score interval of a binomial share.
+def wilson(right: int, count: int) -> tuple[float, float]:
+    """Wilson score interval of a binomial share, 95 %.
 
     Parameters
     ----------
     right, count : int
         Successes and trials, 0 <= right <= count, count >= 1.
-    z : float
-        Half-width in standard deviations; the default gives 95 %.
 
     Returns
     -------
@@ -43,7 +41,7 @@ def wilson(right: int, count: int, *, z: float = Z_95) -> tuple[float, float]:
     """
     if not (count >= 1 and 0 <= right <= count):
         raise ValueError(f"right={right}, count={count}: 0 <= right <= count and count >= 1 are required")
-    share = right / count
+    share, z = right / count, Z_95
     shrink = 1.0 + z * z / count
     centre = (share + z * z / (2 * count)) / shrink
     half = z * math.sqrt(share * (1.0 - share) / count + z * z / (4.0 * count * count)) / shrink

@@ -73,7 +73,7 @@ def draw_page(report: Mapping[str, Any]) -> str:
         css=Markup(_read("page.css")),
         js=Markup(_read("page.js")),
         legend=_legend(looks(names)),
-        least_records=draw_scores.LEAST_RECORDS,
+        least_records=draw_scores.LEAST_SHOWN,
         choice_legend=_legend(
             {row["name"] if row["kind"] == "model" else row["words"]: drawn[row["name"], row["kind"]] for row in rows}
         ),

@@ -21,7 +21,6 @@ from bladewing.models.seal import seal
 from bladewing.simulate import Radar, Records, draw_records
 from numpy.typing import NDArray
 
-from ..bounds import MOST_MODEL_BYTES, MOST_TEXT_BYTES
 from ..dataset import simulator_digest
 from ..errors import BadInput, unreadable
 from ..files import read_bounded, result_folder, settle, write_together
@@ -29,6 +28,7 @@ from ..gather import inputs_digest
 from ..inference import Classifier
 from ..labels import CLASSES
 from ..ladder import CASCADE, STAGES_KEY
+from ..limits import MOST_MODEL_BYTES, MOST_TEXT_BYTES
 from ..parts import REPORT_PARTS, Parts
 from ..progress import Progress
 from ..stability.run import worst_of_each
@@ -55,7 +55,7 @@ REFERENCE = Radar(carrier_hz=9.85e9, prf_hz=25e3, pulses=2000)
 REFERENCE_PURPOSE = "bench"
 
 
-def measure(
+def measured_report(
     models: Mapping[str, bytes],
     config: ReportConfig,
     *,
@@ -332,7 +332,7 @@ def run_report(
     parts = Parts(out / REPORT_PARTS, _of(settings, found, account))
     started, clock, resumed = datetime.now(UTC), time.perf_counter(), parts.begun
     with parts.alone(), Progress(visible=progress) as bars:
-        body = measure(found, settings, parts=parts, progress=bars, account=account)
+        body = measured_report(found, settings, parts=parts, progress=bars, account=account)
         made = {
             "date": started.isoformat(timespec="seconds"),
             "command": _command(out, models, quick=quick, seed=seed, config=config),

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ..bounds import SEEDS
+from ..limits import SEEDS
 from ..settings_file import build_settings
 
 #: What `--quick` changes: enough to see every figure, with wide intervals.

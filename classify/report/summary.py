@@ -10,7 +10,7 @@ from bladewing.models import DEFAULT_MODEL
 from .words import MINUS, batch_words, count, micros, millis, number, percent, size, spoken
 
 # Fewer records than this are no ground for a sentence.
-LEAST_RECORDS = 20
+LEAST_NAMED = 20
 # What a reader may call reliable.
 GOOD_SHARE = 0.9
 
@@ -176,7 +176,7 @@ def _best_other(report: Mapping[str, Any], name: str, *, clearly: bool) -> Itera
 
 
 def _enough(rate: Mapping[str, Any]) -> bool:
-    return bool(rate["count"] >= LEAST_RECORDS)
+    return bool(rate["count"] >= LEAST_NAMED)
 
 
 def _commonest_mistake(classes: Sequence[str], table: Sequence[Sequence[int]]) -> tuple[str, str, float] | None:

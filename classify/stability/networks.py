@@ -73,7 +73,7 @@ def _network(make: Any, names: tuple[str, ...]) -> Iterator[Cell]:
     )
     shapes = {name: INPUT_SHAPES[name] for name in names}
     net: EvidenceNet = make(shapes, seed=0)
-    net.measure(inputs)
+    net.standardise_by(inputs)
     exact = copy.deepcopy(net).double().eval()
 
     def reference(given: Inputs) -> NDArray[np.float64]:

@@ -8,9 +8,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from ..bounds import MOST_TEXT_BYTES
 from ..errors import BadInput
 from ..files import read_bounded, result_folder, write_together
+from ..limits import MOST_TEXT_BYTES
 from ..progress import Progress
 from .cell import Cell
 

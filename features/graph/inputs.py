@@ -5,7 +5,7 @@ from collections.abc import Collection
 import numpy as np
 
 from ..axis import pooling
-from ..change import PARTS, _frame_starts, part_length
+from ..change import PARTS, frame_starts, part_length
 from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
 from ..spectrum import _LEAST, LEAST_FLOOR, LEAST_PART, Spectrum, doppler_spectrum
 from ..vector import _BANDS, _SIGNIFICANT, radar_columns
@@ -96,7 +96,7 @@ def input_graph(
         out["combs"] = comb_levels_db(radar, relative_power, kept)
     if "spectrum" in names or "features" in names:
         length = part_length(pulses)
-        starts, _ = _frame_starts(pulses, length, PARTS)
+        starts, _ = frame_starts(pulses, length, PARTS)
         frames = graph.concat(*(packed.slice(start, start + length) for start in starts), axis=1)
         bins = doppler_spectrum(np.zeros(length, np.complex64), carrier_hz=carrier_hz, prf_hz=prf_hz).bins
         whole = centred_transform(frames.reshape(-1, 2, length), length, bins)

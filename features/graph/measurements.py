@@ -63,7 +63,7 @@ def body_line(radar: Spectrum, relative_power: Value) -> Body:
 def notch_weights(radar: Spectrum, body: Body) -> Value:
     """As `notch.weights` of `notch.notch_mask`."""
     bins, half = radar.bins, notch.half_width_bins(radar)
-    keep, _ = notch._notches(bins, half)
+    keep, _ = notch.notches(bins, half)
     distance = (np.arange(bins, dtype=np.float32) - body.index.to(np.float32)).apply("Abs")
     far = distance.at_most(float(bins) - distance) > float(half)
     return far.to(np.float32) * keep.astype(np.float32)
@@ -141,7 +141,7 @@ def _marked(level_db: Value) -> Value:
 
 def change_levels_db(change: Value, bins: int) -> Value:
     """Mean change at slow, middle and fast speeds as in `vector.feature_vector`, shape (n, 3)."""
-    return change.graph.matmul(change, vector._axis_plan(bins)[1].T)
+    return change.graph.matmul(change, vector.axis_plan(bins)[1].T)
 
 
 def centroid_mps(parts_db: Value, bins: int) -> Value:
@@ -204,12 +204,12 @@ def _evidence(peaks: Value, first: int, last: int, periods: int) -> Value:
         twice = 2 * np.arange(first, stop + 1)
         again = peaks.take(twice - 1).at_least(peaks.take(twice)).at_least(peaks.take(twice + 1))
         out = out + (again * chopping.REPEAT_SHARE).pad(0, last - stop)
-    return out * chopping._length_weights(first, last)
+    return out * chopping.length_weights(first, last)
 
 
 def _prominence(heights: Value, periods: int) -> Value:
     """As `chopping.prominence`."""
-    (starts, stops), shares = chopping._surroundings(periods)
+    (starts, stops), shares = chopping.surroundings(periods)
     upto = heights.cumsum().pad(1, 0)
     below, above = ((upto.take(stops[side]) - upto.take(starts[side])) * shares[side] for side in (0, 1))
     out = heights - below.at_least(above).to(np.float32) + heights.mean()

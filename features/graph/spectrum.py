@@ -72,7 +72,7 @@ def _by_rows(samples: Value, length: int, count: int, *, parts: int, conjugate: 
 def centred_transform(packed: Value, pulses: int, bins: int) -> Value:
     """As `spectrum.centred_transform`: from samples (n, 2, pulses) to real and imaginary parts (n, 2, bins)."""
     even = bins % 2 == 0
-    transform = dft((packed * definition._window(pulses, even)[::2]).pad(0, bins - pulses), bins, bins)
+    transform = dft((packed * definition.packed_window(pulses, even)[::2]).pad(0, bins - pulses), bins, bins)
     half = (bins + 1) // 2
     return transform if even else packed.graph.concat(transform.slice(half, bins), transform.slice(0, half))
 

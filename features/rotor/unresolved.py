@@ -79,6 +79,8 @@ def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) 
             alone = np.abs(fft.fft(shape**2, size)) ** 2 / max(float((shape**2).sum()) ** 2, 1e-30)
         power = np.abs(fft.fft(lines, size)) ** 2
         first = int(power.argmax())
+        if not power[first]:  # such tips have no lines of these orders: those that are there flash as another kind's
+            return False
         power = power / power[first] - np.roll(alone, first)  # few lines of unlike strength flash beside as well
         lines_away = np.abs((np.arange(size) - first + size // 2) % size - size // 2) / FLASH_PADDING
         other = lines_away > FLASH_WIDTH

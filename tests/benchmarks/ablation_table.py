@@ -15,7 +15,7 @@ from bladewing.features.schema import FEATURES, LEVEL_CHANNELS
 from bladewing.models.augment import VelocityMirror
 from bladewing.models.calibration import negative_log_likelihood, softmax
 from bladewing.models.cnn import SpectrumNet
-from bladewing.models.training import network_scores, train_network
+from bladewing.models.training import Course, Lessons, network_scores, train_network
 from numpy.typing import NDArray
 
 from .baselines_table import judged
@@ -71,13 +71,11 @@ def trial(
     mirror = VelocityMirror(axes={names[0]: -1}, odd={})
     train_network(
         net,
-        train,
-        sets["train"].labels,
+        Lessons(train, sets["train"].labels, kinds_of(sets["train"]) if kinds else None),
         (validate, sets["validate"].labels),
+        Course(epochs),
         seed=seed,
-        epochs=epochs,
         augment=mirror,
-        kinds=kinds_of(sets["train"]) if kinds else None,
     )
     scores, labels = network_scores(net, test), sets["bench"].labels
     return (*judged(scores, labels), negative_log_likelihood(softmax(scores), labels))

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 from bladewing.classify import Classifier
-from bladewing.classify.gather import Gathered, Sets
+from bladewing.classify.gather import Gathered, TrainingSets
 from bladewing.classify.train import train_one
 from bladewing.classify.training_config import TrainingConfig
 from bladewing.features import model_inputs
@@ -77,7 +77,7 @@ def main() -> None:
     options = parser.parse_args()
     settings = TrainingConfig(records=options.records, seed=5, epochs=options.epochs)
     drawn = {purpose: gathered(purpose, count) for purpose, count in settings.sets.items()}
-    sets = Sets(**{purpose: ours for purpose, (ours, _) in drawn.items()})
+    sets = TrainingSets(**{purpose: ours for purpose, (ours, _) in drawn.items()})
     labels = sets.test.labels
     print(
         f"{options.records} training records of the whole envelope, {len(labels)} test records, {options.epochs} epochs"

@@ -23,7 +23,7 @@ from bladewing.classify.training_account import figures
 from bladewing.features.wingbeat import wingbeat
 from bladewing.models.calibration import conformal_thresholds
 from bladewing.simulate import Radar, draw_records
-from bladewing.simulate.dataset import KIND_CLASS, KINDS, _powered, _target, draw_radar
+from bladewing.simulate.dataset import KIND_CLASS, KINDS, draw_radar, draw_target, powered
 from bladewing.simulate.laws import LAWS, WIDTH, Draws
 from bladewing.simulate.uav import ROTORS
 
@@ -77,11 +77,11 @@ def ideal(radar: Radar, count: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
         noise = rng.standard_normal((250, radar.pulses, 2), np.float32).view(np.complex64)[..., 0] * np.float32(
             0.5**0.5
         )
-        target = _target(
+        target = draw_target(
             draws, radar, kind, lambda _: lambda n: rng.standard_normal((250, n), np.float32), np.arange(250)
         )
         snr_db = target.snr_db(rng.random(250))
-        parts.append(noise + _powered(target, snr_db))
+        parts.append(noise + powered(target, snr_db))
         snrs.append(snr_db)
     return np.concatenate(parts), np.concatenate(snrs)
 

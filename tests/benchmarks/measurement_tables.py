@@ -1,10 +1,9 @@
-"""Tables of the measurements' accuracy. Run: python tests/benchmarks/measurement_tables.py [--draws N] [TABLE ...].
+"""Tables of the measurements' accuracy. Run: python -m tests.benchmarks.measurement_tables [--draws N] [TABLE ...].
 
 Shares stand with the 95 % interval that the number of draws leaves them (Wilson), variances with that of chi-squared.
 """
 
 import argparse
-import sys
 from collections.abc import Callable
 from functools import partial
 from itertools import product
@@ -12,17 +11,16 @@ from pathlib import Path
 from time import thread_time
 
 import numpy as np
-from scipy.stats import chi2
-
-sys.path.insert(0, str(Path(__file__).parent))
-import records
 from bladewing.classify.recording import load_recording
 from bladewing.features import measure
 from bladewing.features.stft import PAPER_SETTINGS, flash_bandwidth_hz, flash_period_s, stft
 from bladewing.simulate import Radar
-from bladewing.simulate.dataset import _powered, _target
+from bladewing.simulate.dataset import draw_target, powered
 from bladewing.simulate.laws import WIDTH, Draws
 from bladewing.simulate.receiver import FAULT_CHANCE, Receiver
+from scipy.stats import chi2
+
+from . import records
 
 RECORDINGS = Path(__file__).parents[3] / "shared" / "recordings"
 
@@ -348,8 +346,8 @@ def _through(fault: str, draws: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
     receiver = Receiver(cursor)
     receiver.on = {name: np.full(draws, name == fault) for name in FAULT_CHANCE}
     noise = records.white(rng, draws, records.PULSES).astype(np.complex64)
-    target = _target(cursor, radar, "fixed_wing", lambda _: partial(_normals, rng, draws), np.arange(draws))
-    signal = _powered(target, rng.uniform(0, 30, draws))
+    target = draw_target(cursor, radar, "fixed_wing", lambda _: partial(_normals, rng, draws), np.arange(draws))
+    signal = powered(target, rng.uniform(0, 30, draws))
     iq = receiver.receive(signal, noise, radar, lambda _: lambda rows: partial(_normals, faults, len(rows)))
     return iq, target.truth["tip_mps"] * np.cos(target.truth["beta_rad"]), target.truth["chopping_hz"]
 

@@ -156,7 +156,7 @@ def tiny_settings(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def report_folder(tmp_path_factory: pytest.TempPathFactory, tiny_models: Path, tiny_settings: Path) -> Path:
     """A whole report on few records: report.json and report.html."""
-    from bladewing.classify.report import run_report
+    from bladewing.classify.report.run import run_report
 
     folder = tmp_path_factory.mktemp("report") / "new"
     with pytest.MonkeyPatch.context() as patch:

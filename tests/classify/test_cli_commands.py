@@ -18,7 +18,7 @@ from bladewing.models import pretrained
 def calls(monkeypatch):
     """Stand in for the work of both commands; gives what they were called with."""
     seen: list[tuple[object, dict[str, object]]] = []
-    for name, function in (("train", "run_training"), ("report", "run_report")):
+    for name, function in (("train", "run_training"), ("report.run", "run_report")):
         module = types.ModuleType(f"bladewing.classify.{name}")
         setattr(module, function, lambda out, **options: seen.append((out, options)))
         monkeypatch.setitem(sys.modules, module.__name__, module)

@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 from bladewing.classify import BadInput, Classifier, answer, load_recording
-from bladewing.classify import predict as work
+from bladewing.classify import recording as recordings
 from bladewing.classify.cli import main
 
 PRF_HZ = 20e3
@@ -340,7 +340,7 @@ def test_interrupted_by_the_user(run, sigmf_pair, monkeypatch):
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(work, "load_recording", interrupt)
+    monkeypatch.setattr(recordings, "load_recording", interrupt)
     assert run("--json", sigmf_pair()) == (130, "", "bladewing: stopped: interrupted\n")
 
 
@@ -348,7 +348,7 @@ def test_what_nobody_expected_is_one_line_and_exit_code_1(run, sigmf_pair, monke
     def fail(*_, **__):
         raise ZeroDivisionError("two\nlines")
 
-    monkeypatch.setattr(work, "load_recording", fail)
+    monkeypatch.setattr(recordings, "load_recording", fail)
     code, out, err = run("--json", sigmf_pair())
     assert (code, out) == (1, "")
     assert (

@@ -12,7 +12,7 @@ import pytest
 from bladewing.classify import dataset as module
 from bladewing.classify import train
 from bladewing.classify.cli import main
-from bladewing.classify.dataset import MANIFEST, DataSet, Plan, write_dataset
+from bladewing.classify.dataset import MANIFEST, DataSet, DataSetPlan, write_dataset
 from bladewing.classify.errors import BadInput
 from bladewing.classify.files import only_writer
 from bladewing.classify.progress import Progress
@@ -20,7 +20,7 @@ from bladewing.classify.training_config import TrainingConfig
 from bladewing.simulate import stream
 
 COUNTS = {"train": 100, "validate": 24, "calibrate": 30, "test": 24}
-PLAN = Plan(3, COUNTS)
+PLAN = DataSetPlan(3, COUNTS)
 
 
 def write(folder, plan=PLAN):
@@ -127,7 +127,7 @@ from pathlib import Path
 from bladewing.classify import dataset
 from bladewing.classify.progress import Progress
 dataset.SHARD_RECORDS = 48
-plan = dataset.Plan(3, {"train": 100, "validate": 24, "calibrate": 30, "test": 24})
+plan = dataset.DataSetPlan(3, {"train": 100, "validate": 24, "calibrate": 30, "test": 24})
 dataset.write_dataset(Path(sys.argv[1]), plan, Progress(visible=False), workers=1)
 """
 
@@ -184,7 +184,7 @@ def test_one_writer_at_a_time(whole, tmp_path):
 
 def test_another_data_set_or_a_foreign_folder_is_not_written_over(whole, tmp_path):
     with pytest.raises(BadInput, match=r"holds another data set \(seed 3"):
-        write(whole, Plan(4, COUNTS))
+        write(whole, DataSetPlan(4, COUNTS))
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(BadInput, match=r"not empty, and it holds no dataset\.json"):
         write(tmp_path)

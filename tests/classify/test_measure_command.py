@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bladewing.classify.cli import main
-from bladewing.classify.measure import Measured, Settings, measured
+from bladewing.classify.measure import Measured, Settings, measure_recording
 from bladewing.classify.measure_words import with_error
+from bladewing.classify.recording import load_recording
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 
 CARRIER_HZ, PRF_HZ, PULSES = 9.85e9, 35e3, 3000
@@ -86,7 +87,8 @@ def test_a_body_without_a_rotor_has_its_velocity(tmp_path, capsys):
 
 
 def test_a_dwell_that_hardly_tells_the_body_does_not_speak_for_the_recording(folder):
-    (spoken,) = measured([folder / "drone.npy"], Settings(0.0857, 2, None), carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
+    recording = load_recording(folder / "drone.npy", carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
+    spoken = measure_recording(recording, Settings(0.0857, 2, None))
     for values, stds, expected in (
         ([3.0, -90.0, -95.0], [0.1, 110.0, 110.0], (3.0, 0.1)),  # a plain median would be -90
         ([1.0, 3.0], [0.5, 0.5], (2.0, 1.0)),  # each is two deviations off: Birge's ratio is the root of 8

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bladewing.classify.errors import BadInput
+from bladewing.classify.files import only_writer
 from bladewing.classify.parts import Parts
 
 
@@ -25,7 +26,7 @@ def test_parts_are_measured_once_and_only_for_the_same_run(tmp_path: Path) -> No
     assert other.take("one", measure) == [2]
     parts.forget()
     other.forget()
-    assert not (tmp_path / "parts").exists()
+    assert not list((tmp_path / "parts").iterdir())
 
 
 def test_an_interrupted_part_is_not_taken_for_a_finished_one(tmp_path: Path) -> None:
@@ -91,7 +92,8 @@ def test_a_run_that_is_done_leaves_the_parts_of_another(tmp_path: Path) -> None:
     one.forget()
     assert not one.begun
     assert other.begun
-    other.forget()
+    with other.alone():
+        other.forget()
     assert not list(tmp_path.iterdir())
 
 
@@ -121,14 +123,38 @@ def test_a_damaged_measurement_is_one_line(tmp_path: Path) -> None:
         parts.take("one", lambda: [1])
 
 
-def test_two_runs_do_not_work_for_the_same_place(tmp_path):
+@pytest.mark.parametrize("done", ["nothing", "a part", "all"])
+def test_two_runs_do_not_work_for_the_same_place(tmp_path, done):
     one, other = (Parts(tmp_path / "parts", {"seed": seed}) for seed in (1, 2))
     with one.alone():
-        one.take("a", lambda: 1)
-        with pytest.raises(BadInput, match="another run is at work there: let it finish"), other.alone():
-            raise AssertionError
-        assert one.have("a")
+        if done != "nothing":
+            one.take("a", lambda: 1)
+        if done == "all":
+            one.forget()
+        for _ in range(2):  # one that is refused leaves the others shut out
+            with pytest.raises(BadInput, match="another run is at work there: let it finish"), other.alone():
+                raise AssertionError
+        assert one.have("a") == (done == "a part")
     with other.alone():  # what was kept is there for the one that goes on
-        assert one.have("a")
+        assert one.have("a") == (done == "a part")
         one.forget()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_lock_of_a_folder_that_was_made_anew_is_no_lock(tmp_path, monkeypatch):
+    """Between opening the folder and locking it, its holder removes it, and a third run makes it again."""
+    fcntl = pytest.importorskip("fcntl")
+    flock, folder = fcntl.flock, tmp_path / "parts"
+    folder.mkdir()
+
+    def late(descriptor, how):
+        if not made:
+            made.append(folder.rename(tmp_path / "removed"))
+            folder.mkdir()
+        flock(descriptor, how)
+
+    made: list[Path] = []
+    monkeypatch.setattr(fcntl, "flock", late)
+    with only_writer(folder, wait=False), pytest.raises(BlockingIOError), only_writer(folder, wait=False):
+        raise AssertionError
+    assert made

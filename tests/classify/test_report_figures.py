@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from bladewing.classify.report.card import model_card
-from bladewing.classify.report.draw_scores import GROUPS, LEAST_RECORDS, accuracy_by_snr
+from bladewing.classify.report.draw_scores import GROUPS, LEAST_SHOWN, accuracy_by_snr
 
 ROOT = Path(__file__).parents[2]
 CURE = "run: python docs/figures.py"
@@ -49,6 +49,9 @@ def test_a_changed_figure_is_a_changed_text(figures: ModuleType, report: dict[st
     other["scores"]["spectrum-cnn"]["balanced_accuracy"]["value"] += 0.01
     assert figures.filled(text, other) != text
     assert model_card(other) != model_card(report)
+    slower = copy.deepcopy(report)
+    next(row for row in slower["cost"]["batches"][-1]["stages"] if row["stage"] == "chain")["ratio_to_fft"] *= 2
+    assert figures.filled(text, slower) != text
 
 
 def test_committed_report_is_of_the_shipped_models(report: dict[str, Any]) -> None:
@@ -62,7 +65,7 @@ def test_committed_report_is_of_the_shipped_models(report: dict[str, Any]) -> No
 def test_a_step_of_few_records_breaks_the_lines_of_its_class_alone(report: dict[str, Any]) -> None:
     changed = copy.deepcopy(report)
     for scores in changed["scores"].values():
-        scores["by_snr"][5]["uav"]["count"] = LEAST_RECORDS - 1
+        scores["by_snr"][5]["uav"]["count"] = LEAST_SHOWN - 1
 
     def drawn(told: dict[str, Any]) -> list[str]:
         return [panel.svg for panel in accuracy_by_snr(told)]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scipy.fft
 from bladewing.classify.report import front, pictures, stft
-from bladewing.classify.report.bounds import detection_bound
+from bladewing.classify.report.detection_bound import detection_bound
 from bladewing.classify.report.memory import peak_bytes
 from bladewing.classify.report.operations import counted_transforms, network_operations
 from bladewing.classify.report.timing import Laps, quote, ratio
@@ -297,7 +297,7 @@ def test_a_choice_is_made_on_other_records_than_it_is_quoted_on() -> None:
     labels, dwell = np.tile(np.repeat(np.arange(3), 40), places), np.repeat(np.arange(places), 120)
     lucky = np.arange(len(labels)) % 2 == 0  # right on one half, always "uav" on the other
     probabilities = np.where(lucky[:, None], np.eye(3)[labels], np.eye(3)[0]).astype(np.float32)
-    point = front._by_dwell(front.Sets({}, labels, np.full(len(labels), 5.0), dwell), probabilities)["dwells"][0]
+    point = front._by_dwell(front.FrontSet({}, labels, np.full(len(labels), 5.0), dwell), probabilities)["dwells"][0]
     assert point["chosen_by"]["value"] == 1.0
     assert point["quoted"]["balanced_accuracy"]["value"] == pytest.approx(1 / 3)
     assert point["balanced_accuracy"]["value"] == pytest.approx(2 / 3)
@@ -311,9 +311,9 @@ def test_time_to_declare_is_the_first_dwell_that_finds_enough() -> None:
     # the score parts the classes from the third dwell on
     score = np.where((labels == 0) & (dwell >= 2), 0.9, 0.1)
     probabilities = np.stack([score, (1 - score) / 2, (1 - score) / 2], axis=1)
-    found = front._by_dwell(front.Sets({}, labels, snr_db, dwell), probabilities)
+    found = front._by_dwell(front.FrontSet({}, labels, snr_db, dwell), probabilities)
     assert found["declare_s"] == [front.DWELLS_S[2]] * 2
-    never = front._by_dwell(front.Sets({}, labels, np.where(labels == 0, -10.0, np.nan), dwell), probabilities)
+    never = front._by_dwell(front.FrontSet({}, labels, np.where(labels == 0, -10.0, np.nan), dwell), probabilities)
     assert never["declare_s"] == [None, None]
 
 

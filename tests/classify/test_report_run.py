@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bladewing.classify import BadInput, Classifier
-from bladewing.classify.report import cost, run, run_report, scores
+from bladewing.classify.report import cost, run, scores
 from bladewing.classify.report.page import draw_page
 from bladewing.classify.report.timing import Laps
 from bladewing.classify.stability.cell import Cell
@@ -205,10 +205,10 @@ def test_interrupted_run_leaves_the_old_files_whole(
         (tmp_path / name).write_bytes(content)
     body = json.loads(old["report.json"])
     if where != "scores.score":
-        monkeypatch.setattr(run, "measure", lambda *_, **__: body)
+        monkeypatch.setattr(run, "measured_report", lambda *_, **__: body)
     monkeypatch.setattr(f"bladewing.classify.report.run.{where}", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        run_report(tmp_path, models=tiny_models, quick=True, seed=1, config=tiny_settings, progress=False)
+        run.run_report(tmp_path, models=tiny_models, quick=True, seed=1, config=tiny_settings, progress=False)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == old
 
 
@@ -229,12 +229,12 @@ def test_an_interrupted_run_goes_on_where_it_stopped(
     with monkeypatch.context() as patch:
         patch.setattr("bladewing.classify.report.run.cost.time_chain", interrupt)
         with pytest.raises(KeyboardInterrupt):
-            run_report(tmp_path, **call)
+            run.run_report(tmp_path, **call)
     monkeypatch.setattr("bladewing.classify.report.run.evaluate.ask", again)
     # of what comes after, only that it is reached
     monkeypatch.setattr("bladewing.classify.report.run.cost.time_chain", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        run_report(tmp_path, **call)
+        run.run_report(tmp_path, **call)
     (kept,) = (tmp_path / "report-parts").glob("*/scores.json")
     # here no train.json tells of a cascade
     assert json.loads(kept.read_text())["scores"] == {
@@ -244,18 +244,18 @@ def test_an_interrupted_run_goes_on_where_it_stopped(
 
 def test_no_models_is_one_clear_line(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"holds no \.onnx file: run `bladewing train"):
-        run_report(tmp_path, models=tmp_path, quick=True, progress=False)
+        run.run_report(tmp_path, models=tmp_path, quick=True, progress=False)
     with pytest.raises(BadInput, match="not a folder"):
-        run_report(tmp_path, models=tmp_path / "missing", quick=True, progress=False)
+        run.run_report(tmp_path, models=tmp_path / "missing", quick=True, progress=False)
     with pytest.raises(BadInput, match="seed is -1"):
-        run_report(tmp_path, models=None, quick=True, seed=-1, progress=False)
+        run.run_report(tmp_path, models=None, quick=True, seed=-1, progress=False)
 
 
 @pytest.mark.parametrize("name", ["features", "herm", "cascade"])
 def test_a_model_of_a_name_that_the_report_needs_is_refused(tiny_models: Path, tmp_path: Path, name: str) -> None:
     (tmp_path / f"{name}.onnx").write_bytes((tiny_models / "spectrum-cnn.onnx").read_bytes())
     with pytest.raises(BadInput, match=rf"{name}\.onnx has the name of what the report makes itself: rename the file"):
-        run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
+        run.run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
 
 
 @pytest.mark.parametrize("text", ["[]", "3", "{}", '{"settings": {}}', '{"cascade": 3}', "{"])
@@ -265,14 +265,14 @@ def test_a_train_json_of_something_else_is_told_before_anything_is_measured(
     (tmp_path / "spectrum-cnn.onnx").write_bytes((tiny_models / "spectrum-cnn.onnx").read_bytes())
     (tmp_path / "train.json").write_text(text)
     with pytest.raises(BadInput, match=r"train\.json: not .*: remove it or train again"):
-        run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
+        run.run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
 
 
 def test_a_train_json_that_never_ends_is_told_too(tiny_models: Path, tmp_path: Path) -> None:
     (tmp_path / "spectrum-cnn.onnx").write_bytes((tiny_models / "spectrum-cnn.onnx").read_bytes())
     os.mkfifo(tmp_path / "train.json")
     with pytest.raises(BadInput, match=r"train\.json: not JSON: it is no regular file: remove it or train again"):
-        run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
+        run.run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
 
 
 def test_what_was_measured_is_kept_for_the_same_cascade_on_the_same_machine_alone(
@@ -308,7 +308,7 @@ def test_a_chain_whose_records_do_not_all_cost_the_same_costs_their_mean(monkeyp
 def test_a_foreign_model_is_refused_before_anything_is_measured(tmp_path: Path) -> None:
     (tmp_path / "foreign.onnx").write_bytes(b"not a model")
     with pytest.raises(BadInput, match="foreign"):
-        run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
+        run.run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
 
 
 def test_page_shows_a_stability_table_that_lies_beside_it(report: dict[str, Any]) -> None:

@@ -11,7 +11,7 @@ import pytest
 from bladewing.classify import Classifier, train
 from bladewing.classify.cli import main
 from bladewing.classify.errors import BadInput
-from bladewing.classify.gather import Gathered, Sets, gather
+from bladewing.classify.gather import Gathered, TrainingSets, gather
 from bladewing.classify.labels import CLASSES
 from bladewing.classify.model_file import COVERAGES
 from bladewing.classify.parts import TRAIN_PARTS
@@ -144,7 +144,7 @@ def _few_sets(*_):
         kinds = np.array([next(kind for kind, of in KIND_CLASS.items() if of == CLASSES[label]) for label in labels])
         return Gathered(inputs, labels, {"kind": kinds, "background_db": np.full(count, np.nan)})
 
-    return Sets(gathered(192), gathered(96), gathered(300), gathered(300))
+    return TrainingSets(gathered(192), gathered(96), gathered(300), gathered(300))
 
 
 def _run(out, *, after=None, then=None, **changed):

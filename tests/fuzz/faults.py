@@ -42,7 +42,7 @@ from pathlib import Path
 from bladewing.classify import dataset
 from bladewing.classify.progress import Progress
 dataset.SHARD_RECORDS = 48
-plan = dataset.Plan(3, {"train": 960, "validate": 240, "calibrate": 240, "test": 240})
+plan = dataset.DataSetPlan(3, {"train": 960, "validate": 240, "calibrate": 240, "test": 240})
 if __name__ == "__main__":
     dataset.write_dataset(Path(sys.argv[1]), plan, Progress(visible=False), workers=2)
 """

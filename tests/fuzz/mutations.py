@@ -104,7 +104,7 @@ MUTATIONS = (
     ),
     Mutation(
         "packed files unpack to so much and no more",
-        "classify/bounds.py",
+        "classify/limits.py",
         "    if unpacked > most:",
         "    if False:",
         "tests/classify/test_hostile_files.py -k bomb",

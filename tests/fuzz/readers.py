@@ -228,7 +228,7 @@ def _model_seeds() -> tuple[bytes, ...]:
 
 def _dataset_seeds(place: Path) -> tuple[bytes, ...]:
     """The manifest, and each file of a shard, with a letter before it that says which it is."""
-    plan = data_sets.Plan(1, dict.fromkeys(data_sets.PURPOSES, 6))
+    plan = data_sets.DataSetPlan(1, dict.fromkeys(data_sets.PURPOSES, 6))
     data_sets.write_dataset(place, plan, Progress(visible=False), workers=1)
     names = (data_sets.MANIFEST, "train-00000.iq.npy", "train-00000.table.npy")
     return tuple(str(number).encode() + (place / name).read_bytes() for number, name in enumerate(names))

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 import torch
+from bladewing.models import training
 from bladewing.models.augment import VelocityMirror
 from bladewing.models.calibration import softmax
 from bladewing.models.cnn import ImageNet, SpectrumNet, Standardise
 from bladewing.models.tabular import tabular_scores, train_boosted, train_linear
-from bladewing.models.training import network_scores, train_network
+from bladewing.models.training import Course, Lessons, network_scores, train_network
 from bladewing.models.training_state import ForeignSnapshot
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -42,8 +43,9 @@ def _images(count, seed):
 def _trained(seed=0, epochs=2, **options):
     inputs, y = _spectra(300, 1)
     net = SpectrumNet(SHAPES, seed=seed)
-    result = train_network(net, inputs, y, _spectra(100, 2), seed=seed, epochs=epochs, batch=64, **options)
-    return net, result
+    course = {name: options.pop(name) for name in ("learning_rate", "patience", "bfloat16") if name in options}
+    course = Course(epochs, batch=64, **course)
+    return net, train_network(net, Lessons(inputs, y), _spectra(100, 2), course, seed=seed, **options)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +59,7 @@ def _trained(seed=0, epochs=2, **options):
 def test_a_net_learns_what_its_signal_tells(draw, make):
     net = make()
     inputs, y = draw(600, 1)
-    train_network(net, inputs, y, draw(200, 2), seed=0, epochs=8, batch=64)
+    train_network(net, Lessons(inputs, y), draw(200, 2), Course(8, batch=64), seed=0)
     fresh, truth = draw(300, 3)
     accuracy = (network_scores(net, fresh).argmax(axis=1) == truth).mean()
     assert accuracy > 0.9  # chance is 0.33 with a spread of 0.03
@@ -76,7 +78,7 @@ def test_a_net_learns_at_what_rate_something_comes_and_goes():
     }
     parts = [{name: values[rows] for name, values in inputs.items()} for rows in (slice(0, 600), slice(600, 900))]
     net = SpectrumNet({name: values.shape[1:] for name, values in inputs.items()}, seed=0)
-    train_network(net, parts[0], y[:600], (parts[1], y[600:]), seed=0, epochs=8, batch=64)
+    train_network(net, Lessons(parts[0], y[:600]), (parts[1], y[600:]), Course(8, batch=64), seed=0)
     assert (network_scores(net, parts[1]).argmax(axis=1) == y[600:]).mean() > 0.9
 
 
@@ -88,7 +90,7 @@ def test_a_net_learns_what_its_measurements_tell():
         "features": (rng.normal(size=(600, FEATURES)) + 4 * np.eye(FEATURES)[y]).astype(np.float32),
     }
     net = SpectrumNet(SHAPES, seed=0)
-    train_network(net, inputs, y, (inputs, y), seed=0, epochs=4, batch=64)
+    train_network(net, Lessons(inputs, y), (inputs, y), Course(4, batch=64), seed=0)
     assert (network_scores(net, inputs).argmax(axis=1) == y).mean() > 0.9
 
 
@@ -111,7 +113,7 @@ def test_a_net_that_is_told_kinds_knows_them_and_their_sums_are_the_classes():
     fresh, told = _rates(300, 1)
     truth = np.array(KINDS)[told]
     net = SpectrumNet({name: values.shape[1:] for name, values in inputs.items()}, seed=0, kinds=KINDS)
-    train_network(net, inputs, y, (fresh, truth), seed=0, epochs=8, batch=64, kinds=kinds)
+    train_network(net, Lessons(inputs, y, kinds), (fresh, truth), Course(8, batch=64), seed=0)
     with torch.inference_mode():
         scores = net.kind_scores(*(torch.from_numpy(fresh[name]) for name in net.input_shapes)).double().numpy()
     assert (scores.argmax(axis=1) == told).mean() > 0.9
@@ -134,7 +136,8 @@ def test_scores_of_classes_stay_finite_where_one_is_impossible():
     assert scores.argmax(1).tolist() == [0, 0]
 
 
-def test_a_teacher_that_knows_what_a_record_leaves_open_makes_up_for_labels_that_err():
+def test_a_teacher_that_knows_what_a_record_leaves_open_makes_up_for_labels_that_err(monkeypatch):
+    monkeypatch.setattr(training, "SMOOTHING", 0.0)
     inputs, truth = _spectra(400, 1)
     rng = np.random.default_rng(4)
     shares = np.full((400, 3), 0.25)
@@ -144,8 +147,7 @@ def test_a_teacher_that_knows_what_a_record_leaves_open_makes_up_for_labels_that
     off = []
     for teacher in (None, shares):
         net = SpectrumNet(SHAPES, seed=0)
-        options = {"seed": 0, "epochs": 8, "batch": 64, "label_smoothing": 0.0, "teacher": teacher}
-        train_network(net, inputs, drawn, (fresh, labels), **options)
+        train_network(net, Lessons(inputs, drawn, teacher=teacher), (fresh, labels), Course(8, batch=64), seed=0)
         found = softmax(network_scores(net, fresh))
         off.append(np.abs(found[np.arange(300), labels] - 0.5).mean())
     assert off[1] < 0.7 * off[0]
@@ -159,8 +161,8 @@ def test_a_pupil_learns_kinds_that_its_labels_no_longer_tell():
     found = []
     for teacher in (None, np.eye(len(KINDS))[kinds]):
         net = SpectrumNet({name: values.shape[1:] for name, values in inputs.items()}, seed=0, kinds=KINDS)
-        options = {"seed": 0, "epochs": 8, "batch": 64, "kinds": mixed, "teacher": teacher}
-        train_network(net, inputs, y, (fresh, np.array(KINDS)[told]), **options)
+        lessons = Lessons(inputs, y, mixed, teacher)
+        train_network(net, lessons, (fresh, np.array(KINDS)[told]), Course(8, batch=64), seed=0)
         with torch.inference_mode():
             scores = net.kind_scores(*map(torch.as_tensor, fresh.values()))
         found.append((scores.numpy().argmax(axis=1) == told).mean())
@@ -264,7 +266,7 @@ def test_the_learning_rate_of_each_epoch_is_that_of_the_schedule():
 def test_the_shortest_trainings_have_a_schedule_too(steps):
     inputs, y = _spectra(12, 1)
     net = SpectrumNet(SHAPES, seed=0)
-    result = train_network(net, inputs, y, (inputs, y), seed=0, epochs=steps, batch=12, learning_rate=0.01)
+    result = train_network(net, Lessons(inputs, y), (inputs, y), Course(steps, batch=12, learning_rate=0.01), seed=0)
     rates = [epoch["learning_rate"] for epoch in result.epochs]
     assert all(0 < rate <= 0.01 for rate in rates)
     assert steps == 1 or max(rates) > 0.009
@@ -279,15 +281,16 @@ def test_training_stops_where_the_validation_loss_no_longer_falls():
     net = SpectrumNet(SHAPES, seed=0)
     inputs, y = _spectra(300, 1)
     snapshots = []
-    options = {"seed": 0, "epochs": 9, "batch": 64, "on_epoch": worsen, "on_snapshot": snapshots.append}
-    result = train_network(net, inputs, y, _spectra(100, 2), patience=3, **options)
+    lessons, course = Lessons(inputs, y), Course(9, batch=64, patience=3)
+    options = {"seed": 0, "on_epoch": worsen, "on_snapshot": snapshots.append}
+    result = train_network(net, lessons, _spectra(100, 2), course, **options)
     assert result.stopped_early
     assert len(result.epochs) == result.best_epoch + 3 < 9
     losses = [epoch["validation_loss"] for epoch in result.epochs]
     assert min(losses) == losses[result.best_epoch - 1]
     # interrupted just then, it has nothing left to do
     again = SpectrumNet(SHAPES, seed=0)
-    stopped = train_network(again, inputs, y, _spectra(100, 2), patience=3, snapshot=snapshots[-1], **options)
+    stopped = train_network(again, lessons, _spectra(100, 2), course, snapshot=snapshots[-1], **options)
     assert stopped.stopped_early
     assert _without_seconds(stopped) == _without_seconds(result)
     for name, values in net.state_dict().items():
@@ -329,7 +332,7 @@ def test_the_best_state_is_kept_when_the_last_epochs_are_ruined():
     net = SpectrumNet(SHAPES, seed=0)
     inputs, y = _spectra(300, 1)
     validation = _spectra(100, 2)
-    result = train_network(net, inputs, y, validation, seed=0, epochs=4, batch=64, on_epoch=ruin)
+    result = train_network(net, Lessons(inputs, y), validation, Course(4, batch=64), seed=0, on_epoch=ruin)
     assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
     assert result.best_epoch <= 2
     losses = [epoch["validation_loss"] for epoch in result.epochs]
@@ -344,7 +347,7 @@ def test_the_best_state_is_kept_when_the_last_epochs_are_ruined():
 def test_training_measures_its_records_and_not_those_of_the_validation():
     net, _ = _trained(epochs=1)
     fresh = SpectrumNet(SHAPES, seed=0)
-    fresh.measure(_spectra(300, 1)[0])
+    fresh.standardise_by(_spectra(300, 1)[0])
     for name, values in fresh.standardise.state_dict().items():
         assert torch.equal(net.standardise.state_dict()[name], values), name
 
@@ -353,7 +356,7 @@ def test_a_training_that_never_gives_a_number_says_so():
     net = SpectrumNet(SHAPES, seed=0)
     inputs, y = _spectra(64, 1)
     with pytest.raises(FloatingPointError, match="learning_rate inf is too high"):
-        train_network(net, inputs, y, _spectra(64, 2), seed=0, epochs=1, batch=32, learning_rate=float("inf"))
+        train_network(net, Lessons(inputs, y), _spectra(64, 2), Course(1, batch=32, learning_rate=float("inf")), seed=0)
 
 
 def test_half_precision_in_memory_gives_what_its_values_give_in_full():
@@ -363,7 +366,7 @@ def test_half_precision_in_memory_gives_what_its_values_give_in_full():
     states = []
     for given_inputs in (half, full):
         net = SpectrumNet(SHAPES, seed=0)
-        train_network(net, given_inputs, y, (given_inputs, y), seed=0, epochs=1, batch=32)
+        train_network(net, Lessons(given_inputs, y), (given_inputs, y), Course(1, batch=32), seed=0)
         states.append(network_scores(net, given_inputs))
     assert np.array_equal(*states)
 
@@ -376,7 +379,7 @@ def test_half_precision_in_memory_gives_what_its_values_give_in_full():
 def test_scaled_inputs_measured_anew_give_the_same_scores(scale, shift):
     inputs, _ = _spectra(64, 1)
     net = SpectrumNet(SHAPES, seed=0)
-    net.measure(inputs)
+    net.standardise_by(inputs)
     scores = network_scores(net, inputs)
     column = np.array([scale]).T
     moved = {
@@ -385,7 +388,7 @@ def test_scaled_inputs_measured_anew_give_the_same_scores(scale, shift):
     }
     if not np.allclose(scale, 1, atol=0.2):
         assert np.abs(network_scores(net, moved) - scores).max() > 1e-3  # the old buffers are the wrong ones
-    net.measure(moved)
+    net.standardise_by(moved)
     assert network_scores(net, moved) == pytest.approx(scores, abs=1e-4)
 
 
@@ -394,7 +397,7 @@ def test_scaled_inputs_measured_anew_give_the_same_scores(scale, shift):
 def test_a_constant_input_is_only_centred(level, count):
     layer = Standardise(2, 0)
     values = np.stack([np.full(count, level), np.arange(count) % 2], axis=1).astype(np.float32)
-    layer.measure(values)
+    layer.standardise_by(values)
     result = layer(torch.from_numpy(values))
     assert torch.isfinite(result).all()
     assert result[:, 0].abs().max() < 1e-3
@@ -402,7 +405,7 @@ def test_a_constant_input_is_only_centred(level, count):
 
 def test_an_outlier_is_clipped_to_very_much():
     layer = Standardise(1, 0)
-    layer.measure(np.array([[-1.0], [1.0]], np.float32))
+    layer.standardise_by(np.array([[-1.0], [1.0]], np.float32))
     assert layer(torch.tensor([[3.0], [1e30]])).tolist() == [[3.0], [8.0]]
 
 
@@ -448,8 +451,13 @@ def test_the_mirror_turns_some_records_whole_and_leaves_the_others():
 
 def _refuse_network(change):
     inputs, y = _spectra(60, 1)
-    arguments = {"inputs": inputs, "y": y, "validation": (dict(inputs), y), "seed": 0, "epochs": 1} | change(inputs, y)
-    train_network(SpectrumNet(SHAPES, seed=0), **arguments)
+    lessons, validation, course = {"inputs": inputs, "labels": y}, (dict(inputs), y), {"epochs": 1}
+    for name, value in change(inputs, y).items():
+        if name == "validation":
+            validation = value
+        else:
+            (lessons if name in ("inputs", "labels", "kinds", "teacher") else course)[name] = value
+    train_network(SpectrumNet(SHAPES, seed=0), Lessons(**lessons), validation, Course(**course), seed=0)
 
 
 @pytest.mark.parametrize(
@@ -459,8 +467,8 @@ def _refuse_network(change):
         (lambda x, y: {"inputs": x | {"features": x["features"][:, 1:]}}, r"has shape \(60, 3\); it must be \(n, 4,"),
         (lambda x, y: {"inputs": x | {"features": x["features"][1:]}}, r"\[59, 60\] records"),
         (lambda x, y: {"inputs": x | {"features": x["features"] * np.float32("nan")}}, r"'features'\[0, 0\] is nan"),
-        (lambda x, y: {"y": y[1:]}, r"y has shape \(59,\)"),
-        (lambda x, y: {"y": y % 2}, "each needs 2"),
+        (lambda x, y: {"labels": y[1:]}, r"labels has shape \(59,\)"),
+        (lambda x, y: {"labels": y % 2}, "each needs 2"),
         (lambda x, y: {"validation": (x, y + 1)}, "validation labels holds the label 3"),
         (lambda x, y: {"epochs": 0}, "epochs is 0"),
         (lambda x, y: {"kinds": y[1:]}, r"kinds is int64 of shape \(59,\)"),

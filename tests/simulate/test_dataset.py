@@ -95,10 +95,10 @@ def test_powers_are_those_drawn():
     micro, body = (rng.normal(size=(5, 999)) + 1j * rng.normal(size=(5, 999)) for _ in range(2))
     snr_db = np.array([-20.0, -3, 0, 10, 30])
     target = Target(micro.astype(np.complex64), body_db=np.full(5, 12.0), body=0 * body.astype(np.complex64))
-    power = np.mean(abs(dataset_module._powered(target, snr_db)) ** 2, axis=1)
+    power = np.mean(abs(dataset_module.powered(target, snr_db)) ** 2, axis=1)
     np.testing.assert_allclose(10 * np.log10(power), snr_db, atol=1e-3)
     target = Target(0 * micro.astype(np.complex64), body.astype(np.complex64), np.full(5, 12.0))
-    power = np.mean(abs(dataset_module._powered(target, snr_db)) ** 2, axis=1)
+    power = np.mean(abs(dataset_module.powered(target, snr_db)) ** 2, axis=1)
     np.testing.assert_allclose(10 * np.log10(power), snr_db + 12, atol=1e-3)
 
 

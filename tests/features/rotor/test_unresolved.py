@@ -154,3 +154,13 @@ def test_many_blades_that_reflect_at_their_tips_are_one_rotor(blades):
         assert found.rotors_resolved
         assert found.chopping_hz == pytest.approx(blades * rate_hz, rel=1e-3)
         assert found.tip_speed_mps == pytest.approx(2 * np.pi * rate_hz * 0.15, rel=5e-3)
+
+
+@pytest.mark.parametrize("index", [14, 18])
+def test_a_tone_that_swings_is_one_comb_without_a_band(index):
+    """No edge is told, and no line is left of blades whose tips have no speed (a warning is an error here)."""
+    swing = np.exp(1j * index * np.sin(2 * np.pi * 0.0134 * np.arange(240)))
+    found = measure(swing.astype(np.complex64), carrier_hz=480e6, prf_hz=36e3)
+    assert found.chopping_hz == pytest.approx(0.0134 * 36e3, rel=1e-3)
+    assert np.isnan(found.bandwidth_hz)
+    assert found.band_reason

@@ -1,4 +1,4 @@
-"""Bounds on what is read and asked for: what a file may hold, what a packed one may unpack to, the fewest records."""
+"""Limits of what is read and asked for: what a file may hold, what a packed one may unpack to, the fewest records."""
 
 import bz2
 import io
@@ -93,15 +93,16 @@ def unpacked(path: Path) -> bytes | None:
     Exception
         What the decompressors raise for a damaged one.
     """
-    packed = path.read_bytes()
+    with open(path, "rb") as file:
+        head = file.read(6)
     for magic, make in (
         (b"\x1f\x8b", lambda: zlib.decompressobj(zlib.MAX_WBITS | 16)),
         (b"BZh", bz2.BZ2Decompressor),
         (b"\xfd7zXZ\x00", lambda: lzma.LZMADecompressor(memlimit=_LZMA_BYTES)),
     ):
-        if packed.startswith(magic):
+        if head.startswith(magic):
             out = io.BytesIO()
-            for part in _stream(make(), packed):
+            for part in _stream(make(), path.read_bytes()):
                 out.write(part)
                 require_unpacked(path, out.tell())
             return out.getvalue()
