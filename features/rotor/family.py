@@ -27,8 +27,8 @@ from .weak_lines import by_rotation, without_weak_lines
 SEVERAL_GAIN, BELIEVED_GAIN = 1.0, 1.5
 
 #: A gain over the dwell is that of all lines where it explains so much of what one comb leaves, and of what all rotors
-#: found leave, which two nearer than the dwell tells apart come to a twentieth of. It is taken out so many times, each.
-ONE_GAIN_SHARE, GAIN_SHARE, GAIN_STEPS = 0.3, 0.05, 2
+#: found leave, which two nearer than the dwell tells apart come to 0.05 of. It is taken out so many times, each.
+ONE_GAIN_SHARE, GAIN_SHARE, GAIN_STEPS = 0.3, 0.08, 2
 
 #: Lines that swell and fall pass for two rotors whose outermost lines are so near to one another, at most [bins].
 TWIN_BINS = 1.5

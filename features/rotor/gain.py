@@ -17,8 +17,8 @@ from ..spectrum import Spectrum
 from .comb_fit import CombFit, fit_combs
 from .periodogram import Periodogram, prepared
 
-#: The gain is a sum of Legendre polynomials in time up to this degree, and of no more than a rotor has half flashes.
-DEGREE = 6
+#: The gain is a sum of Legendre polynomials in time up to this degree, and to this share of the flashes in the dwell.
+DEGREE, FLASH_SHARE = 8, 0.75
 
 #: What the lines explain more by it is no chance from so many nats on.
 LEAST_NATS = 40.0
@@ -50,7 +50,7 @@ def gain_left(data: Periodogram, rest: NDArray[np.complex128], chopping: float) 
         Share of the power left, without the noise, that it explains, 0 to 1; 0 where it may be chance.
     """
     pulses = data.pulses
-    degree = min(DEGREE, int(chopping * pulses / 2))
+    degree = min(DEGREE, int(FLASH_SHARE * chopping * pulses))
     shapes = np.polynomial.legendre.legvander(2 * middle_times(pulses) / pulses, degree).T
     lines = data.samples - rest
     seen = shapes @ (lines.conj() * data.samples).real

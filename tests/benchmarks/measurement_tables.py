@@ -18,6 +18,7 @@ from bladewing.simulate import Radar
 from bladewing.simulate.dataset import draw_target, powered
 from bladewing.simulate.laws import WIDTH, Draws
 from bladewing.simulate.receiver import FAULT_CHANCE, Receiver
+from numpy.typing import ArrayLike
 from scipy.stats import chi2
 
 from . import records
@@ -193,28 +194,54 @@ def drifting(draws: int) -> None:
 def changing(draws: int) -> None:
     """Four rotors at least 20 rpm apart whose rates change, each in its own way: told apart, rates and deviations."""
     print(f"four rotors in 3395 to 3500 rpm, at least 20 rpm apart, {draws} draws a row: each changes by up to so much")
-    print("change     SNR | all four, resolved   wrong | within 0.2 %           normalised variance     ms")
+    print(f"change     SNR | {_TOLD_APART}")
     for change, snr_db in product((0.0, 0.003, 0.01, 0.02), (0, 10, 20)):
         rng = np.random.default_rng(int(1000 * change) + snr_db + 7)
-        told, wrong, near, off, took = [], 0, [], [], 0.0
-        for _ in range(draws):
-            rates_hz = records.apart(rng, 4, 20, 3395, 3500) / 60
-            options = {"snr_db": snr_db, "body_db": 20, "velocity_mps": rng.uniform(-30, 30)}
-            iq = records.record(rng, rates_hz, change=change * rng.uniform(-1, 1, 4), **options)
-            start = thread_time()
-            found = measure(iq, **records.RADAR)
-            took += thread_time() - start
-            told.append(found.rotors_resolved and found.rotor_count == 4)
-            wrong += bool(found.rotors_resolved and found.rotor_count != 4)
-            if told[-1]:
-                away = found.rotor_rates_hz[:4] - 2 * rates_hz
-                near.append(np.abs(away / rates_hz / 2).max() < 2e-3)
-                off += list(away / found.rotor_rates_hz_std[:4])
-        print(
-            f"{100 * change:4.1f} % {snr_db:4d} dB | {share(np.array(told))}   {wrong:3d} | {share(np.array(near))}  "
-            f"{variance(np.array(off))}  {1e3 * took / draws:5.0f}",
-            flush=True,
-        )
+        row = _told_apart(draws, rng, 4, snr_db, lambda rng, c=change: {"change": c * rng.uniform(-1, 1, 4)})
+        print(f"{100 * change:4.1f} % {snr_db:4d} dB | {row}", flush=True)
+
+
+def gains(draws: int) -> None:
+    """Rotors whose echo swells and falls over the dwell: counted, rates and deviations."""
+    print(f"rotors in 3395 to 3500 rpm, at least 20 rpm apart, seen through a gain over the dwell, {draws} draws a row")
+    print(f"rotors  gain             SNR | {_TOLD_APART}")
+    for count, (name, gain), snr_db in product((1, 4), records.GAINS.items(), (0, 10, 20)):
+        rng = np.random.default_rng(100 * count + snr_db + 7)
+        row = _told_apart(draws, rng, count, snr_db, lambda _, gain=gain: {"gain": gain})
+        print(f"{count:6d}  {name:13s} {snr_db:4d} dB | {row}", flush=True)
+
+
+_TOLD_APART = "all of them, resolved  wrong | within 0.2 %           normalised variance     ms"
+
+
+def _told_apart(
+    draws: int,
+    rng: np.random.Generator,
+    count: int,
+    snr_db: float,
+    drawn: Callable[[np.random.Generator], dict[str, ArrayLike]],
+) -> str:
+    """How often so many rotors are told apart in records with some options drawn for each, and how well."""
+    told, wrong, near, off, took = [], 0, [], [], 0.0
+    for _ in range(draws):
+        rates_hz = (records.apart(rng, count, 20, 3395, 3500) if count > 1 else rng.uniform(3395, 3500, 1)) / 60
+        options = {"snr_db": snr_db, "body_db": 20, "velocity_mps": rng.uniform(-30, 30)}
+        iq = records.record(rng, rates_hz, **drawn(rng), **options)
+        start = thread_time()
+        found = measure(iq, **records.RADAR)
+        took += thread_time() - start
+        told.append(found.rotors_resolved and found.rotor_count == count)
+        wrong += bool(found.rotors_resolved and found.rotor_count != count)
+        if told[-1]:
+            away = found.rotor_rates_hz[:count] - 2 * rates_hz
+            near.append(np.abs(away / rates_hz / 2).max() < 2e-3)
+            off += list(away / found.rotor_rates_hz_std[:count])
+    if not off:
+        return f"{share(np.array(told))}   {wrong:3d} | {1e3 * took / draws:59.0f}"
+    return (
+        f"{share(np.array(told))}   {wrong:3d} | {share(np.array(near))}  {variance(np.array(off))}  "
+        f"{1e3 * took / draws:5.0f}"
+    )
 
 
 def near_rotors(draws: int) -> None:
@@ -446,6 +473,7 @@ TABLES = {
     "near-rotors": near_rotors,
     "drifting": drifting,
     "changing": changing,
+    "gains": gains,
     "receivers": receivers,
     "random-rotors": random_rotors,
     "helicopters": helicopters,

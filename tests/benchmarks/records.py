@@ -9,6 +9,21 @@ RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 WAVELENGTH_M = 299_792_458.0 / CARRIER_HZ
 TIMES_S = np.arange(PULSES) / PRF_HZ
 
+_AWAY = np.linspace(-1, 1, PULSES)  # from the middle of the dwell
+
+#: Gains over the dwell of a target's echo, of power 1 on average: a beam that sweeps past, whose middle may lie
+#: elsewhere, a range cell that is entered and left, two paths that fade.
+GAINS = {
+    name: gain / np.sqrt(np.mean(gain**2))
+    for name, gain in {
+        "beam": 10 ** (-6 / 20 * _AWAY**2),
+        "beam, late": 10 ** (-8 / 20 * (_AWAY - 0.5) ** 2),
+        "narrow beam": 10 ** (-25 / 20 * _AWAY**2),
+        "cell": np.cos(np.pi / 2 * 0.95 * _AWAY) ** 2,
+        "fading": 1 + 0.6 * np.cos(2 * np.pi * 0.8 * _AWAY + 1.0),
+    }.items()
+}
+
 
 def white(rng: np.random.Generator, *shape: int) -> np.ndarray:
     """Complex noise of unit power a sample."""

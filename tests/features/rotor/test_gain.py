@@ -15,23 +15,9 @@ from ..signals import CARRIER_HZ, PRF_HZ, PULSES, family_of, white
 
 AWAY = np.linspace(-1, 1, PULSES)  # from the middle of the dwell
 
-#: What a target's echo goes through: a beam that sweeps past, whose middle may lie elsewhere, a range cell that is
-#: entered and left, two paths that fade.
-GAINS = {
-    "beam": 10 ** (-6 / 20 * AWAY**2),
-    "beam, late": 10 ** (-8 / 20 * (AWAY - 0.5) ** 2),
-    "narrow beam": 10 ** (-25 / 20 * AWAY**2),
-    "cell": np.cos(np.pi / 2 * 0.95 * AWAY) ** 2,
-    "fading": 1 + 0.6 * np.cos(2 * np.pi * 0.8 * AWAY + 1.0),
-}
-
-
-def even_power(gain: np.ndarray) -> np.ndarray:
-    return gain / np.sqrt(np.mean(gain**2))
-
 
 @pytest.mark.parametrize("snr_db", [0.0, 20.0])
-@pytest.mark.parametrize("gain", GAINS)
+@pytest.mark.parametrize("gain", records.GAINS)
 def test_a_rotor_whose_echo_swells_and_falls_is_one_rotor(gain, snr_db):
     """Nearly none of these were told apart at 20 dB, and some became several rotors that were called resolved."""
     right, tips, off = 0, 0, []
@@ -39,9 +25,7 @@ def test_a_rotor_whose_echo_swells_and_falls_is_one_rotor(gain, snr_db):
         rng = np.random.default_rng(seed)
         rate_hz = rng.uniform(45, 75)
         options = {"snr_db": snr_db, "body_db": 10, "velocity_mps": rng.uniform(-25, 25)}
-        found = measure(
-            records.record(rng, np.array([rate_hz]), gain=even_power(GAINS[gain]), **options), **records.RADAR
-        )
+        found = measure(records.record(rng, np.array([rate_hz]), gain=records.GAINS[gain], **options), **records.RADAR)
         right += bool(found.rotors_resolved) and found.rotor_count == 1
         off.append((found.chopping_hz - 2 * rate_hz) / found.chopping_hz_std)
         assert found.body_velocity_mps == pytest.approx(options["velocity_mps"], abs=0.02)
@@ -57,7 +41,7 @@ def test_four_rotors_in_a_beam_that_sweeps_past_are_four(snr_db):
         rng = np.random.default_rng(seed)
         rates_hz = records.apart(rng, 4, 20, 3395, 3500) / 60
         options = {"snr_db": snr_db, "body_db": 10, "velocity_mps": rng.uniform(-25, 25)}
-        found = measure(records.record(rng, rates_hz, gain=even_power(GAINS["beam"]), **options), **records.RADAR)
+        found = measure(records.record(rng, rates_hz, gain=records.GAINS["beam"], **options), **records.RADAR)
         assert found.rotors_resolved
         assert found.rotor_count == 4
         np.testing.assert_allclose(found.rotor_rates_hz[:4], 2 * rates_hz, rtol=2e-3)
@@ -70,7 +54,7 @@ def test_a_rate_that_changes_in_a_beam_that_sweeps_past_is_told():
         rate_hz, change = rng.uniform(45, 75), rng.choice([-0.01, 0.02])
         options = {"snr_db": 15.0, "body_db": 10, "velocity_mps": rng.uniform(-25, 25), "change": change}
         found = measure(
-            records.record(rng, np.array([rate_hz]), gain=even_power(GAINS["beam"]), **options), **records.RADAR
+            records.record(rng, np.array([rate_hz]), gain=records.GAINS["beam"], **options), **records.RADAR
         )
         drift_hz_per_s = 2 * rate_hz * change * PRF_HZ / PULSES
         right += found.rotor_count == 1 and abs(found.chopping_drift_hz_per_s / drift_hz_per_s - 1) < 0.02
@@ -80,7 +64,7 @@ def test_a_rate_that_changes_in_a_beam_that_sweeps_past_is_told():
 @pytest.mark.parametrize("name", ["beam", "beam, late", "narrow beam", "cell"])
 def test_the_gain_of_lines_is_what_they_were_multiplied_by(name):
     """As a factor on lines that are known; it explains all that steady ones of the same mean leave."""
-    gain = GAINS[name] / GAINS[name].mean()
+    gain = records.GAINS[name] / records.GAINS[name].mean()
     iq = records.record(np.random.default_rng(1), np.array([57.0]), snr_db=60, body_db=-90, velocity_mps=0.0)
     data, _ = family_of(iq)
     lines, power = data.samples, np.abs(data.samples) ** 2
@@ -114,7 +98,7 @@ def test_noise_is_no_gain():
 def test_what_was_evened_has_lines_of_one_strength_and_says_how_loud_its_ends_are():
     rng = np.random.default_rng(4)
     time_s = np.arange(PULSES) / PRF_HZ
-    gain = np.maximum(GAINS["beam"], LEAST_GAIN)
+    gain = np.maximum(records.GAINS["beam"], LEAST_GAIN)
     line = 10 * np.exp(2j * np.pi * 5000 * time_s)
     iq = (line * gain + white(rng, PULSES)).astype(np.complex64)
     spectrum = doppler_spectrum(iq, carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
@@ -134,7 +118,7 @@ def test_rates_in_a_beam_have_true_deviations():
         rng = np.random.default_rng(seed)
         rate_hz = rng.uniform(50, 60)
         options = {"snr_db": 10.0, "body_db": 10, "velocity_mps": rng.uniform(-25, 25)}
-        gain = even_power(10 ** (-14 / 20 * AWAY**2))
+        gain = 10 ** (-14 / 20 * AWAY**2)
         found = measure(records.record(rng, np.array([rate_hz]), gain=gain, **options), **records.RADAR)
         off.append((found.chopping_hz - 2 * rate_hz) / found.chopping_hz_std)
     assert 0.55 < np.mean(np.square(off)) < 1.6  # chi square of 40: 0.1 % to either side
