@@ -21,7 +21,7 @@ from .periodogram import Periodogram, prepared
 DEGREE, FLASH_SHARE = 8, 0.75
 
 #: What the lines explain more by it is no chance from so many nats on.
-LEAST_NATS = 40.0
+LEAST_NATS = 15.0
 
 #: Nowhere is it taken to be below this share of its mean.
 LEAST_GAIN = 0.1
