@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
 from ..bodies import LINE_DB
 from .comb_search import FINE_STEPS, Candidate, even_scores
@@ -14,6 +15,9 @@ from .periodogram import Periodogram
 #: beyond. Blades may be the stronger: then their outermost lines are, and say nothing of the body.
 STRONG_LINE, STRONG_OVER_DB = 10.0, 6.0
 STRONG_LINE_DB = 1.0
+
+#: A line that speaks for so much tells the body: one-sided lines about it must not outvote it [nats].
+TELLS = 5.0
 
 #: Counted from its outermost line, a family that takes up most of the unambiguous span reaches around all of it but for
 #: so many orders.
@@ -34,6 +38,13 @@ UNRELATED = np.pi**2 / 3
 #: A family goes on over so many orders that do not show. So far about the middle of its ends [orders] the one about
 #: which it is even is sought.
 ENDS_GAP, MIDDLE_REACH = 2, 3
+
+#: Where no line tells the body, what shows so many times over the level is compared with its mirror image about each
+#: order, twice as far from that as so many bins of the padded spectrum too; a line and its image take up so many.
+SHOWS, BESIDE, PAIR_BINS = 3.0, 8, 12
+
+#: So many orders about which all is most even are tried.
+EVENEST = 8
 
 #: What speaks for the order at rest at most where a background lies there, and more where no line that moves is as
 #: strong as a body's [nats]: a background is strong whatever hovers in it, and a line of the comb comes as near to it
@@ -101,9 +112,11 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
                     found.score,
                 )
     chosen = round((best.centre - found.centre) / found.spacing)
-    others = np.setdiff1d(chosen + np.arange(-NEAR_ORDERS, NEAR_ORDERS + 1), list(totals))
+    near = chosen + np.arange(-NEAR_ORDERS, NEAR_ORDERS + 1)
+    others = np.setdiff1d(np.append(near, list(even)).astype(np.intp), list(totals))
     places = best.centre + best.spacing * (others - chosen)
     scores, _ = even_scores(evidence, np.full(len(others), best.spacing), places, furthest)
+    scores += [even.get(int(order), 0.0) for order in others]
     away = np.append(others, list(totals)) - chosen
     likely = np.exp(np.append(scores, list(totals.values())) - most)
     likely[likely < np.exp(-OPEN_NATS)] = 0.0
@@ -165,11 +178,6 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
     power = data.at(places) * data.level_at(places) * data.usable(places)
     power *= _stands_out(data, places, power)
     highest_db = 10 * float(np.log10(power.max(initial=1.0)))
-    even: dict[int, float] = {}
-    if highest_db > CLEAR_DB and not found.is_folded:  # on both sides of any line there are those of the other end
-        unlikely, most_even = _even_orders(data, found, 10 ** ((highest_db - ENDS_DB) / 10))
-        even = {order: most_even - nats for order, nats in unlikely.items() if nats < most_even}
-        out += [(found.centre + found.spacing * order, 0.0) for order in even]
     others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
     moving = 0.0
     centres, levels = data.strong.centres, data.strong.centres_db
@@ -198,10 +206,45 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
         off = (orders - round(orders)) * found.spacing * data.pulses / (1 + 0.2 * from_middle)
         if abs(off) < 1.5 and level_db > LINE_DB:
             out.append((centre, nats - 16 * off**2))
+    even: dict[int, float] = {}
+    if not found.is_folded:  # on both sides of any line there are those of the other end
+        if max(nats for _, nats in out) < TELLS:
+            even = _mirrored(data, found)
+        if highest_db > CLEAR_DB:
+            about = max(even, key=even.__getitem__, default=0)
+            shifted = replace(
+                found, centre=found.centre + found.spacing * about, low=found.low - about, high=found.high - about
+            )
+            unlikely, most_even = _even_orders(data, shifted, 10 ** ((highest_db - ENDS_DB) / 10))
+            even |= {about + order: most_even - nats for order, nats in unlikely.items() if nats < most_even}
+        evenest = sorted(even, key=even.__getitem__)[-EVENEST:]
+        out += [(found.centre + found.spacing * order, 0.0) for order in evenest]
     most: dict[float, float] = {}
     for place, nats in out:  # a place may come in twice, as a line's and as one that hides
         most[place] = max(most.get(place, -np.inf), nats)
     return most, even
+
+
+def _mirrored(data: Periodogram, found: Candidate) -> dict[int, float]:
+    """What speaks for each order of a comb by how even all that shows is about it: 0 for the evenest [nats].
+
+    Lines of several rotors too lie where their mirror images about the body do, and noise past an end of the comb has
+    none. All orders are compared at once: what a spectrum has in common with its mirror image is its own convolution.
+    """
+    shows = np.log(np.maximum(data.power * data.seen / SHOWS, 1))
+    size, spectrum = len(shows), fft.rfft(shows)
+    order = np.arange(found.low, found.high + 1)
+    places = found.centre + found.spacing * order
+    sums = np.rint(2 * places * size).astype(np.intp)[:, None] + np.arange(-BESIDE, BESIDE + 1)
+    alike = fft.irfft(spectrum**2, size)[sums % size].max(axis=1)
+    pairs = max(np.count_nonzero(shows) / PAIR_BINS, 1)
+    unlikely = pairs / 2 * np.log(2 * ((shows**2).sum() - alike) / pairs + LEAST_UNEVEN)
+    # about the place across the circle all is as even, but less of it is near
+    across = round(0.5 / found.spacing)
+    both = (order - across >= found.low) | (order + across <= found.high)
+    middle = np.exp(2j * np.pi * np.flatnonzero(shows) / size).sum()
+    unlikely += EVEN * (both & ((middle * np.exp(-2j * np.pi * places)).real < 0))
+    return dict(zip(order.tolist(), (unlikely.min() - unlikely).tolist(), strict=True))
 
 
 def _even_orders(data: Periodogram, found: Candidate, least: float) -> tuple[dict[int, float], float]:

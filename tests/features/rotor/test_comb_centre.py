@@ -126,3 +126,55 @@ def test_a_weaker_echo_that_moves_is_not_a_hovering_drones_body(second_db):
         found = measure(drone + other + signals.white(rng, signals.PULSES), carrier_hz=9.85e9, prf_hz=signals.PRF_HZ)
         off += not abs(found.body_velocity_mps) < 0.1
     assert off <= 1  # where a line of the comb lies at the other echo by chance it may be the body's
+
+
+def without(iq: np.ndarray, filtered: str) -> np.ndarray:
+    """A record whose echoes at rest a filter took out, the body of what hovers among them."""
+    if filtered == "mean":
+        return iq - iq.mean()
+    if filtered == "two pulses":
+        return np.diff(iq)
+    spectrum = np.fft.fft(iq)
+    spectrum[np.abs(np.fft.fftfreq(len(iq), 1 / signals.PRF_HZ)) < 100.0] = 0
+    return np.fft.ifft(spectrum)
+
+
+@pytest.mark.parametrize("filtered", ["mean", "high pass", "two pulses"])
+@pytest.mark.parametrize(
+    ("draws", "count", "lengths_m", "rates_hz"),
+    [(12, 1, (0.1, 0.2), (45, 100)), (6, 4, (0.1, 0.2), (60, 75)), (6, 1, (0.3, 0.4), (75, 90))],
+)
+def test_a_body_that_was_filtered_out_is_where_its_lines_are_even(filtered, draws, count, lengths_m, rates_hz):
+    # taken was the middle of what noise past an end had stretched: of one rotor 1 in 12 was wrong and sure, 7 unsure,
+    # of four two in three unsure, and with tips past a quarter of the span 5 in 6 wrong and sure, by up to 140 m/s
+    rng, wrong, unsure, tip_wrong = np.random.default_rng(7), 0, 0, 0
+    times_s = np.arange(signals.PULSES + 1) / signals.PRF_HZ
+    for _ in range(draws):
+        length_m, rates = rng.uniform(*lengths_m), rng.uniform(*rates_hz, size=count)
+        lines = signals.rotors_by_chance(rng, rates, times_s, wavelength_m=signals.WAVELENGTH_M, length_m=length_m)
+        iq = without(np.sqrt(10) * (lines + 10.0) + signals.white(rng, len(times_s)), filtered)
+        found = measure(iq, carrier_hz=signals.CARRIER_HZ, prf_hz=signals.PRF_HZ, blades=2, beta_rad=0.0)
+        off_mps, tip_mps = abs(found.body_velocity_mps), 2 * np.pi * rates.max() * length_m
+        wrong += bool(off_mps > max(4 * found.body_velocity_mps_std, 0.1))
+        unsure += bool(found.body_velocity_mps_std > 0.5)
+        tip_off_mps = abs(found.tip_speed_mps - tip_mps)
+        tip_wrong += bool(tip_off_mps > max(4 * found.tip_speed_mps_std, 0.05 * tip_mps))
+    assert wrong == 0
+    assert unsure <= draws // 3
+    assert tip_wrong <= 1
+
+
+def test_one_sided_lines_do_not_outvote_a_line_that_stands_out():
+    # a blade that shows where it comes nearer alone has lines on one side of the body, even about their own middle
+    rng, times_s, wrong = np.random.default_rng(3), np.arange(signals.PULSES) / signals.PRF_HZ, 0
+    for _ in range(20):
+        rate_hz, velocity_mps = rng.uniform(50, 90), rng.uniform(-30, 30)
+        angle_rad = 2 * np.pi * rate_hz * times_s + rng.uniform(0, np.pi)
+        away = 2 * 0.15 / signals.WAVELENGTH_M * np.cos(angle_rad)  # of the blade's middle, in turns of the phase
+        one, other = np.sinc(away) * np.exp(2j * np.pi * np.outer([1, -1], away / 2))
+        lines = np.where(np.sin(angle_rad) > 0, one + 0.2 * other, 0.2 * one + other)
+        lines = (lines - lines.mean()) / lines.std() + 10 ** (-5 / 20)
+        iq = 2 * lines * signals.tone(-2 * velocity_mps / signals.WAVELENGTH_M) + signals.white(rng, signals.PULSES)
+        found = measure(iq, carrier_hz=signals.CARRIER_HZ, prf_hz=signals.PRF_HZ, blades=2)
+        wrong += bool(abs(found.body_velocity_mps - velocity_mps) > max(4 * found.body_velocity_mps_std, 0.1))
+    assert wrong == 0
