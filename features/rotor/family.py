@@ -10,7 +10,7 @@ from ..lines import squared
 from ..spectrum import Spectrum
 from .changing import ChangingSeparation, may_be_sought
 from .changing_fit import ChangingFit, Start, fit_changing
-from .comb import LEAST_REACH_MPS, MOST_BLADES, OVER_BODY, Comb, find_comb, is_short
+from .comb import LEAST_REACH_MPS, MOST_BLADES, OVER_BODY, Comb, find_comb, is_short, span_too_slow
 from .comb_fit import CombFit
 from .drift import Straightened, ahead_left, straightened
 from .family_edge import edge_around, edge_of_lines, span_of
@@ -99,7 +99,8 @@ def slower_than_rotors(data: Periodogram, edge: float, edge_std: float) -> str:
     """Why a line family of this edge [cycles a sample] is no rotor's; empty where it may be one's."""
     edge_mps, edge_std_mps = (value * data.span_mps for value in (edge, edge_std))
     if edge_mps + edge_std_mps < LEAST_REACH_MPS:
-        return f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
+        reason = f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
+        return span_too_slow(data) or reason
     return ""
 
 
