@@ -12,7 +12,7 @@ from .body_velocity import body_velocity, folded
 from .chopping import Chopping
 from .measurements import BODY, EACH_ROTOR, Measurements
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
-from .rotor.family import Family, as_wheels, find_family, slower_than_rotors, too_few_flashes
+from .rotor.family import Family, as_wheels, by_turns, find_family, slower_than_rotors, too_few_flashes
 from .rotor.family_edge import SPAN, edge_around, edge_of_lines, span_of, surer_edge
 from .rotor.folding import FASTEST_TIP_MPS, fastest_tip
 from .rotor.periodogram import prepared
@@ -83,6 +83,7 @@ def measure_record(
     out |= {"reason": as_wheels(family.data, edge[0], velocity[0])} | _named(BODY, velocity)
     if out["reason"]:
         return out
+    family = by_turns(family, blades)
     out |= _turning(family) | _geared(family)
     out |= _band(family, edge, beta_rad)
     out |= _blade(family, out, blades)
@@ -199,7 +200,7 @@ def _blade(family: Family, found: dict[str, Any], blades: int | None) -> dict[st
     comb, rates = family.comb, family.rotors.rates
     # unequal blades tell their number; between the lines of several rotors the weak ones may be something else
     known = blades if blades is not None or len(rates) > 1 or not comb.blades_sure else comb.blades
-    if known is None:
+    if known is None or (known > 1 and family.may_be_turn):
         return {}
     tip, tip_std = found["tip_speed_mps"], found["tip_speed_mps_std"]
     length = tip / (2 * np.pi * float(rates.max()) * family.data.prf_hz / known)  # the edge is the fastest rotor's

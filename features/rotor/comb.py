@@ -256,6 +256,18 @@ def _too_short(data: Periodogram) -> str:
     return f"dwell too short: no chopping frequency can be told in less than {1e3 * least_s:.1f} ms at this PRF"
 
 
+def span_too_slow(data: Periodogram) -> str:
+    """Why no line can be seen to reach as far as a rotor's: they come back from the other end of the span; or empty."""
+    unambiguous_mps = data.span_mps / 2
+    if unambiguous_mps >= LEAST_REACH_MPS:
+        return ""
+    least_hz = data.prf_hz * LEAST_REACH_MPS / unambiguous_mps
+    return (
+        f"PRF too low: velocities are told to {unambiguous_mps:.1f} m/s, rotors' lines reach {LEAST_REACH_MPS:.0f} m/s "
+        f"and more: raise it to {least_hz / 1e3:.1f} kHz at least"
+    )
+
+
 def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None, str]:
     """Find the comb of a record.
 
@@ -285,7 +297,8 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     fit = fitted[0][0]
     reach_mps = max(start.high, -start.low) * fit.spacing * data.span_mps
     if reach_mps < LEAST_REACH_MPS:
-        return None, f"no rotor: lines reach {reach_mps:.1f} m/s, rotors {LEAST_REACH_MPS:.0f} m/s and more"
+        reason = f"no rotor: lines reach {reach_mps:.1f} m/s, rotors {LEAST_REACH_MPS:.0f} m/s and more"
+        return None, span_too_slow(data) or reason
     finer = finer_spacing(data, fit)
     if finer is not None:
         least_s = MIN_SPACING_BINS / finer / data.prf_hz

@@ -10,10 +10,11 @@ from ..lines import squared
 from ..spectrum import Spectrum
 from .changing import ChangingSeparation, may_be_sought
 from .changing_fit import ChangingFit, Start, fit_changing
-from .comb import LEAST_REACH_MPS, OVER_BODY, Comb, find_comb, is_short
+from .comb import LEAST_REACH_MPS, MOST_BLADES, OVER_BODY, Comb, find_comb, is_short, span_too_slow
 from .comb_fit import CombFit
 from .drift import Straightened, ahead_left, straightened
 from .family_edge import edge_around, edge_of_lines, span_of
+from .flash_count import flashes_in_period
 from .gain import Evened
 from .helicopter import Gear, find_gear
 from .periodogram import Level, Periodogram, prepared
@@ -74,6 +75,8 @@ class Family:
     ahead : (ndarray, ndarray) or None
         How far ahead of an even rotor each is, by the polynomials of `DEGREES`, and standard deviations, shape
         (rotors, degrees) [samples]; None where they are not told apart.
+    may_be_turn : bool
+        True where the chopping frequency may be the rotation rate of unlike blades.
     """
 
     data: Periodogram
@@ -85,6 +88,7 @@ class Family:
     rotors: Rotors
     gear_reason: str
     ahead: tuple[NDArray[np.float64], NDArray[np.float64]] | None
+    may_be_turn: bool = False
 
     @property
     def is_told_apart(self) -> bool:
@@ -103,7 +107,8 @@ def slower_than_rotors(data: Periodogram, edge: float, edge_std: float) -> str:
     """Why a line family of this edge [cycles a sample] is no rotor's; empty where it may be one's."""
     edge_mps, edge_std_mps = (value * data.span_mps for value in (edge, edge_std))
     if edge_mps + edge_std_mps < LEAST_REACH_MPS:
-        return f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
+        reason = f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
+        return span_too_slow(data) or reason
     return ""
 
 
@@ -132,6 +137,28 @@ def too_few_flashes(family: Family) -> str:
         f"dwell too short: lines about {chopping * data.prf_hz:.0f} Hz apart are not one rotor's, "
         f"to tell what they are takes {1e3 * LEAST_FLASHES / chopping / data.prf_hz:.0f} ms at least"
     )
+
+
+def by_turns(family: Family, blades: int | None) -> Family:
+    """A lone rotor's family, its comb counted in turns where its blades flash one after another: it is that of a turn.
+
+    Parameters
+    ----------
+    family : Family
+        From `find_family`.
+    blades : int, optional
+        Of a rotor: those that are alike flash together.
+    """
+    comb, rotors = family.comb, family.rotors
+    if family.gear is not None or len(rotors.rates) > 1 or comb.blades > 1 or family.data.one_channel:
+        return family
+    numbers = [number for number in range(2, (blades or MOST_BLADES) + 1) if not (blades or 0) % number]
+    number, is_sure = flashes_in_period(comb.fit, numbers, min(family.edge, 0.5) / comb.fit.spacing)
+    if number == 1 or not is_sure:
+        return replace(family, may_be_turn=number > 1)
+    turned = replace(comb, per_turn=number, blades=number, blades_sure=True)
+    rates, stds, spread = number * rotors.rates, number * rotors.stds, number * rotors.spread
+    return replace(family, comb=turned, rotors=replace(rotors, rates=rates, stds=stds, spread=spread))
 
 
 def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None) -> tuple[Family | None, str]:

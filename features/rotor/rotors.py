@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..bodies import LINE_DB
 from ..lines import squared
-from .comb import MOST_BLADES, Comb, strong_multiple
+from .comb import MOST_BLADES, UNEQUAL_FACTOR, Comb, strong_multiple
 from .comb_fit import CombFit, fit_combs
 from .comb_search import even_scores
 from .flashes import flash_nats
@@ -142,11 +142,10 @@ def _is_between(rest: Periodogram, centre: float, rate: float, fits: Sequence[Co
     return False
 
 
-def _holds_another(fit: CombFit, pulses: int) -> bool:
-    """True where only every so many-th line of a comb is there: a tail rotor's, whose rate is that multiple."""
-    return (
-        strong_multiple(fit.orders, 1 + pulses * np.abs(fit.amplitudes) ** 2, range(2, MOST_GEAR + 1), GEAR_FACTOR) > 1
-    )
+def _lines_apart(fit: CombFit, pulses: int, factor: float) -> int:
+    """Every how many-th line of a comb is there: of more than one, another rotor's, whose rate is that multiple."""
+    power = 1 + pulses * np.abs(fit.amplitudes) ** 2
+    return strong_multiple(fit.orders, power, range(2, MOST_GEAR + 1), factor)
 
 
 def powers_of(fits: Sequence[CombFit]) -> list[float]:
@@ -294,12 +293,15 @@ class Separation:
         rates = one.rate * RATIOS
         away = rates / self.nominal - 1
         rates = rates[(away > low - RATE_SPREAD) & (away < high + RATE_SPREAD)]
-        near = np.arange(-1, 1.01, 0.25) * self.resolution
-        tried = np.sort((rates[:, None] + near).ravel())
+        tried = np.sort((rates[:, None] + self._near()).ravel())
         if not len(tried):
             return []
         found = self._strongest(tried, is_apart=True)
         return [found] if found.evidence > one.evidence else []
+
+    def _near(self) -> NDArray[np.float64]:
+        """How far from a rate that is about right others are tried [cycles a sample]."""
+        return np.arange(-1, 1.01, 0.25) * self.resolution
 
     def join(self, one: Sought) -> _Verdict:
         """Take a rate in, if it is a rotor's."""
@@ -324,7 +326,7 @@ class Separation:
         if fitted is None:
             return _NO_ROTOR
         together, _ = fitted
-        if self.fits and _holds_another(together[-1], self.data.pulses):
+        if self.fits and _lines_apart(together[-1], self.data.pulses, GEAR_FACTOR) > 1:
             self.seeks_apart &= not one.is_apart
             return _NO_ROTOR
         if _meet(together, self.resolution):
@@ -350,6 +352,29 @@ class Separation:
             return False
         self._take(*fitted)
         return True
+
+    def make_whole(self) -> None:
+        """Seek rotors of which only every so many-th line is there anew, now that the others are known.
+
+        As each came in, lines of rotors not found yet stood between its own or were some of them.
+        """
+        for known in 2 * self.rates:  # some show once others are whole
+            number = int(np.abs(np.array(self.rates) - known).argmin())
+            times = _lines_apart(self.fits[number], self.data.pulses, UNEQUAL_FACTOR)
+            if times == 1 or len(self.fits) == 1:
+                continue
+            whole = times * self.rates[number]
+            before = self.fits, self.reaches, self.rest, self.level
+            self.fits = [fit for other, fit in enumerate(self.fits) if other != number]
+            self.reaches = [reach for other, reach in enumerate(self.reaches) if other != number]
+            self.fitted_out = False
+            if not self.fit_out(FURTHER_STEPS):
+                self.fits, self.reaches, self.rest, self.level = before
+                continue
+            rates = whole / np.arange(1, max(times, MOST_BLADES) + 1)
+            one = self._strongest(np.sort((rates[:, None] + self._near()).ravel()))
+            if one.evidence > FURTHER_EVIDENCE and self.join(one).added:
+                self.fit_out(FURTHER_STEPS)
 
     def _take(self, fits: Sequence[CombFit], samples: NDArray[np.complex128]) -> None:
         """Hold these fits and what they leave."""
@@ -436,6 +461,7 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float, how: type[Separa
     if not found.fits:
         return replace(alone, resolved=not last.unresolved, spread=found.resolution if last.unresolved else 0.0)
     found.fit_out(LAST_STEPS)
+    found.make_whole()
     fits = sorted(found.fits, key=lambda fit: fit.spacing)
     rates = np.array([fit.spacing for fit in fits])
     spread = float(np.ptp(rates))

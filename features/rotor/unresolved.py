@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..lines import squared
-from .comb import Comb
+from .comb import Comb, blade_numbers
 from .comb_fit import CombFit
+from .flash_count import flashes_in_period
 from .left_flashes import others_flash
 from .periodogram import Periodogram
 from .rotors import RATE_SPREAD, RESOLVED_BINS, Rotors
@@ -178,7 +179,8 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float, *, fitted
     several = len(rotors.fits) > 1
     per_turn = comb.per_turn if rotors.fits[0] is comb.fit else 1
     tip = edge / (per_turn * max(fit.spacing for fit in rotors.fits))  # an order is the same for all: blades are alike
-    twice = any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
+    in_turn = not several and per_turn == 1 and flashes_in_period(comb.fit, blade_numbers(None), tip)[0] > 1
+    twice = not in_turn and any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
     about = _power_about(data, rotors.rest, rotors.fits[0].centre)
     share, hidden = _left_over(about, rotors.fits, edge)
     # lines that come back from the other end of the span are none of a family that ends within it

@@ -119,3 +119,24 @@ def test_lines_that_come_back_are_fitted_as_they_stand():
     assert np.abs(fit.orders).max() > 0.5 / spacing
     assert abs(fit.spacing - spacing) < 4 * fit.spacing_std < 1e-6
     assert np.mean(np.abs(rest) ** 2) < 2 * np.mean(np.abs(white(rng, pulses)) ** 2)
+
+
+@pytest.mark.parametrize(("prf_hz", "is_too_low"), [(4e3, True), (40e3, False)])
+def test_lines_that_fill_a_span_slower_than_rotors_are_none_of_something_slow(prf_hz, is_too_low):
+    """At 77 GHz and 4 kHz velocities are told to 3.9 m/s: a rotor's lines were said to reach no further than that."""
+    wavelength_m = 299_792_458.0 / 77e9
+    unambiguous_mps = wavelength_m * prf_hz / 4
+    time_s = np.arange(int(0.2 * prf_hz)) / prf_hz
+    rng = np.random.default_rng(3)
+    # a comb over 3.5 m/s: all of the span at the low PRF, slower than any rotor at the high one
+    orders = np.arange(-int(3.5 * 2 / wavelength_m / 140.3), int(3.5 * 2 / wavelength_m / 140.3) + 1)
+    lines = np.exp(2j * np.pi * np.outer(orders * 140.3, time_s) + 2j * np.pi * rng.uniform(size=(len(orders), 1)))
+    noise = rng.standard_normal((2, len(time_s)))
+    iq = lines.sum(axis=0) + 10 + (noise[0] + 1j * noise[1]) / np.sqrt(2)
+    reason = str(measure(iq.astype(np.complex64), carrier_hz=77e9, prf_hz=prf_hz).reason)
+    assert ("PRF too low" in reason) == is_too_low
+    if is_too_low:
+        assert f"to {unambiguous_mps:.1f} m/s" in reason
+        assert f"raise it to {12 / unambiguous_mps * prf_hz / 1e3:.1f} kHz at least" in reason
+    else:
+        assert "no rotor" in reason

@@ -96,3 +96,18 @@ def test_the_mean_rate_holds_where_two_rotors_that_flash_together_pass_for_one(a
         stated_hz.append(found.chopping_hz_std)
     assert np.abs(errors).max() < 4
     assert max(stated_hz) < 0.015 * 2 * rates_hz.mean()
+
+
+def test_lines_of_rotors_not_found_yet_neither_halve_a_rate_nor_make_one_up():
+    """Of these rates one was told at half, as one that is resolved, or another at 3/2 of the slowest, in 9 of 12."""
+    rates_hz, right = np.array([60.304, 63.538, 76.818, 88.117]), 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        given = {"snr_db": 20.0, "body_db": 20, "velocity_mps": rng.uniform(-20, 20), "length_m": 0.136}
+        found = measure(records.record(rng, rates_hz, **given), **records.RADAR)
+        if found.rotors_resolved:
+            right += 1
+            assert found.rotor_count == 4
+            np.testing.assert_allclose(found.rotor_rates_hz[:4], 2 * rates_hz, rtol=1e-4)
+            assert found.chopping_hz == pytest.approx(2 * rates_hz.mean(), abs=4 * found.chopping_hz_std)
+    assert right >= 10
