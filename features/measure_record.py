@@ -70,6 +70,7 @@ def measure_record(
     out["notch_residual_db"] = float(notch_residual_db(spectrum, mask))
     family, why = find_family(data, spectrum, blades)
     if family is not None:
+        family = by_turns(family, blades)
         edge = _edge(family, blades)
         why = slower_than_rotors(family.data, *edge) or too_few_flashes(family)
     if family is None or why:
@@ -83,7 +84,6 @@ def measure_record(
     out |= {"reason": as_wheels(family.data, edge[0], velocity[0])} | _named(BODY, velocity)
     if out["reason"]:
         return out
-    family = by_turns(family, blades)
     out |= _turning(family) | _geared(family)
     out |= _band(family, edge, beta_rad)
     out |= _blade(family, out, blades)

@@ -153,12 +153,19 @@ def by_turns(family: Family, blades: int | None) -> Family:
     if family.gear is not None or len(rotors.rates) > 1 or comb.blades > 1 or family.data.one_channel:
         return family
     numbers = [number for number in range(2, (blades or MOST_BLADES) + 1) if not (blades or 0) % number]
-    number, is_sure = flashes_in_period(comb.fit, numbers, min(family.edge, 0.5) / comb.fit.spacing)
+    if not numbers:
+        return family
+    edge, std = family.edge, family.edge_std
+    number, is_sure = flashes_in_period(comb.fit, numbers, min(edge, 0.5) / comb.fit.spacing)
+    if blades is not None and (number > 1 or not rotors.resolved):  # it was sought for blades that are alike
+        edge, std = edge_of_lines(family.data, [comb.fit], comb.rest, 1, None)
+        number, is_sure = flashes_in_period(comb.fit, numbers, min(edge, 0.5) / comb.fit.spacing)
     if number == 1 or not is_sure:
         return replace(family, may_be_turn=number > 1)
     turned = replace(comb, per_turn=number, blades=number, blades_sure=True)
     rates, stds, spread = number * rotors.rates, number * rotors.stds, number * rotors.spread
-    return replace(family, comb=turned, rotors=replace(rotors, rates=rates, stds=stds, spread=spread))
+    rotors = replace(rotors, rates=rates, stds=stds, spread=spread)
+    return replace(family, comb=turned, edge=edge, edge_std=std, rotors=rotors)
 
 
 def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None) -> tuple[Family | None, str]:

@@ -360,8 +360,8 @@ class Separation:
         """
         for known in 2 * self.rates:  # some show once others are whole
             number = int(np.abs(np.array(self.rates) - known).argmin())
-            times = _lines_apart(self.fits[number], self.data.pulses, UNEQUAL_FACTOR)
-            if times == 1 or len(self.fits) == 1:
+            times = _lines_apart(self.fits[number], self.data.pulses, UNEQUAL_FACTOR) if len(self.fits) > 1 else 1
+            if times == 1:
                 continue
             whole = times * self.rates[number]
             before = self.fits, self.reaches, self.rest, self.level

@@ -179,8 +179,9 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float, *, fitted
     several = len(rotors.fits) > 1
     per_turn = comb.per_turn if rotors.fits[0] is comb.fit else 1
     tip = edge / (per_turn * max(fit.spacing for fit in rotors.fits))  # an order is the same for all: blades are alike
-    in_turn = not several and per_turn == 1 and flashes_in_period(comb.fit, blade_numbers(None), tip)[0] > 1
-    twice = not in_turn and any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
+    twice = any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
+    if twice and not several and per_turn == 1:  # unlike blades of one rotor do so in its turn
+        twice = flashes_in_period(comb.fit, blade_numbers(None), tip)[0] == 1
     about = _power_about(data, rotors.rest, rotors.fits[0].centre)
     share, hidden = _left_over(about, rotors.fits, edge)
     # lines that come back from the other end of the span are none of a family that ends within it

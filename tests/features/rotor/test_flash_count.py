@@ -22,7 +22,7 @@ def test_blades_some_rad_apart_have_their_rotation_rate(phases_rad, is_given):
         assert found.rotation_hz == pytest.approx(rate_hz, rel=1e-3)
         assert found.chopping_hz == pytest.approx(blades * rate_hz, rel=1e-3)
         assert found.rotor_rates_hz[0] == pytest.approx(found.chopping_hz)
-        assert found.blade_length_m == pytest.approx(0.15, rel=0.03)
+        assert found.blade_length_m == pytest.approx(0.15, rel=0.012)
 
 
 def comb(amplitudes):
