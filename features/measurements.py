@@ -57,7 +57,8 @@ class Measurements:
     notch_residual_db : ndarray
         Mean power outside the notches over the noise floor [dB].
     rotation_hz, rotation_hz_std : ndarray
-        Rotation rate [Hz]; NaN where the number of blades is neither given nor seen in unequal lines.
+        Rotation rate [Hz]; NaN where the number of blades is neither given nor seen in unequal lines or in flashes that
+        follow one another evenly, or where these may be two rotors'.
     blade_length_m, blade_length_m_std : ndarray
         Blade length [m]; a lower bound where beta is not given. NaN where the rotation rate is.
     length_is_lower_bound : bool
