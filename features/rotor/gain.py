@@ -23,7 +23,7 @@ DEGREE, FLASH_SHARE = 8, 0.75
 #: What the lines explain more by it is no chance from so many nats on.
 LEAST_NATS = 15.0
 
-#: Nowhere is it taken to be below this share of its mean.
+#: Nowhere is it taken to be below this share of the root of its mean square.
 LEAST_GAIN = 0.1
 
 #: Combs are fitted so many times at most as their gain becomes known.
@@ -45,7 +45,7 @@ def gain_left(data: Periodogram, rest: NDArray[np.complex128], chopping: float) 
     Returns
     -------
     gain : ndarray of float64, shape (pulses,)
-        Its mean over the dwell is 1.
+        Its mean, weighed by the power of the lines, is 1.
     share : float
         Share of the power left, without the noise, that it explains, 0 to 1; 0 where it may be chance.
     """
@@ -60,7 +60,7 @@ def gain_left(data: Periodogram, rest: NDArray[np.complex128], chopping: float) 
     if nats < LEAST_NATS:
         return np.ones(pulses), 0.0
     left = float(squared(rest).sum()) - pulses
-    return factors @ shapes / factors[0], nats / max(left, nats)
+    return factors @ shapes, nats / max(left, nats)
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Evened:
     def by(self, gain: NDArray[np.float64]) -> Self:
         """With a gain that its lines have besides divided out."""
         gain = self.gain * gain
-        noise = np.maximum(gain / gain.mean(), LEAST_GAIN) ** -2.0
+        noise = np.maximum(gain / np.sqrt((gain**2).mean()), LEAST_GAIN) ** -2.0
         noise /= noise.mean()
         samples = self.whole.samples * np.sqrt(noise * self.spectrum.floor)
         record = prepared(samples.astype(np.complex64), self.spectrum)
