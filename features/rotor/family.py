@@ -10,14 +10,14 @@ from ..lines import squared
 from ..spectrum import Spectrum
 from .changing import ChangingSeparation, may_be_sought
 from .changing_fit import ChangingFit, Start, fit_changing
-from .comb import LEAST_REACH_MPS, MOST_BLADES, OVER_BODY, Comb, find_comb, is_short, span_too_slow
+from .comb import LEAST_REACH_MPS, OVER_BODY, Comb, blade_numbers, find_comb, is_short, span_too_slow
 from .comb_fit import CombFit
 from .drift import Straightened, ahead_left, straightened
 from .family_edge import edge_around, edge_of_lines, span_of
 from .flash_count import flashes_in_period
 from .gain import Evened
 from .helicopter import Gear, find_gear
-from .periodogram import Level, Periodogram, prepared
+from .periodogram import Level, Periodogram, prepared_again
 from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
 from .turning import DEGREES, bend, is_sure
 from .unresolved import judged, not_all
@@ -152,7 +152,7 @@ def by_turns(family: Family, blades: int | None) -> Family:
     comb, rotors = family.comb, family.rotors
     if family.gear is not None or len(rotors.rates) > 1 or comb.blades > 1 or family.data.one_channel:
         return family
-    numbers = [number for number in range(2, (blades or MOST_BLADES) + 1) if not (blades or 0) % number]
+    numbers = [number for number in range(2, blades + 1) if blades % number == 0] if blades else blade_numbers(None)
     if not numbers:
         return family
     edge, std = family.edge, family.edge_std
@@ -258,10 +258,10 @@ def _turned(data: Periodogram, spectrum: Spectrum, family: Family, blades: int |
 
     def evened(comb: Comb) -> tuple[Straightened | None, Family | None]:
         even = straightened(data, comb, edge, least_gain=least_gain)
-        again = prepared((even.samples * np.sqrt(spectrum.floor)).astype(np.complex64), spectrum) if even else None
-        if again is None:
-            return even, None
-        steady, found = _evened_by_one(Evened.of(replace(again, ends_noise=data.ends_noise), spectrum), blades)
+        if even is None:
+            return None, None
+        again = prepared_again(even.samples, spectrum, data.ends_noise)
+        steady, found = _evened_by_one(Evened.of(again, spectrum), blades)
         return even, _as_it_is(steady.record, found, blades, even)[0]
 
     comb = by_rotation(family.comb)

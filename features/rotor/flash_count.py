@@ -17,7 +17,7 @@ from .comb_fit import CombFit
 
 #: Each side must have so many lines, of blades that reflect at their tips more: few of those add up anywhere. Flashes
 #: are read at so many places for each.
-LEAST_LINES, LEAST_OF_TIPS, PADDING = 12, 24, 16
+LEAST_LINES, LEAST_OF_TIPS, FLASH_PADDING = 12, 24, 16
 
 #: What is so far from a flash is no part of it [1 / lines].
 FLASH_WIDTH = 2.5
@@ -80,12 +80,12 @@ def _evenly(
     """
     lines = np.zeros(order.max() + 1, np.complex128)
     lines[order] = amplitudes * shape
-    part = PADDING * len(lines) // number
+    part = FLASH_PADDING * len(lines) // number
     power = squared(fft.fft(lines, part * number)) / max(float(squared(amplitudes).sum() * (shape**2).sum()), 1e-30)
     first = int(power.reshape(number, part).sum(axis=0).argmax())
     parts = np.roll(power, part // 2 - first).reshape(number, part)  # each has its flash in the middle
     flashes = parts[:, part // 2]
-    near = np.abs(np.arange(part) - part // 2) < FLASH_WIDTH * PADDING
+    near = np.abs(np.arange(part) - part // 2) < FLASH_WIDTH * FLASH_PADDING
     rival = float(parts[:, ~near].max(initial=0.0))
     if flashes.min() < LEAST_FLASH * flashes.max() or rival > MOST_RIVAL * flashes.min():
         return 0.0, 0.0

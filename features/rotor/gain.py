@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..lines import middle_times, squared
 from ..spectrum import Spectrum
 from .comb_fit import CombFit, fit_combs
-from .periodogram import Periodogram, prepared
+from .periodogram import Periodogram, prepared_again
 
 #: The gain is a sum of Legendre polynomials in time up to this degree, and to this share of the flashes in the dwell.
 DEGREE, FLASH_SHARE = 8, 0.75
@@ -94,12 +94,9 @@ class Evened:
         gain = self.gain * gain
         noise = np.maximum(gain / np.sqrt((gain**2).mean()), LEAST_GAIN) ** -2.0
         noise /= noise.mean()
-        samples = self.whole.samples * np.sqrt(noise * self.spectrum.floor)
-        record = prepared(samples.astype(np.complex64), self.spectrum)
-        assert record is not None  # one with lines has a floor
         away = middle_times(len(gain)) ** 2
         ends_noise = self.whole.ends_noise * float((away * noise).mean() / away.mean())
-        record = replace(record, ends_noise=ends_noise)
+        record = prepared_again(self.whole.samples * np.sqrt(noise), self.spectrum, ends_noise)
         return replace(self, gain=gain, record=record)
 
     def further(

@@ -340,3 +340,10 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
         spectrum.prf_hz,
         bool(half_empty(spectrum.relative_power)),
     )
+
+
+def prepared_again(samples: NDArray[np.complex128], spectrum: Spectrum, ends_noise: float) -> Periodogram:
+    """`prepared` for what was made of the samples of such a record; of unit noise power, and how loud at its ends."""
+    again = prepared((samples * np.sqrt(spectrum.floor)).astype(np.complex64), spectrum)
+    assert again is not None  # a record that was prepared has a floor
+    return replace(again, ends_noise=ends_noise)

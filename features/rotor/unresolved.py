@@ -10,15 +10,14 @@ from scipy import fft
 from ..lines import squared
 from .comb import Comb, blade_numbers
 from .comb_fit import CombFit
-from .flash_count import flashes_in_period
+from .flash_count import FLASH_PADDING, FLASH_WIDTH, flashes_in_period
 from .left_flashes import others_flash
 from .periodogram import Periodogram
 from .rotors import RATE_SPREAD, RESOLVED_BINS, Rotors
 
 #: A rotor flashes once a period on each side of the body. A second flash of this share of the first one's power is
-#: another rotor's, of a rate that the dwell does not tell apart; so far from the first it is no part of it [1 / lines].
-SECOND_FLASH_SHARE, FLASH_WIDTH, FLASH_PADDING = 0.3, 2.5, 16
-LEAST_FLASH_LINES = 6
+#: another rotor's, of a rate that the dwell does not tell apart, where so many lines tell.
+SECOND_FLASH_SHARE, LEAST_FLASH_LINES = 0.3, 6
 
 #: Blades that reflect at their tips are taken for this many, at most.
 MOST_TIPS = 6
