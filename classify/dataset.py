@@ -205,6 +205,7 @@ def _writable(folder: Path) -> Iterator[None]:
         with only_writer(folder, wait=False):
             yield
     except BlockingIOError:
+        made.clear()  # one that began at this very moment has nothing in it yet
         raise BadInput(f"{folder}: another process is writing there: let it finish, or give another folder") from None
     except OSError as error:
         never = error.errno in (errno.EEXIST, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.EROFS)

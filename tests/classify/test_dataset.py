@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
@@ -180,6 +181,15 @@ def test_a_disk_that_is_too_small_is_refused_before_anything_is_drawn(tmp_path, 
 def test_one_writer_at_a_time(whole, tmp_path):
     with only_writer(whole), pytest.raises(BadInput, match="another process is writing there"):
         write(whole)
+
+
+def test_one_that_is_refused_leaves_the_folder_to_the_other_which_has_nothing_in_it_yet(tmp_path, monkeypatch):
+    folder = tmp_path / "data"
+    with ExitStack() as other:
+        monkeypatch.setattr(module, "settle", lambda _: other.enter_context(only_writer(folder)))
+        with pytest.raises(BadInput, match="another process is writing there"):
+            write(folder)
+        assert folder.is_dir()
 
 
 def test_another_data_set_or_a_foreign_folder_is_not_written_over(whole, tmp_path):
