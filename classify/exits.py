@@ -22,6 +22,8 @@ _DISK_ERRORS = {
     errno.EEXIST, errno.ENAMETOOLONG, errno.ENOENT,
 }  # fmt: skip
 _TRACEBACK = "BLADEWING_TRACEBACK"
+# What others' errors say may hold whole models.
+_MOST_SAID = 300
 _NUMBERS = {"int_parsing": "be a whole number", "float_parsing": "be a number"}
 
 
@@ -112,5 +114,7 @@ def _unexpected(error: Exception) -> int:
         import traceback
 
         traceback.print_exc()
-    complain(f"unexpected {type(error).__name__}: {error} (set {_TRACEBACK}=1 to see where)")
+    said = str(error)
+    said = said if len(said) <= _MOST_SAID else f"{said[:_MOST_SAID]}..."
+    complain(f"unexpected {type(error).__name__}: {said} (set {_TRACEBACK}=1 to see where)")
     return 1

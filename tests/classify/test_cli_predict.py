@@ -358,6 +358,18 @@ def test_what_nobody_expected_is_one_line_and_exit_code_1(run, sigmf_pair, monke
     assert 'raise ZeroDivisionError("two\\nlines")' in run("--json", sigmf_pair())[2]
 
 
+def test_what_nobody_expected_is_a_line_that_can_be_read_however_much_it_says(run, sigmf_pair, monkeypatch):
+    def fail(*_, **__):
+        raise TypeError(f"nodes hold {'0.0, ' * 10_000}")
+
+    monkeypatch.setattr(recordings, "load_recording", fail)
+    code, _, err = run("--json", sigmf_pair())
+    assert code == 1
+    assert "TypeError: nodes hold 0.0, " in err
+    assert err.endswith("... (set BLADEWING_TRACEBACK=1 to see where)\n")
+    assert len(err) < 400
+
+
 ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
 BLADEWING = [sys.executable, "-c", "import sys; from bladewing.classify.cli import main; sys.exit(main())"]
 
