@@ -162,12 +162,17 @@ def _line_powers(fits: Sequence[CombFit]) -> list[NDArray[np.floating]]:
     return [squared(fit.amplitudes[np.abs(fit.orders) <= common]) for fit in fits]
 
 
-def hidden_shift(fits: Sequence[CombFit]) -> float:
-    """How far the mean of combs' rates is off, if those that may be several rotors are [cycles a sample]."""
+def may_hold(fits: Sequence[CombFit]) -> NDArray[np.float64]:
+    """How many rotors each comb may be, by its power over that of the weakest one: 1, or more, no whole number."""
     powers = np.array([powers.mean() for powers in _line_powers(fits)])
     times = np.minimum(powers / powers.min(), MAX_ROTORS)
+    return np.where(times > TWO_POWER, times, 1.0)
+
+
+def hidden_shift(fits: Sequence[CombFit]) -> float:
+    """How far the mean of combs' rates is off, if those that may be several rotors are [cycles a sample]."""
     rates = np.array([fit.spacing for fit in fits])
-    return float(np.average(rates, weights=np.where(times > TWO_POWER, np.rint(times), 1)) - rates.mean())
+    return float(np.average(rates, weights=np.rint(may_hold(fits))) - rates.mean())
 
 
 def _meet(fits: Sequence[CombFit], resolution: float) -> bool:

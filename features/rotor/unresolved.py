@@ -13,11 +13,15 @@ from .comb_fit import CombFit
 from .flash_count import FLASH_PADDING, FLASH_WIDTH, flashes_in_period
 from .left_flashes import others_flash
 from .periodogram import Periodogram
-from .rotors import RATE_SPREAD, RESOLVED_BINS, Rotors
+from .rotors import RATE_SPREAD, RESOLVED_BINS, Rotors, may_hold
 
 #: A rotor flashes once a period on each side of the body. A second flash of this share of the first one's power is
 #: another rotor's, of a rate that the dwell does not tell apart, where so many lines tell.
 SECOND_FLASH_SHARE, LEAST_FLASH_LINES = 0.3, 6
+
+#: The same of a comb among others that has the power of two: rotors alone that are so much stronger than another leave
+#: 0.02 to 0.08.
+STRONG_FLASH_SHARE = 0.1
 
 #: Blades that reflect at their tips are taken for this many, at most.
 MOST_TIPS = 6
@@ -39,18 +43,18 @@ HIDDEN_DEVIATIONS = 1.5
 PAST_EDGE, PAST_DEVIATIONS, PAST_SHARE = 4.0, 4.0, 0.2
 
 
-def _flashes_twice(fit: CombFit, per_turn: int, tip: float) -> bool:
-    """True where a comb's phases show the flashes of two rotors in each period.
+def _flashes_twice(fit: CombFit, per_turn: int, tip: float, share: float = SECOND_FLASH_SHARE) -> bool:
+    """True where a comb's phases show the flashes of two rotors in each period, the second one of a share of the first.
 
     A blade that reflects along its length flashes once on each side. One that reflects at its tip alone is seen twice
     at every speed below the tip's, before and after that comes straight on: its lines are J_n(Gamma) (the paper's eq.
     24), and flash once when these are taken for what they are; `tip` is the order its edge has.
     """
     blades = [None, *((number, tip) for number in range(1, MOST_TIPS + 1))]
-    return all(_second_flashes(fit, per_turn, blade) for blade in blades)
+    return all(_second_flashes(fit, per_turn, blade, share) for blade in blades)
 
 
-def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) -> bool:
+def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None, share: float) -> bool:
     """True where the second flashes on both sides are as strong as another rotor's, for blades of one kind.
 
     Parameters
@@ -59,6 +63,8 @@ def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) 
         The comb, and the strong lines' spacing in lines of it.
     tip : (int, float), optional
         Blades that reflect at their tips, and the tip's order; else they reflect along their length.
+    share
+        Of the first flash's power, both sides' mean, each half of it at least.
     """
     from scipy.special import jv  # here, because predicting needs no such import
 
@@ -87,7 +93,7 @@ def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None) 
         for part in (2, 3):  # unequal blades of one rotor flash at fractions of the turn
             other &= np.abs(lines_away - len(lines) / part) > 1
         shares.append(float(power[other].max(initial=0.0)))
-    return len(shares) == 2 and min(shares) > SECOND_FLASH_SHARE / 2 and sum(shares) > 2 * SECOND_FLASH_SHARE
+    return len(shares) == 2 and min(shares) > share / 2 and sum(shares) > 2 * share
 
 
 #: Of each bin: how far from a centre it is [cycles a sample], its power, whether it can be seen.
@@ -178,7 +184,13 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float, *, fitted
     several = len(rotors.fits) > 1
     per_turn = comb.per_turn if rotors.fits[0] is comb.fit else 1
     tip = edge / (per_turn * max(fit.spacing for fit in rotors.fits))  # an order is the same for all: blades are alike
-    twice = any(_flashes_twice(fit, per_turn, tip) for fit in rotors.fits)
+    strong = may_hold(rotors.fits) > 1 if several else np.array([False])
+    twice = any(
+        _flashes_twice(fit, per_turn, tip, STRONG_FLASH_SHARE if more else SECOND_FLASH_SHARE)
+        for fit, more in zip(rotors.fits, strong, strict=True)
+    )
+    # airframes have rotors of an even number: two that flash together pass for one of their power
+    odd = len(rotors.fits) % 2 == 1 and bool(strong.any())
     if twice and not several and per_turn == 1:  # unlike blades of one rotor do so in its turn
         twice = flashes_in_period(comb.fit, blade_numbers(None), tip)[0] == 1
     about = _power_about(data, rotors.rest, rotors.fits[0].centre)
@@ -188,7 +200,7 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float, *, fitted
     past = (not several or fitted_to is not None) and _stands_past(about, rotors.fits, fitted_to or edge)
     if fitted_to is None and others_flash(data, rotors.rest, (fit.spacing for fit in rotors.fits), edge):
         return not_all(rotors, data, 2 * RATE_SPREAD * float(rotors.rates.mean()))  # they may be any of one airframe
-    if not (twice or hidden or past or contradicted or share > (LEFT_SHARE if several else LEFT_ALONE)):
+    if not (twice or odd or hidden or past or contradicted or share > (LEFT_SHARE if several else LEFT_ALONE)):
         return rotors
     apart = abs(rotors.next_rate - float(rotors.rates[0])) if hidden and not several else 0.0
     return not_all(rotors, data, apart)

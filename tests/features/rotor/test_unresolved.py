@@ -34,6 +34,26 @@ def test_fewer_rotors_than_there_are_near_the_noise_are_not_called_resolved():
     assert np.median(np.square(errors)) < 2
 
 
+def with_a_pair(seed, rates_rpm):
+    """What is found of rotors of which the last two turn at one rate but for 0.6 rpm."""
+    rng, times_s = np.random.default_rng(seed), np.arange(PULSES) / PRF_HZ
+    rates_hz = np.array([*rates_rpm, rates_rpm[-1] + 0.6]) / 60
+    iq = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=WAVELENGTH_M, length_m=0.15) + 10
+    return measure(10**0.5 * iq + white(rng, PULSES), **RADAR)
+
+
+@pytest.mark.parametrize("seed", [1, 7, 23])
+def test_two_rotors_of_one_rate_that_flash_apart_do_not_pass_for_one_of_their_power(seed):
+    found = with_a_pair(seed, (3400, 3480))
+    assert (found.rotor_count, found.rotors_resolved) == (2, False)
+
+
+@pytest.mark.parametrize("seed", [1, 16])
+def test_nor_where_they_flash_together_and_the_number_is_odd(seed):
+    found = with_a_pair(seed, (3400, 3440, 3480))
+    assert (found.rotor_count, found.rotors_resolved) == (3, False)
+
+
 @pytest.mark.parametrize("snr_db", [5, 15])
 def test_four_rotors_that_are_all_found_are_resolved(snr_db):
     resolved = [bool(measure(four_rotors(seed, snr_db)[0], **RADAR).rotors_resolved) for seed in range(8)]
