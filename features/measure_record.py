@@ -97,6 +97,8 @@ def _named(names: tuple[str, ...], values: Iterable[Any]) -> dict[str, Any]:
 def _edge(family: Family, blades: int | None) -> tuple[float, float]:
     """Edge of all rotors' lines and its standard deviation [cycles a sample], as what tells it surest has it."""
     data, comb, rotors = family.data, family.comb, family.rotors
+    if rotors.resolved and rotors.row_edge is not None:
+        return rotors.row_edge
     several = len(rotors.rates) > 1
     edge, std = edge_of_lines(data, rotors.fits, rotors.rest, 1, blades) if several else (family.edge, family.edge_std)
     if not rotors.resolved:

@@ -8,9 +8,9 @@ comb_search, comb_sums, flashes, octaves, folding, flash_rate, comb_centre, comb
     Where a comb may be, which of its multiples and fractions it is, which line is the body's; or why there is none.
 comb_fit, weak_lines, turning, drift, changing, changing_fit
     Combs fitted below the bin: steady ones, of blades not quite alike, of rates that change within the dwell.
-gain, rotors, unresolved, left_flashes, flash_count, helicopter
-    A gain that all lines share; single rotors told apart, whether these are all, whether one's comb is that of a turn;
-    a main and a tail rotor.
+gain, rotors, unresolved, points, left_flashes, flash_count, helicopter
+    A gain that all lines share; single rotors told apart, whether these are all, or blades are rows of a few points,
+    whether one's comb is that of a turn; a main and a tail rotor.
 line_shapes, line_likelihood, rotor_band, family_edge
     Where the lines end: the tip.
 family

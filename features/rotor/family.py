@@ -343,10 +343,10 @@ def _as_it_is(
         return None, slow
     fills_span = bool(np.isinf(edge))
     furthest = min(edge, span_of(data, [comb.fit]))
-    gear, rotors, reason = find_gear(data, comb, furthest)
+    gear, rotors, reason = find_gear(data, comb, furthest, blades)
     if gear is None and len(rotors.rates) == 1:  # of several the lines lie anywhere
         without, alike = without_weak_lines(data, comb, blades)
-        again = find_gear(without, alike, furthest) if without is not data else None
+        again = find_gear(without, alike, furthest, blades) if without is not data else None
         if again is not None and again[0] is None and len(again[1].rates) == 1:
             data, comb, (_, rotors, reason) = without, alike, again
     if gear is not None:

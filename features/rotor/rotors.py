@@ -96,6 +96,9 @@ class Rotors:
     next_rate : float
         The rate near those found that spoke loudest when a further one was last sought, be it a rotor's or not
         [cycles a sample].
+    row_edge : (float, float) or None
+        Of a lone rotor whose blades are rows of points, where its lines end, and the standard deviation [cycles a
+        sample from the body].
     """
 
     rates: NDArray[np.float64]
@@ -105,6 +108,7 @@ class Rotors:
     fits: list[CombFit]
     rest: NDArray[np.complex128]
     next_rate: float
+    row_edge: tuple[float, float] | None = None
 
 
 def _low_power(rest: Periodogram, places: NDArray[np.float64], fits: Sequence[CombFit]) -> float:

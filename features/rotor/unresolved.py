@@ -13,6 +13,7 @@ from .comb_fit import CombFit
 from .flash_count import FLASH_PADDING, FLASH_WIDTH, flashes_in_period
 from .left_flashes import others_flash
 from .periodogram import Periodogram
+from .points import fit_points
 from .rotors import RATE_SPREAD, RESOLVED_BINS, Rotors, may_hold
 
 #: A rotor flashes once a period on each side of the body. A second flash of this share of the first one's power is
@@ -25,6 +26,10 @@ STRONG_FLASH_SHARE = 0.1
 
 #: Blades that reflect at their tips are taken for this many, at most.
 MOST_TIPS = 6
+
+#: Points along a rotor's blades explain all of its lines but for this share of their power: 0.005 at most where blades
+#: are such rows; where they are not, or rotors of one rate are several, 0.02 and more is left.
+ROW_LEFT = 0.012
 
 #: What is left between the lines within the band, over what is left beyond it, and as a share of the lines' power,
 #: speaks of rotors that were not found where it exceeds both of these.
@@ -167,7 +172,15 @@ def _stands_past(about: _About, fits: Sequence[CombFit], edge: float) -> bool:
     return over > PAST_DEVIATIONS * deviation and over * past.sum() > least * lines
 
 
-def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float, *, fitted_to: float | None = None) -> Rotors:
+def judged(
+    rotors: Rotors,
+    data: Periodogram,
+    comb: Comb,
+    edge: float,
+    blades: int | None = None,
+    *,
+    fitted_to: float | None = None,
+) -> Rotors:
     """Rotors, called unresolved where their flashes, or what they leave, speak of more than were found.
 
     Parameters
@@ -176,6 +189,8 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float, *, fitted
         From `separate_rotors`.
     data, comb, edge
         As there.
+    blades : int, optional
+        Of a rotor.
     fitted_to : float, optional
         How far out lines were fitted [cycles a sample from the body], where that may not be as far as they reach.
     """
@@ -193,6 +208,13 @@ def judged(rotors: Rotors, data: Periodogram, comb: Comb, edge: float, *, fitted
     odd = len(rotors.fits) % 2 == 1 and bool(strong.any())
     if twice and not several and per_turn == 1:  # unlike blades of one rotor do so in its turn
         twice = flashes_in_period(comb.fit, blade_numbers(None), tip)[0] == 1
+    if twice and not several:  # or points along a lone one's blades do
+        numbers = range(1, MOST_TIPS + 1) if blades is None else (blades,)
+        row = fit_points(rotors.fits[0], per_turn, data.pulses, numbers)
+        if row is not None and row.left < ROW_LEFT:
+            chopping = per_turn * rotors.fits[0].spacing
+            rotors = replace(rotors, row_edge=(row.edge * chopping, row.edge_std * chopping))
+            twice = False
     about = _power_about(data, rotors.rest, rotors.fits[0].centre)
     share, hidden = _left_over(about, rotors.fits, edge)
     # lines that come back from the other end of the span are none of a family that ends within it
