@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
+from bladewing.features.dropouts import filled, longest_silence, lost_pulses
 from bladewing.features.one_channel import one_channel
 from numpy.typing import NDArray
 
 from .arrays import ARRAY_SUFFIXES, read_array
 from .clipping import clipped_values
-from .dropouts import filled, longest_silence, lost_pulses
 from .errors import BadInput, unreadable
 from .samples import complex_samples, positive
 from .sigmf_file import find_sigmf, read_sigmf

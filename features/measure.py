@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .allocator import keep_freed
+from .dropouts import without_lost
 from .measure_record import measure_record
 from .measurements import EACH_ROTOR, Measurements
 from .one_channel import made_analytic
@@ -45,7 +46,8 @@ def measure(
     ----------
     iq : array_like of complex, shape (..., pulses)
         Slow-time samples of one range cell, any gain. Of one channel, I without Q, that holds noise, what both sides of
-        the spectrum share is measured, and no band.
+        the spectrum share is measured, and no band. Pulses that were lost, which are exactly 0, are filled in by what
+        those beside them tell of them.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz], within `CARRIER_RANGE_HZ` and `PRF_RANGE_HZ`.
     blades : int, optional
@@ -77,7 +79,7 @@ def measure(
     if beta_rad is not None and not 0 <= beta_rad < np.pi / 2:
         raise ValueError(f"beta_rad is {beta_rad!r}: it must be at least 0 and below pi/2 [rad]")
     blades = None if blades is None else int(blades)
-    samples = made_analytic(finite_complex(iq, least=2))
+    samples = made_analytic(without_lost(finite_complex(iq, least=2)))
     shape = samples.shape[:-1]
     some = samples if samples.size else np.zeros((1, *samples.shape[-1:]), np.complex64)  # of none, fields of no length
     spectrum = doppler_spectrum(some, carrier_hz=carrier_hz, prf_hz=prf_hz)

@@ -10,15 +10,18 @@ from numpy.typing import NDArray
 from .bandwidth import threshold_band_hz
 from .body_velocity import body_velocity, folded
 from .chopping import Chopping
+from .dropouts import filled
 from .measurements import BODY, EACH_ROTOR, Measurements
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
+from .rotor.even_pulses import even_pulses
 from .rotor.family import Family, as_wheels, by_turns, find_family, slower_than_rotors, too_few_flashes
 from .rotor.family_edge import SPAN, edge_around, edge_of_lines, span_of, surer_edge
 from .rotor.folding import FASTEST_TIP_MPS, fastest_tip
-from .rotor.periodogram import prepared
+from .rotor.periodogram import Periodogram, prepared
 from .rotor.rotors import MAX_ROTORS, hidden_shift
+from .rotor.sidebands import sideband_spacing
 from .smearing import wide_smearing_index
-from .spectrum import LEAST_PART, Spectrum, largest_part
+from .spectrum import LEAST_PART, Spectrum, doppler_spectrum, largest_part
 
 #: Threshold of the paper's bandwidth rule over the noise [dB]: it took 20 on measured data, 30 on simulated.
 PAPER_THRESHOLD_DB = 20.0
@@ -31,6 +34,9 @@ UNSURE_SHARE = 0.03
 
 #: Why there is no band where one channel was made analytic: the lines on both sides of the body lie in one another.
 ONE_CHANNEL = "no band: one side of the spectrum is empty, one channel has both folded onto the other: record I and Q"
+
+#: Other radars whose pulses are filled in, one after the other, at most.
+MOST_RADARS = 2
 
 #: Where rates differ by more, the growth of their lines' width does not show it.
 WIDEST_INDEX = 0.04
@@ -63,16 +69,16 @@ def measure_record(
     data = prepared(iq, spectrum)
     if data is None:
         return out | {"reason": "no signal"}
+    data, spectrum, family, why = _found(iq, data, spectrum, blades)
     body = body_line(spectrum)
     mask = notch_mask(spectrum, body)
     low, high = threshold_band_hz(spectrum, PAPER_THRESHOLD_DB)
     out["threshold_bandwidth_hz"] = float(high - low)
     out["notch_residual_db"] = float(notch_residual_db(spectrum, mask))
-    family, why = find_family(data, spectrum, blades)
     if family is not None:
         family = by_turns(family, blades)
         edge = _edge(family, blades)
-        why = slower_than_rotors(family.data, *edge) or too_few_flashes(family)
+        why = slower_than_rotors(family.data, *edge) or too_few_flashes(family) or _of_supply(family)
     if family is None or why:
         return out | {"reason": why} | _named(BODY, body_velocity(data, spectrum, None))
     if data.one_channel:  # about a body whose sides lie in one another nothing is even: its own line tells
@@ -88,6 +94,40 @@ def measure_record(
     out |= _band(family, edge, beta_rad)
     out |= _blade(family, out, blades)
     return out | {"smearing_index": _index(family, spectrum, body, mask, out["chopping_hz"])}
+
+
+def _found(
+    iq: NDArray[np.complex64], data: Periodogram, spectrum: Spectrum, blades: int | None
+) -> tuple[Periodogram, Spectrum, Family | None, str]:
+    """The line family of a record, or why there is none; where it is of another radar's pulses, without these.
+
+    The record made ready and its spectrum are those that it was found in.
+    """
+    family, why = find_family(data, spectrum, blades)
+    for _ in range(MOST_RADARS):
+        if family is None or not len(places := even_pulses(data, family.comb.fit.spacing)):
+            break
+        spoilt = np.zeros(len(iq), bool)
+        spoilt[places] = True
+        iq = filled(iq, spoilt)
+        pulsed, spectrum = spectrum, doppler_spectrum(iq, carrier_hz=spectrum.carrier_hz, prf_hz=spectrum.prf_hz)
+        rate_hz = spectrum.prf_hz * (len(places) - 1) / (places[-1] - places[0])
+        no_rotor = f"no rotor: single pulses {rate_hz:.1f} times a second, as of another radar"
+        without = prepared(iq, spectrum)
+        if without is None:  # they were all there is
+            return data, pulsed, None, no_rotor
+        data = without
+        family, _ = find_family(data, spectrum, blades)
+        why = no_rotor
+    return data, spectrum, family, why
+
+
+def _of_supply(family: Family) -> str:
+    """Why a family is a supply's; empty where it may be a rotor's."""
+    spacing = sideband_spacing(family.data, family.comb)
+    if spacing is None:
+        return ""
+    return f"no rotor: lines every {spacing * family.data.prf_hz:.1f} Hz, alike on both sides, as a supply draws them"
 
 
 def _named(names: tuple[str, ...], values: Iterable[Any]) -> dict[str, Any]:

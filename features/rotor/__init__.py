@@ -15,4 +15,6 @@ line_shapes, line_likelihood, rotor_band, family_edge
     Where the lines end: the tip.
 family
     All of these in their order.
+even_pulses, sidebands
+    What passes for a rotor in all of these and is another radar's or a supply's.
 """

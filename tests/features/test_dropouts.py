@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from bladewing.classify import Classifier, answer, load_recording
-from bladewing.classify.dropouts import filled, longest_silence, lost_pulses
-from bladewing.classify.recording import Recording
+from bladewing.features import measure
+from bladewing.features.dropouts import filled, lost_pulses
+
+from .signals import CARRIER_HZ, PRF_HZ, rotors
 
 PULSES = np.arange(20000)
 
@@ -95,45 +96,6 @@ def test_a_silence_is_no_lost_pulses() -> None:
     assert np.flatnonzero(lost_pulses(iq)).tolist() == list(range(10, 20))
 
 
-def test_a_recording_tells_of_a_silence_that_cannot_be_filled_in() -> None:
-    iq = noise(np.random.default_rng(5), 2000)
-    iq[300:500] = iq[700:750] = 0
-    assert longest_silence(iq) == (300, 200)
-    recording = Recording("walk", iq, 24e9, 1e4)
-    (said,) = recording.remarks(0.1, recording.dwells(0.1))
-    assert said.startswith("silence: 200 pulses in a row are exactly 0 from 0.03 s on, too many to be filled in")
-    coarse = np.round(0.25 * noise(np.random.default_rng(6), 20000).real).astype(np.complex64)
-    for whole in (
-        coarse,
-        iq[:300],
-        np.zeros(200, np.complex64),
-        np.zeros(0, np.complex64),
-        np.where(np.arange(300) < 32, 0, 1),
-    ):
-        assert longest_silence(whole)[1] == 0
-
-
-def test_a_recording_tells_of_a_channel_that_is_missing() -> None:
-    iq = noise(np.random.default_rng(6), 2000)
-    for part, name in ((iq.real + 0j, "Q"), (1j * iq.imag, "I")):
-        recording = Recording("walk", part.astype(np.complex64), 24e9, 1e4)
-        (said,) = recording.remarks(0.1, recording.dwells(0.1))
-        assert said.startswith(f"one channel: {name} is 0 in every pulse")
-        (said,) = recording.remarks(0.1, recording.dwells(0.1), measured=True)
-        assert said.endswith("neither tips nor the sign of a velocity can be believed: record I and Q")
-    alike = Recording("walk", (iq.real * (1 - 1j)).astype(np.complex64), 24e9, 1e4)
-    assert alike.remarks(0.1, alike.dwells(0.1))[0].startswith("one channel: I and Q are the same but for a sign")
-    assert not Recording("walk", iq, 24e9, 1e4).remarks(0.1, iq.reshape(2, -1))
-
-
-def test_a_recording_tells_of_them_and_how_many() -> None:
-    iq = noise(np.random.default_rng(4), 2000)
-    iq[100:110] = 0
-    recording = Recording("walk", iq, 24e9, 1e4)
-    (said,) = recording.remarks(0.1, recording.dwells(0.1))
-    assert said.startswith("lost: 10 of 2000 pulses are exactly 0")
-
-
 PATTERNS = {
     "each 97th": PULSES % 97 == 0,
     "each 7th": PULSES % 7 == 0,
@@ -172,29 +134,15 @@ def test_a_short_recording_and_one_without_noise_are_filled_in_too() -> None:
         np.testing.assert_allclose(found, whole, atol=0.02)
 
 
-def test_lost_pulses_of_a_recording_draw_no_rotor(tmp_path) -> None:
-    """Of each 97th pulse that was lost, ground was once a UAV, surely, with a comb of 258 Hz."""
-    whole = (100 + noise(np.random.default_rng(10), len(PULSES))).astype(np.complex64)
-    whole[::97] = 0
-    np.save(tmp_path / "ground.npy", whole)
-    recording = load_recording(tmp_path / "ground.npy", carrier_hz=9.85e9, prf_hz=25e3)
-    given = answer(recording, Classifier.load())
-    assert given.track.label != "uav"
-    assert not set(given.dwells.labels) & {"uav"}
-    assert given.shown == {}
-    (said,) = given.remarks
-    assert said.startswith("lost: 207 of 20000 pulses were exactly 0")
-    assert said.endswith("filled in from those beside them")
-
-
-def test_of_a_recording_that_clips_no_comb_that_stays_is_counted(tmp_path) -> None:
-    line = 100 * np.exp(2j * np.pi * 20 / 25e3 * PULSES) + noise(np.random.default_rng(11), len(PULSES))
-    clipped = np.clip(line.real, -70, 70) + 1j * np.clip(line.imag, -70, 70)
-    clipped[::97] = 0  # what is filled in must not hide it
-    np.save(tmp_path / "clipped.npy", clipped.astype(np.complex64))
-    given = answer(load_recording(tmp_path / "clipped.npy", carrier_hz=9.85e9, prf_hz=25e3), Classifier.load())
-    assert "comb" not in given.shown  # of 80 Hz, four times the line's own
-    assert set(given.dwells.labels) == {"unknown"}
-    assert "no comb that stays is counted" in given.remarks[0]
-    recording = load_recording(tmp_path / "clipped.npy", carrier_hz=9.85e9, prf_hz=25e3)
-    assert "tips may come out too fast" in recording.remarks(0.08, recording.dwells(0.08), measured=True)[0]
+def test_measure_fills_lost_pulses_in() -> None:
+    """Of each 72nd pulse that was lost, the comb was once that of the losses, 486 Hz and surely so."""
+    radar = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+    whole = (3 * rotors([58.61], velocity_mps=7.3, body=10.0) + noise(np.random.default_rng(12), 3000)).astype("c8")
+    lost = np.where(np.arange(3000) % 72 == 11, 0, whole)
+    given = np.stack([whole, lost, lost.real + 0j])
+    before = given.copy()
+    every = measure(given, **radar)
+    np.testing.assert_array_equal(given, before)  # the caller's samples stay as they are
+    assert every.chopping_hz == pytest.approx(2 * 58.61, rel=1e-3)
+    assert every.tip_speed_mps[1] == pytest.approx(every.tip_speed_mps[0], rel=0.03)
+    assert every.chopping_hz[0] == measure(whole, **radar).chopping_hz

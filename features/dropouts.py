@@ -73,6 +73,24 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     return lost if zeros > NEAR_SHARE * near and no_chance else none
 
 
+def without_lost(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
+    """Records with the pulses that each has lost filled in, same shape; those that are there are returned as they are.
+
+    Parameters
+    ----------
+    iq
+        Records, shape (..., pulses), finite.
+    """
+    with_zeros = np.argwhere((iq == 0).any(axis=-1))
+    out = iq
+    for index in map(tuple, with_zeros):
+        lost = lost_pulses(iq[index])
+        if lost.any():
+            out = iq.copy() if out is iq else out
+            out[index] = filled(iq[index], lost)
+    return out
+
+
 def _chance(zeros: int, near: int, share: float) -> float:
     """How likely so many zeros are, and more, among those and those nearly 0, if each is one by this chance."""
     from scipy.special import bdtrc  # here, because dwells are judged without

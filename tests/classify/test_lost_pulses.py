@@ -1,0 +1,82 @@
+"""What a recording tells of pulses that were lost, of channels that are missing, and of none of which a rotor comes."""
+
+import numpy as np
+from bladewing.classify import Classifier, answer, load_recording
+from bladewing.classify.recording import Recording
+from bladewing.features.dropouts import longest_silence
+
+from ..features.signals import white
+
+PULSES = np.arange(20000)
+
+
+def noise(rng: np.random.Generator, count: int) -> np.ndarray:
+    """White noise of unit power as a recording holds it."""
+    return white(rng, count).astype(np.complex64)
+
+
+def test_a_recording_tells_of_a_silence_that_cannot_be_filled_in() -> None:
+    iq = noise(np.random.default_rng(5), 2000)
+    iq[300:500] = iq[700:750] = 0
+    assert longest_silence(iq) == (300, 200)
+    recording = Recording("walk", iq, 24e9, 1e4)
+    (said,) = recording.remarks(0.1, recording.dwells(0.1))
+    assert said.startswith("silence: 200 pulses in a row are exactly 0 from 0.03 s on, too many to be filled in")
+    coarse = np.round(0.25 * noise(np.random.default_rng(6), 20000).real).astype(np.complex64)
+    for whole in (
+        coarse,
+        iq[:300],
+        np.zeros(200, np.complex64),
+        np.zeros(0, np.complex64),
+        np.where(np.arange(300) < 32, 0, 1),
+    ):
+        assert longest_silence(whole)[1] == 0
+
+
+def test_a_recording_tells_of_a_channel_that_is_missing() -> None:
+    iq = noise(np.random.default_rng(6), 2000)
+    for part, name in ((iq.real + 0j, "Q"), (1j * iq.imag, "I")):
+        recording = Recording("walk", part.astype(np.complex64), 24e9, 1e4)
+        (said,) = recording.remarks(0.1, recording.dwells(0.1))
+        assert said.startswith(f"one channel: {name} is 0 in every pulse")
+        (said,) = recording.remarks(0.1, recording.dwells(0.1), measured=True)
+        assert said.endswith("neither tips nor the sign of a velocity can be believed: record I and Q")
+    alike = Recording("walk", (iq.real * (1 - 1j)).astype(np.complex64), 24e9, 1e4)
+    assert alike.remarks(0.1, alike.dwells(0.1))[0].startswith("one channel: I and Q are the same but for a sign")
+    assert not Recording("walk", iq, 24e9, 1e4).remarks(0.1, iq.reshape(2, -1))
+
+
+def test_a_recording_tells_of_them_and_how_many() -> None:
+    iq = noise(np.random.default_rng(4), 2000)
+    iq[100:110] = 0
+    recording = Recording("walk", iq, 24e9, 1e4)
+    (said,) = recording.remarks(0.1, recording.dwells(0.1))
+    assert said.startswith("lost: 10 of 2000 pulses are exactly 0")
+
+
+def test_lost_pulses_of_a_recording_draw_no_rotor(tmp_path) -> None:
+    """Of each 97th pulse that was lost, ground was once a UAV, surely, with a comb of 258 Hz."""
+    whole = (100 + noise(np.random.default_rng(10), len(PULSES))).astype(np.complex64)
+    whole[::97] = 0
+    np.save(tmp_path / "ground.npy", whole)
+    recording = load_recording(tmp_path / "ground.npy", carrier_hz=9.85e9, prf_hz=25e3)
+    given = answer(recording, Classifier.load())
+    assert given.track.label != "uav"
+    assert not set(given.dwells.labels) & {"uav"}
+    assert given.shown == {}
+    (said,) = given.remarks
+    assert said.startswith("lost: 207 of 20000 pulses were exactly 0")
+    assert said.endswith("filled in from those beside them")
+
+
+def test_of_a_recording_that_clips_no_comb_that_stays_is_counted(tmp_path) -> None:
+    line = 100 * np.exp(2j * np.pi * 20 / 25e3 * PULSES) + noise(np.random.default_rng(11), len(PULSES))
+    clipped = np.clip(line.real, -70, 70) + 1j * np.clip(line.imag, -70, 70)
+    clipped[::97] = 0  # what is filled in must not hide it
+    np.save(tmp_path / "clipped.npy", clipped.astype(np.complex64))
+    given = answer(load_recording(tmp_path / "clipped.npy", carrier_hz=9.85e9, prf_hz=25e3), Classifier.load())
+    assert "comb" not in given.shown  # of 80 Hz, four times the line's own
+    assert set(given.dwells.labels) == {"unknown"}
+    assert "no comb that stays is counted" in given.remarks[0]
+    recording = load_recording(tmp_path / "clipped.npy", carrier_hz=9.85e9, prf_hz=25e3)
+    assert "tips may come out too fast" in recording.remarks(0.08, recording.dwells(0.08), measured=True)[0]
