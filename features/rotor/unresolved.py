@@ -204,8 +204,9 @@ def judged(
         _flashes_twice(fit, per_turn, tip, STRONG_FLASH_SHARE if more else SECOND_FLASH_SHARE)
         for fit, more in zip(rotors.fits, strong, strict=True)
     )
-    # airframes have rotors of an even number: two that flash together pass for one of their power
-    odd = len(rotors.fits) % 2 == 1 and bool(strong.any())
+    # like rotors of an airframe are of an even number: two that flash together pass for one of their power
+    alike = float(np.ptp(rotors.rates)) < 2 * RATE_SPREAD * float(rotors.rates.mean())
+    odd = alike and len(rotors.fits) % 2 == 1 and bool(strong.any())
     if twice and not several and per_turn == 1:  # unlike blades of one rotor do so in its turn
         twice = flashes_in_period(comb.fit, blade_numbers(None), tip)[0] == 1
     if twice and not several:  # or points along a lone one's blades do
