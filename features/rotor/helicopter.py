@@ -165,7 +165,10 @@ def _second_comb(data: Periodogram, comb: Comb, furthest: float) -> tuple[Gear |
     outer = max(-best.low, best.high) * best.spacing
     if off * outer / tail * data.pulses < MEETING_BINS:
         return None, f"no second comb: {gear.ratio:.3f} to 1 is a whole ratio, as of unequal blades"
-    return replace(gear, per_turn=_lines_per_turn(second.orders, powers_over_noise(data, second, samples))), ""
+    gear = replace(gear, per_turn=_lines_per_turn(second.orders, powers_over_noise(data, second, samples)))
+    if gear.ratio < GEAR_RANGE[0]:  # more than the highest may be: tails have up to four blades for each of the main
+        return None, f"no second comb: its strong lines are {gear.ratio:.3f} to 1, which is no gear's"
+    return gear, ""
 
 
 def _lines_per_turn(orders: NDArray[np.intp], power: NDArray[np.float64]) -> int:

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
+from bladewing.features.rotor import helicopter as module
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 from bladewing.simulate.catalogue import AIRFRAMES
 
@@ -144,6 +145,16 @@ def test_tail_blades_that_are_not_quite_alike_chop_by_their_number(blades, gear)
             truth = (2 * main_hz, blades * gear * main_hz, gear * blades / 2)
             np.testing.assert_allclose(values(found), truth, rtol=1e-3)
     assert told >= 2  # of four: else the weak lines are too few, and the fraction is no answer
+
+
+def test_a_second_comb_whose_strong_lines_are_as_far_apart_as_the_firsts_is_no_helicopters(monkeypatch):
+    """Of what a drone's unlike blades leave, lines at a fraction of their rate, every fourth one was strong."""
+    iq = helicopter(tail_db=12.0)  # the tail's comb is found first
+    assert measure(iq, **RADAR).gear_ratio == pytest.approx(GEAR, rel=1e-3)
+    monkeypatch.setattr(module, "_lines_per_turn", lambda *_: 4)
+    found = measure(iq, **RADAR)
+    assert np.isnan(found.gear_ratio)
+    assert "its strong lines are 1.18" in str(found.gear_reason)
 
 
 def test_the_reasons_of_no_comb_and_of_a_short_dwell():
