@@ -11,7 +11,8 @@ import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
 from bladewing.features.measure import MOST_BLADES_GIVEN, beyond_radars, measure
 from bladewing.features.measurements import BODY, EACH_ROTOR, Measurements
-from bladewing.features.one_channel import made_analytic
+from bladewing.features.one_channel import half_empty, made_analytic
+from bladewing.features.spectrum import centred_power, scaled, unit_scale
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
 from .envelope import Envelope
@@ -63,6 +64,12 @@ MOST_PULSES = Envelope.pulses_max
 
 #: No dwell knows the body better.
 LEAST_STD_MPS = 1e-6
+
+#: How fast a body is from dwell to dwell: by those that know it so well [m/s], but for so large a share at either end.
+KNOWN_MPS, ENDS = 1.0, 0.05
+
+#: A recording whose spectrum has one side alone in more than this share of its dwells is of one channel.
+ONE_SIDED = 0.5
 
 
 @dataclass(frozen=True)
@@ -168,6 +175,7 @@ class Measured:
         geared = np.isfinite(self.values.gear_ratio)
         pair = ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
         gear = {name: _median(getattr(self.values, name)[geared]) for name in pair}
+        medians["body_velocity_range_mps"] = self.body_range(held if held.any() else ~held)
         counts = {"dwells": len(self.iq), "with_comb": int(held.sum()), "with_second_comb": int(geared.sum())}
         beside = {"left_out_s": self.recording.left_out_s(self.iq), "remarks": list(self.remarks)}
         return {**counts, **beside, **medians, **gear, **self.over_all()}
@@ -190,6 +198,12 @@ class Measured:
         middle = float(value[np.minimum(pair, len(value) - 1)].mean())
         unlike = float((weight * (value - middle) ** 2).sum()) / max(len(value) - 1, 1)
         return dict(zip(BODY, (middle, float(np.sqrt(max(unlike, 1.0) / weight.sum()))), strict=True))
+
+    def body_range(self, dwells: np.ndarray) -> list[float] | None:
+        """The lowest and the highest velocity of the body in single dwells, of some of them; None where none knows it."""
+        values, stds = self.values.body_velocity_mps[dwells], self.values.body_velocity_mps_std[dwells]
+        known = values[np.isfinite(values) & (stds < KNOWN_MPS)]
+        return [float(edge) for edge in np.quantile(known, [ENDS, 1 - ENDS])] if len(known) else None
 
     def over_all(self) -> dict[str, Any]:
         """Wingbeat and acceleration over the whole recording; nothing where that is too short.
@@ -304,6 +318,12 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     beat = wingbeat(whole, **radar) if long else None
     stop_s = start_s + pulses / recording.prf_hz
     remarks = recording.remarks(settings.dwell_s, iq, measured=True)
+    empty = sum(bool(half_empty(centred_power(scaled(dwell, unit_scale(dwell))))) for dwell in iq)
+    if whole is recording.iq and empty > ONE_SIDED * count:  # else it is told that there is one channel
+        remarks += (
+            f"one side: half of the spectrum is empty in {empty} of {counted(count)}, as of a single channel that was "
+            "made analytic: whether a body comes or goes is not told",
+        )
     return Measured(recording, iq, start_s, stop_s, values, acceleration, acceleration_std, beat, remarks)
 
 

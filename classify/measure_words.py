@@ -1,7 +1,8 @@
 """What `bladewing measure` says: a table with error bars, one line a dwell, and one line of summary in words."""
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from bladewing.features.measurements import BODY
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 
 #: Where the middle half of so many combs and more reaches over this ratio, they are not the same in all dwells.
 LEAST_COMBS, UNSTEADY = 4, 1.25
+
+#: Bodies whose velocity differs by more from dwell to dwell have no single one [m/s].
+UNSTEADY_MPS = 1.0
 
 
 def print_measured(found: "Measured", console: "Console") -> None:
@@ -62,8 +66,7 @@ def print_measured(found: "Measured", console: "Console") -> None:
 def _sentence(found: "Measured") -> str:
     """The recording in one line: the answer an engineer wants."""
     all_together = found.together()
-    velocity_mps, std_mps = (all_together[name] for name in BODY)
-    body = "" if velocity_mps is None else f"; body {signed(velocity_mps, std_mps)} m/s"
+    body = _body(all_together)
     if not all_together["with_comb"]:
         return f"no rotor in {counted(all_together['dwells'])}{body}"
     clear = found.clearest()
@@ -85,9 +88,29 @@ def _sentence(found: "Measured") -> str:
             for c in v.alternatives((clear,))[:4]
         )
         rotor = "blades x rate: " + " or ".join(options)
+        rotor += _blades(found)
     where = f"comb in {all_together['with_comb']} of {counted(all_together['dwells'])}"
     folded = str(v.band_reason[clear])
     return f"{where}; {rotor}{body}{_gear(found)}{_wheel(found)}{_unsteady(found)}{folded and '; ' + folded}"
+
+
+def _body(all_together: Mapping[str, Any]) -> str:
+    """How fast the body is: its median, or from where to where where that is not the same in all dwells; or ""."""
+    velocity_mps, std_mps = (all_together[name] for name in BODY)
+    slowest, fastest = all_together["body_velocity_range_mps"] or (0.0, 0.0)
+    if fastest - slowest > UNSTEADY_MPS:
+        return f"; body {slowest:+.2f} to {fastest:+.2f} m/s"
+    return "" if velocity_mps is None else f"; body {signed(velocity_mps, std_mps)} m/s"
+
+
+def _blades(found: "Measured") -> str:
+    """How many dwells tell the number of blades, where the clearest does not; or ""."""
+    turns = found.values.chopping_hz / found.values.rotation_hz
+    told = np.rint(turns[np.isfinite(turns)]).astype(int)
+    if not len(told):
+        return ""
+    number = int(np.bincount(told).argmax())
+    return f"; {number} blade{'s' * (number > 1)} in {np.count_nonzero(told == number)} of {counted(len(turns))}"
 
 
 def _unsteady(found: "Measured") -> str:

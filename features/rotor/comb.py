@@ -289,7 +289,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     if start is None:
         return None, _too_short(data)
     if start.score < threshold(data):
-        return None, f"no comb: evidence {start.score:.1f} below {threshold(data):.0f} nats"
+        return None, f"no comb: evidence {start.score:.1f} nats, {threshold(data):.0f} are needed"
     start, open_orders = centred(data, of_flashes(data, start))
     fitted = fit_combs(data, start.centre, [start.spacing], [(start.low, start.high)])
     if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:

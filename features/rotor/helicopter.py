@@ -144,7 +144,7 @@ def _second_comb(data: Periodogram, comb: Comb, furthest: float) -> tuple[Gear |
     limits = spacing_limits(data.pulses, data.prf_hz)
     best = _loudest(rest, evidence, comb, limits, furthest)
     if best is None or best.score < THRESHOLD:
-        return None, f"no second comb: evidence {best.score if best else 0.0:.1f} below {THRESHOLD:.0f} nats"
+        return None, f"no second comb: evidence {best.score if best else 0.0:.1f} nats, {THRESHOLD:.0f} are needed"
     rival = _rival(rest, evidence, hidden, best)
     if rival > 0:
         return None, f"no second comb: the lines left over repeat every {rival * data.prf_hz:.1f} Hz as well"

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from bladewing.classify.cli import main
 from bladewing.classify.measure import Measured, Settings, measure_recording
-from bladewing.classify.measure_words import with_error
+from bladewing.classify.measure_words import _blades, with_error
 from bladewing.classify.recording import load_recording
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
+from scipy.signal import hilbert
 
 CARRIER_HZ, PRF_HZ, PULSES = 9.85e9, 35e3, 3000
 RADAR = ["--carrier-hz", "9.85e9", "--prf-hz", "35e3"]
@@ -84,6 +85,42 @@ def test_a_body_without_a_rotor_has_its_velocity(tmp_path, capsys):
     np.save(tmp_path / "line.npy", line.astype(np.complex64))
     assert main(["measure", str(tmp_path / "line.npy"), *RADAR]) == 0
     assert re.search(r"no rotor in 2 dwells; body -(19\.99|20\.0[01]) \+- 0\.01 m/s", capsys.readouterr().out)
+
+
+def test_a_body_that_grows_faster_has_no_single_velocity(tmp_path, capsys):
+    """Of dwells an instant apart the median was told, with the error of a mean."""
+    parts = [line * 10 for line in np.split(moving(6 * PULSES), 6)]
+    times_s = np.arange(PULSES) / PRF_HZ
+    iq = [
+        part * np.exp(-4j * np.pi * n * times_s / WAVELENGTH_M) for n, part in enumerate(parts)
+    ]  # 1 m/s from each to each
+    np.save(
+        tmp_path / "off.npy", (np.concatenate(iq) + white(np.random.default_rng(4), 6 * PULSES)).astype(np.complex64)
+    )
+    dwell = ["--dwell", str(PULSES / PRF_HZ)]
+    assert main(["measure", str(tmp_path / "off.npy"), *RADAR, *dwell]) == 0
+    assert "no rotor in 6 dwells; body -19.75 to -15.25 m/s" in capsys.readouterr().out
+    assert main(["measure", str(tmp_path / "off.npy"), *RADAR, *dwell, "--json"]) == 0
+    *_, closing = capsys.readouterr().out.splitlines()
+    edges = json.loads(closing)["recording"]["body_velocity_range_mps"]
+    assert edges == pytest.approx([VELOCITY_MPS + 0.25, VELOCITY_MPS + 4.75], abs=0.01)
+
+
+def test_of_one_side_alone_it_is_told_that_a_velocity_has_no_sign(folder, tmp_path, capsys):
+    noise = np.load(folder / "noise.npy")
+    half = hilbert((10 * moving(2 * PULSES) + noise).real).astype(np.complex64)
+    for name, iq, one in (("half", half, True), ("both", noise, False)):
+        np.save(tmp_path / f"{name}.npy", iq)
+        assert main(["measure", str(tmp_path / f"{name}.npy"), *RADAR]) == 0
+        assert ("half of the spectrum is empty in 2 of 2 dwells" in capsys.readouterr().out) == one
+
+
+def test_dwells_that_tell_the_number_of_blades_are_heard_though_the_clearest_does_not():
+    values = SimpleNamespace(chopping_hz=np.array([320.0, 321.0, 319.0, np.nan]), rotation_hz=np.full(4, np.nan))
+    found = SimpleNamespace(values=values)
+    assert _blades(found) == ""
+    values.rotation_hz[:2] = 160.0, 160.5
+    assert _blades(found) == "; 2 blades in 2 of 4 dwells"
 
 
 def test_a_dwell_that_hardly_tells_the_body_does_not_speak_for_the_recording(folder):
