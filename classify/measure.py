@@ -200,7 +200,7 @@ class Measured:
         return dict(zip(BODY, (middle, float(np.sqrt(max(unlike, 1.0) / weight.sum()))), strict=True))
 
     def body_range(self, dwells: np.ndarray) -> list[float] | None:
-        """The lowest and the highest velocity of the body in single dwells, of some of them; None where none knows it."""
+        """Lowest and highest velocity of the body in single dwells, of some of them; None where none knows it well."""
         values, stds = self.values.body_velocity_mps[dwells], self.values.body_velocity_mps_std[dwells]
         known = values[np.isfinite(values) & (stds < KNOWN_MPS)]
         return [float(edge) for edge in np.quantile(known, [ENDS, 1 - ENDS])] if len(known) else None
