@@ -11,6 +11,7 @@ from typing import NoReturn
 
 import numpy as np
 from bladewing.features.allocator import keep_freed
+from bladewing.features.dropouts import without_lost
 from bladewing.features.inputs import model_inputs
 from bladewing.features.spectrum import LEAST_PART, largest_part
 from bladewing.models import KIND_SCORES
@@ -238,7 +239,8 @@ class Classifier:
         ----------
         iq
             Shape (..., pulses), complex: one range cell, one sample a pulse. Leading axes are a batch, and every
-            record is answered as if it were alone. The gain does not matter.
+            record is answered as if it were alone. The gain does not matter. Pulses that were lost, which are exactly
+            0, are filled in by what those beside them tell of them.
         carrier_hz
             Carrier [Hz].
         prf_hz
@@ -268,7 +270,7 @@ class Classifier:
         if samples.ndim == 0 or samples.shape[-1] == 0:
             raise BadInput(f"iq has shape {samples.shape}: it must be (..., pulses) with one pulse or more")
         *leading, pulses = samples.shape
-        told, labels, reasons = self._answers(samples.reshape(-1, pulses), carrier_hz, prf_hz)
+        told, labels, reasons = self._answers(without_lost(samples.reshape(-1, pulses)), carrier_hz, prf_hz)
         return Prediction(
             labels.reshape(leading),
             np.ascontiguousarray(told[:, :-1]).reshape(*leading, len(CLASSES)),

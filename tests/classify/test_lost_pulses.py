@@ -69,6 +69,15 @@ def test_lost_pulses_of_a_recording_draw_no_rotor(tmp_path) -> None:
     assert said.endswith("filled in from those beside them")
 
 
+def test_nor_do_those_of_records_from_python() -> None:
+    whole = (100 + noise(np.random.default_rng(10), len(PULSES))).astype(np.complex64).reshape(10, 2000)
+    spoilt = whole.copy()
+    spoilt[:, ::97] = 0
+    given, clear = (Classifier.load().predict(iq, carrier_hz=9.85e9, prf_hz=25e3) for iq in (spoilt, whole))
+    np.testing.assert_array_equal(given.labels, clear.labels)
+    np.testing.assert_allclose(given.probabilities, clear.probabilities, atol=0.05)
+
+
 def test_of_a_recording_that_clips_no_comb_that_stays_is_counted(tmp_path) -> None:
     line = 100 * np.exp(2j * np.pi * 20 / 25e3 * PULSES) + noise(np.random.default_rng(11), len(PULSES))
     clipped = np.clip(line.real, -70, 70) + 1j * np.clip(line.imag, -70, 70)
