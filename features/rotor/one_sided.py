@@ -27,8 +27,9 @@ LEAST_UNLIKE, LEAST_UNEVEN = 0.02, 0.01
 #: The image of an order is sought so many bins of the padded spectrum beside its place too; a line takes up so many.
 BESIDE, LINE_BINS = 4, 12
 
-#: A filter took a line out that is so near to rest [bins] and so far below its neighbours [nats], of so many orders.
-AT_REST_BINS, FILTERED_BELOW, NEIGHBOURS = 1.0, 2.0, 4
+#: A filter took a line out that is so near to rest [bins] and so far below its neighbours [nats], of so many orders,
+#: in the bins of the padded spectrum so near to it: other rotors' lines lie beside.
+AT_REST_BINS, FILTERED_BELOW, NEIGHBOURS, HOLE_BINS = 1.0, 2.0, 4, 2
 
 
 class Sides:
@@ -52,15 +53,17 @@ class Sides:
         nats = np.log(np.maximum(data.power[bins] * data.seen[bins] * level / (OVER * level.max()), 1))
         tops = nats[:, half - near : half + near + 1].max(axis=1)
         self._is_at_rest = abs(comb.centre) * data.pulses < AT_REST_BINS
-        self._middle, self._tops = reach, tops
+        own = np.log(level[reach] * np.maximum(data.power[bins[reach]] * data.seen[bins[reach]], 1))
+        beside = np.log(level * np.maximum(data.power[bins], 1))[:, half - near : half + near + 1].max(axis=1)
+        beside = np.delete(beside, reach)[max(reach - NEIGHBOURS, 0) : reach + NEIGHBOURS]
+        self._below = float(np.median(beside) - own[half - HOLE_BINS : half + HOLE_BINS + 1].max())
         self._after, self._before = nats[reach + 1 :], nats[:reach][::-1, ::-1]
         self._tops_after, self._tops_before = tops[reach + 1 :], tops[:reach][::-1]
 
     @property
     def filtered_out(self) -> bool:
         """Whether the line itself is missing, at rest: a filter takes out what stands there."""
-        beside = self._tops[max(self._middle - NEIGHBOURS, 0) : self._middle + NEIGHBOURS + 1]
-        return bool(self._is_at_rest and self._tops[self._middle] < np.median(beside) - FILTERED_BELOW)
+        return self._is_at_rest and self._below > FILTERED_BELOW
 
     @property
     def one_sided(self) -> bool:
