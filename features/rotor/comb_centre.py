@@ -9,6 +9,7 @@ from scipy import fft
 from ..bodies import LINE_DB
 from .comb_search import FINE_STEPS, Candidate, even_scores
 from .folding import outermost_orders
+from .one_sided import Sides
 from .periodogram import Periodogram
 
 #: What speaks for the comb's centre where a line stands so far over all others of it [nats, dB], and more for each dB
@@ -50,6 +51,10 @@ EVENEST = 8
 #: strong as a body's [nats]: a background is strong whatever hovers in it, and a line of the comb comes as near to it
 #: by chance, but many do hover. Where no line stands out that moves, the body hides in what was taken out there.
 REST, HOVERS = 14.0, 5.0
+
+#: Lines that are even about their middle no more than this may all lie on one side of another line, if that is a strong
+#: one; however uneven they are, that leaves both open [nats].
+FLAT, LEAST_EVEN = 5.0, -2.0
 
 #: A line is at rest so near to it [bins].
 AT_REST_BINS = 1.0
@@ -101,16 +106,14 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
         totals[shift] = max(totals.get(shift, -np.inf), total)
         if total > most:
             most = total
-            if centre == found.centre:
-                best = found
-            else:
-                best = Candidate(
-                    float(steps[index]),
-                    centre,
-                    max(min(found.low - shift, 0), -within),
-                    min(max(found.high - shift, 0), within),
-                    found.score,
-                )
+            best = found if centre == found.centre else _counted_from(found, float(steps[index]), centre, shift, within)
+    # as one-sided lines of a strong line's, all that speaks for the best order speaks for that one
+    for shift, nats in _one_sided(data, found, best, bonuses).items():
+        totals[shift] = max(totals.get(shift, -np.inf), most + nats)
+    shift = max(totals, key=totals.__getitem__)
+    if totals[shift] > most:
+        most = totals[shift]
+        best = _counted_from(found, best.spacing, found.centre + found.spacing * shift, shift, within)
     chosen = round((best.centre - found.centre) / found.spacing)
     near = chosen + np.arange(-NEAR_ORDERS, NEAR_ORDERS + 1)
     others = np.setdiff1d(np.append(near, list(even)).astype(np.intp), list(totals))
@@ -124,6 +127,42 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
         _, (reach,) = even_scores(evidence, np.array([best.spacing]), np.array([best.centre]), furthest)
         best = replace(best, centre=best.centre - round(best.centre), low=-int(reach), high=int(reach))
     return best, float(np.sqrt((likely * away**2).sum() / likely.sum()))
+
+
+def _counted_from(found: Candidate, spacing: float, centre: float, order: int, within: int) -> Candidate:
+    """A comb counted from one of its orders, its spacing and centre as given [cycles a sample]."""
+    low, high = max(min(found.low - order, 0), -within), min(max(found.high - order, 0), within)
+    return Candidate(spacing, centre, low, high, found.score)
+
+
+def _one_sided(data: Periodogram, found: Candidate, best: Candidate, bonuses: dict[float, float]) -> dict[int, float]:
+    """What speaks for strong lines that all of a comb's lines lie on one side of, by order [nats over the best].
+
+    Nothing does where the best order tells the body by how even all is about it, or where a filter took it out.
+    """
+    if found.is_folded or data.one_channel:
+        return {}
+    lines = zip(data.strong.centres, data.strong.centres_db, strict=True)
+    strong = [place for place, level_db in lines if level_db > LINE_DB and place in bonuses]
+    rivals, span = {}, best.high - best.low
+    for place in strong:
+        order = round((place - best.centre) / best.spacing)
+        sides = Sides(data, replace(best, centre=best.centre + best.spacing * order, low=-span, high=span))
+        if order != 0 and sides.one_sided:
+            rivals[place] = sides
+    if not rivals:
+        return {}
+    own = Sides(data, best)
+    if own.filtered_out:
+        return {}
+    even = max(own.even_nats() - FLAT, LEAST_EVEN) + max(
+        (nats for place, nats in bonuses.items() if abs(place - best.centre) < best.spacing / 2), default=0.0
+    )
+    out: dict[int, float] = {}
+    for place, sides in rivals.items():
+        nats = bonuses[place] + max(sides.even_nats() - FLAT, 0.0) - even
+        out[round((place - found.centre) / found.spacing)] = nats
+    return out
 
 
 def _furthest(data: Periodogram, found: Candidate) -> tuple[int, float]:

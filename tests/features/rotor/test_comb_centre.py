@@ -164,17 +164,33 @@ def test_a_body_that_was_filtered_out_is_where_its_lines_are_even(filtered, draw
     assert tip_wrong <= 1
 
 
-def test_one_sided_lines_do_not_outvote_a_line_that_stands_out():
-    # a blade that shows where it comes nearer alone has lines on one side of the body, even about their own middle
-    rng, times_s, wrong = np.random.default_rng(3), np.arange(signals.PULSES) / signals.PRF_HZ, 0
+def one_sided(rng: np.random.Generator, other: float, body_db: float, amplitude: float) -> tuple[np.ndarray, float]:
+    """A rotor whose blades reflect this much as they go beside what they do as they come, and its velocity [m/s].
+
+    The body's line is so far over the power of all lines of the blades [dB].
+    """
+    times_s = np.arange(signals.PULSES) / signals.PRF_HZ
+    rate_hz, velocity_mps = rng.uniform(50, 90), rng.uniform(-30, 30)
+    angle_rad = 2 * np.pi * rate_hz * times_s + rng.uniform(0, np.pi)
+    away = 2 * 0.15 / signals.WAVELENGTH_M * np.cos(angle_rad)  # of the blade's middle, in turns of the phase
+    come, go = np.sinc(away) * np.exp(2j * np.pi * np.outer([1, -1], away / 2))
+    lines = np.where(np.sin(angle_rad) > 0, come + other * go, other * come + go)
+    lines = (lines - lines.mean()) / lines.std() + 10 ** (body_db / 20)
+    turn = signals.tone(-2 * velocity_mps / signals.WAVELENGTH_M)
+    return amplitude * lines * turn + signals.white(rng, signals.PULSES), velocity_mps
+
+
+# such lines, to one side of the body alone, are even about their own middle: of 20 each none, 20 and 19 were wrong and
+# sure. A body's line that is hardly stronger than each of the blades' leaves it open
+@pytest.mark.parametrize(
+    ("other", "body_db", "amplitude", "most_unsure"), [(0.2, -5, 2, 2), (0.1, -10, 3, 20), (0, 0, 10, 2)]
+)
+def test_one_sided_lines_do_not_outvote_a_line_that_stands_out(other, body_db, amplitude, most_unsure):
+    rng, wrong, unsure = np.random.default_rng(3), 0, 0
     for _ in range(20):
-        rate_hz, velocity_mps = rng.uniform(50, 90), rng.uniform(-30, 30)
-        angle_rad = 2 * np.pi * rate_hz * times_s + rng.uniform(0, np.pi)
-        away = 2 * 0.15 / signals.WAVELENGTH_M * np.cos(angle_rad)  # of the blade's middle, in turns of the phase
-        one, other = np.sinc(away) * np.exp(2j * np.pi * np.outer([1, -1], away / 2))
-        lines = np.where(np.sin(angle_rad) > 0, one + 0.2 * other, 0.2 * one + other)
-        lines = (lines - lines.mean()) / lines.std() + 10 ** (-5 / 20)
-        iq = 2 * lines * signals.tone(-2 * velocity_mps / signals.WAVELENGTH_M) + signals.white(rng, signals.PULSES)
+        iq, velocity_mps = one_sided(rng, other, body_db, amplitude)
         found = measure(iq, carrier_hz=signals.CARRIER_HZ, prf_hz=signals.PRF_HZ, blades=2)
         wrong += bool(abs(found.body_velocity_mps - velocity_mps) > max(4 * found.body_velocity_mps_std, 0.1))
+        unsure += bool(found.body_velocity_mps_std > 1.0)
     assert wrong == 0
+    assert unsure <= most_unsure

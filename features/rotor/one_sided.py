@@ -1,0 +1,118 @@
+"""How even a comb's levels are to both sides of a line, or whether all lie on one side of it.
+
+A blade that reflects only as it comes, or as it goes, has lines to one side of the body alone. About their own middle
+they are even as well, as far as they reach: what tells is whether levels are more like their mirror images than like
+their neighbours.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .comb_search import Candidate
+from .periodogram import Periodogram
+
+#: Compared is what stands so many times over the level; an order shows where a place so much of a spacing to each side
+#: of it, at most, stands so much further over it [nats].
+OVER, NEAR_SHARE, SHOWS = 3.0, 0.25, 1.0
+
+#: All lies on one side of a line where that is the stronger one at such a share of the orders that show.
+SAME_SIDE = 0.85
+
+#: Fewer orders tell nothing.
+LEAST_ORDERS = 4
+
+#: No two levels are told to be more alike than by so much [nats], or its square.
+LEAST_UNLIKE, LEAST_UNEVEN = 0.02, 0.01
+
+#: The image of an order is sought so many bins of the padded spectrum beside its place too; a line takes up so many.
+BESIDE, LINE_BINS = 4, 12
+
+#: A filter took a line out that is so near to rest [bins] and so far below its neighbours [nats], of so many orders,
+#: in the bins of the padded spectrum so near to it: other rotors' lines lie beside.
+AT_REST_BINS, FILTERED_BELOW, NEIGHBOURS, HOLE_BINS = 1.0, 2.0, 4, 2
+
+
+class Sides:
+    """What lies to both sides of a line of a comb.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    comb : Candidate
+        The comb, counted from that line.
+    """
+
+    def __init__(self, data: Periodogram, comb: Candidate) -> None:
+        size, reach = len(data.power), max(min(max(comb.high, -comb.low), int(0.49 / comb.spacing)), 1)
+        half = int(comb.spacing * size / 2)
+        near = max(int(2 * NEAR_SHARE * half), 2)
+        middles = np.rint((comb.centre + comb.spacing * np.arange(-reach, reach + 1)) * size).astype(np.intp)
+        bins = (middles[:, None] + np.arange(-half, half + 1)) % size
+        level = data.level[bins]  # lines lift it, and not to both sides alike: what is compared are powers
+        nats = np.log(np.maximum(data.power[bins] * data.seen[bins] * level / (OVER * level.max()), 1))
+        tops = nats[:, half - near : half + near + 1].max(axis=1)
+        self._is_at_rest = abs(comb.centre) * data.pulses < AT_REST_BINS
+        own = np.log(level[reach] * np.maximum(data.power[bins[reach]] * data.seen[bins[reach]], 1))
+        beside = np.log(level * np.maximum(data.power[bins], 1))[:, half - near : half + near + 1].max(axis=1)
+        beside = np.delete(beside, reach)[max(reach - NEIGHBOURS, 0) : reach + NEIGHBOURS]
+        self._below = float(np.median(beside) - own[half - HOLE_BINS : half + HOLE_BINS + 1].max())
+        self._after, self._before = nats[reach + 1 :], nats[:reach][::-1, ::-1]
+        self._tops_after, self._tops_before = tops[reach + 1 :], tops[:reach][::-1]
+
+    @property
+    def filtered_out(self) -> bool:
+        """Whether the line itself is missing, at rest: a filter takes out what stands there."""
+        return self._is_at_rest and self._below > FILTERED_BELOW
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether nearly all that shows is stronger on the same side of the line."""
+        after, before = self._tops_after, self._tops_before
+        either = np.maximum(after, before) > SHOWS
+        stronger = float((after > before)[either].mean()) if either.sum() >= LEAST_ORDERS else 0.5
+        return max(stronger, 1 - stronger) >= SAME_SIDE
+
+    def even_nats(self) -> float:
+        """What speaks for the line by how much more like their mirror images levels are than like their neighbours.
+
+        One side may be weaker than the other by any factor: the edges of a blade reflect unlike.
+        """
+        both = np.minimum(self._tops_after, self._tops_before) > SHOWS
+        if both.sum() < LEAST_ORDERS:
+            return 0.0
+        return self._of_levels(both) + self._of_places(both)
+
+    def _of_levels(self, both: NDArray[np.bool_]) -> float:
+        """By the level of each order."""
+        after, before = self._tops_after, self._tops_before
+        unlike = (after - before)[both]
+        in_a_row = both[1:] & both[:-1]
+        steps = np.abs(np.concatenate([np.diff(after)[in_a_row], np.diff(before)[in_a_row]]))
+        if len(steps) < LEAST_ORDERS:
+            return 0.0
+        images = float(np.median(np.abs(unlike - np.median(unlike))))
+        return len(unlike) * float(np.log((np.median(steps) + LEAST_UNLIKE) / (images + LEAST_UNLIKE)))
+
+    def _of_places(self, both: NDArray[np.bool_]) -> float:
+        """By where lines lie about each order: those of several rotors part."""
+        images, bins = self._uneven(both, 0)
+        neighbours, _ = self._uneven(both, 1)
+        ratio = (neighbours + LEAST_UNEVEN) / (images + LEAST_UNEVEN)
+        return bins / LINE_BINS / 2 * float(np.log(ratio))
+
+    def _uneven(self, both: NDArray[np.bool_], apart: int) -> tuple[float, int]:
+        """Mean square by which orders and images so many orders apart differ [nats^2], and of how many bins."""
+        kept = slice(None, len(both) - apart), slice(apart, None)
+        out = []
+        for shift in range(-BESIDE, BESIDE + 1):
+            beside = np.roll(self._before, shift, axis=1)
+            square, bins = 0.0, 0
+            for one, other in (kept, kept[::-1])[: apart + 1]:
+                here = (both[one] & both[other])[:, None]
+                after, before = self._after[one], beside[other]
+                here = here & ((after > 0) | (before > 0))
+                square += float(((after - before)[here] ** 2).sum())
+                bins += int(here.sum())
+            out.append((square / max(bins, 1), bins))
+        return min(out)
