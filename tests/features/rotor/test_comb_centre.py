@@ -164,6 +164,17 @@ def test_a_body_that_was_filtered_out_is_where_its_lines_are_even(filtered, draw
     assert tip_wrong <= 1
 
 
+@pytest.mark.parametrize("seed", [6, 11, 22, 32])
+def test_a_body_that_was_filtered_out_is_known_by_the_hole_it_leaves_though_lines_lift_the_level_about_it(seed):
+    rng, times_s = np.random.default_rng([7, seed]), np.arange(signals.PULSES + 1) / signals.PRF_HZ
+    length_m, rates = rng.uniform(0.1, 0.2), rng.uniform(60, 75, size=4)
+    lines = signals.rotors_by_chance(rng, rates, times_s, wavelength_m=signals.WAVELENGTH_M, length_m=length_m)
+    iq = np.sqrt(10) * (lines + 10.0) + signals.white(rng, len(times_s))
+    found = measure(iq - iq.mean(), carrier_hz=signals.CARRIER_HZ, prf_hz=signals.PRF_HZ, blades=2, beta_rad=0.0)
+    assert abs(found.body_velocity_mps) < 0.1  # it was 30 to 70 m/s off, give or take 10 to 20
+    assert found.body_velocity_mps_std < 0.1
+
+
 def one_sided(rng: np.random.Generator, other: float, body_db: float, amplitude: float) -> tuple[np.ndarray, float]:
     """A rotor whose blades reflect this much as they go beside what they do as they come, and its velocity [m/s].
 
