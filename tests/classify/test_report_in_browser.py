@@ -173,6 +173,12 @@ def test_on_a_phone_the_lettered_tables_and_all_captions_are_seen_whole(page: Pa
     assert [table for table in tables if table["cut"] > 1] == []
 
 
+def test_on_a_small_desk_the_tables_that_are_not_folded_are_seen_whole(page: Page, html: Path) -> None:
+    page.show(html, 1200)
+    tables = page.value(TABLES)
+    assert [table for table in tables if table["kind"] in ("stack", "confusion") and table["over"] > 0] == []
+
+
 SORTED = """(() => {
   const read = (table, i) => [...table.tBodies[0].rows].map((r) => r.cells[i].dataset.v ?? r.cells[i].textContent);
   return [...document.querySelectorAll("table")].filter((t) => t.querySelector("th button")).map((table) => {
