@@ -12,7 +12,7 @@ from .letters import write_letters
 from .series import choice_looks
 from .svg import INK, MUTED, PAPER, SERIES, Panel, banded, drawing, panel
 from .ticks import log_ticks, percent_ticks, share_axis
-from .words import batch_words, micros, millis, percent, size
+from .words import batch_words, count, micros, millis, percent
 
 #: Letters of the points that nothing beats, in the order of their cost.
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
@@ -161,8 +161,8 @@ def stored(report: Mapping[str, Any]) -> list[Panel]:
         axes.set_xscale("log", base=2)
         axes.xaxis.set_major_locator(LogLocator(base=4))
         axes.xaxis.set_minor_locator(NullLocator())
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: size(value)))
-        axes.set_xlabel("a record; MB for a million records")
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: count(round(value))))  # powers of two, whole
+        axes.set_xlabel("bytes a record")
         percent_ticks(axes.yaxis)
         axes.set_ylabel("balanced accuracy")
         alt = f"Balanced accuracy against stored bytes. {' '.join(words)}"

@@ -329,3 +329,11 @@ def test_curves_that_are_not_drawn_are_not_described_and_the_cure_is_named(repor
     assert "Not drawn: " in page
     assert "(dashed)" not in page
     assert "leave <code>--quick</code> out, or set <code>front_test</code>" in page
+
+
+def test_stored_bytes_are_numbered_in_whole_bytes(report: dict[str, Any]) -> None:
+    from bladewing.classify.report.draw_front import stored
+
+    svg = stored(report)[0].svg
+    assert ">1024</text>" in svg
+    assert ">bytes a record</text>" in svg
