@@ -159,9 +159,10 @@ def _read_mat(path: Path, variable: str | None) -> dict[str, NDArray[np.generic]
 
     try:
         with open(path, "rb") as file:
-            if file.read(len(_HDF5)) == _HDF5:  # without the head that MATLAB writes before it
-                raise _hdf5(path)
-        if scipy.io.matlab.matfile_version(path)[0] == 1:
+            head = file.read(len(_HDF5))
+        if head == _HDF5:  # without the head that MATLAB writes before it
+            raise _hdf5(path)
+        if _mat_version(path, head) == 1:
             require_sound(path)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about variables that are of no concern here
@@ -180,6 +181,19 @@ def _read_mat(path: Path, variable: str | None) -> dict[str, NDArray[np.generic]
         raise _hdf5(path) from None
     except Exception as error:  # a damaged file makes scipy raise nearly anything
         raise BadInput(_damaged(path, error)) from None
+
+
+def _mat_version(path: Path, head: bytes) -> int:
+    """Version of the format: 0 for 4, 1 for 5 to 7, 2 for 7.3."""
+    from scipy.io.matlab import matfile_version
+
+    try:
+        return int(matfile_version(path)[0])
+    except Exception as error:
+        if isinstance(error, OSError) or head.startswith(b"MATLAB"):
+            raise
+        cure = "save the samples with save(name, 'iq', '-v7') or scipy.io.savemat"
+        raise BadInput(f"{path}: not a MATLAB file, whatever its name says: {cure}") from None
 
 
 def _hdf5(path: Path) -> BadInput:

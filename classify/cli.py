@@ -14,6 +14,7 @@ import typer
 
 from .errors import BadInput, Interrupted
 from .exits import complain, exit_code, mend_streams
+from .files import no_empty_folder
 from .limits import LEAST_RECORDS
 from .terminal import console
 
@@ -212,7 +213,7 @@ def train(
     from .parts import TRAIN_PARTS
     from .train import run_training
 
-    with _goes_on(out / TRAIN_PARTS):
+    with no_empty_folder(out), _goes_on(out / TRAIN_PARTS):
         run_training(out, records=records, seed=seed, quick=quick, config=config, data=data, progress=True)
 
 
@@ -232,7 +233,7 @@ def dataset(
     """Write the records of a training to disk; interrupted, the same command goes on."""
     from .dataset import run_dataset
 
-    with _goes_on(out):
+    with no_empty_folder(out), _goes_on(out):
         run_dataset(out, records=records, seed=seed, config=config, progress=True)
 
 
@@ -279,7 +280,7 @@ def report(
     from .parts import REPORT_PARTS
     from .report.run import run_report
 
-    with _goes_on(out / REPORT_PARTS):
+    with no_empty_folder(out), _goes_on(out / REPORT_PARTS):
         run_report(out, models=models, quick=quick, seed=seed, config=config, progress=True)
 
 
@@ -345,7 +346,8 @@ def stability(
     """Take every stage to its extremes: errors against a more precise oracle, and the guard that acts there."""
     from .stability import run_stability
 
-    run_stability(out, quick=quick, progress=True)
+    with no_empty_folder(out):
+        run_stability(out, quick=quick, progress=True)
 
 
 @app.command()
@@ -356,7 +358,9 @@ def tables(
     """Make the paper's tables again: its theory and measurements beside those of this product."""
     from .tables import markdown, run_tables
 
-    print(markdown(run_tables(out, seed)), flush=True)
+    with no_empty_folder(out):
+        made = run_tables(out, seed)
+    print(markdown(made), flush=True)
     print(f"Wrote {out / 'tables.md'} and {out / 'tables.json'}", flush=True)
 
 

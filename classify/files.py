@@ -161,6 +161,21 @@ def result_folder(path: str | os.PathLike[str]) -> Path:
     return folder
 
 
+@contextlib.contextmanager
+def no_empty_folder(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Around a run that writes to a folder: what it makes of that and those above goes again where it stays empty.
+
+    A run that is stopped early, or that lacks a library, leaves nothing then.
+    """
+    made = [folder for folder in (Path(path), *Path(path).parents) if not os.path.exists(folder)]
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):  # of the first that holds something, all above do
+            for folder in made:
+                folder.rmdir()
+
+
 #: Journal of a change of several files that was decided but maybe not finished.
 _JOURNAL = ".bladewing-pending.json"
 _JOURNAL_BYTES = 1 << 20

@@ -122,6 +122,18 @@ class Parts:
         """Remove all parts of this run, whose result stands; those of others stay, the folder until `alone` ends."""
         shutil.rmtree(self._folder, ignore_errors=True)
 
+    def others(self) -> str:
+        """Say in one line what other runs have left unfinished beside this one; empty where none has."""
+        left = [folder for folder in self._all.glob("*") if folder.is_dir() and folder != self._folder]
+        if not left:
+            return ""
+        held = sum(file.stat().st_size for folder in left for file in folder.rglob("*") if file.is_file())
+        what, it = ("an unfinished run", "it") if len(left) == 1 else (f"{len(left)} unfinished runs", "them")
+        return (
+            f"{self._all} holds {what} of other settings or of another version, {held / 1e6:.3g} MB: "
+            f"what began {it} goes on with {it}, or remove the folder to be rid of {it}"
+        )
+
     def _clear(self) -> None:
         """Remove the folder of all runs, if nothing is in it."""
         with suppress(OSError):

@@ -219,8 +219,9 @@ def _check_structure(metadata: Any, path: Path) -> None:
     datatype = general.get("core:datatype")
     match = _DATATYPE.fullmatch(datatype) if isinstance(datatype, str) else None
     if match is None:
+        said = f"is {datatype!r}" if "core:datatype" in general else "is missing"
         raise BadInput(
-            f"{path}: core:datatype is {datatype!r}: it must be the SigMF type of the samples, such as 'cf32_le' "
+            f"{path}: core:datatype {said}: it must be the SigMF type of the samples, such as 'cf32_le' "
             "(c for complex; f of 32 or 64 bits, i or u of 8, 16, 32 or 64; _le or _be)"
         )
     if match[1] == "r":

@@ -152,6 +152,8 @@ def _train_all(
     parts.forget()
     if progress:
         print_account(account, out)
+    if others := parts.others():
+        bars.say(others)
     return account
 
 

@@ -17,10 +17,12 @@ def main() -> None:
     kept = {name for name, _ in front(told["models"])}
     if told[CASCADE]:
         kept |= set(told[CASCADE][STAGES_KEY])
-    for file in PRETRAINED.glob("*.onnx"):
-        if file.stem not in kept:
-            file.unlink()
-            print(f"took out {file.stem}")
+    beaten = [file for file in PRETRAINED.glob("*.onnx") if file.stem not in kept]
+    for file in beaten:
+        file.unlink()
+        print(f"took out {file.stem}")
+    if not beaten:
+        print("nothing to take out")
 
 
 if __name__ == "__main__":

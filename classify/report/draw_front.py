@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from .draw_scores import LEAST_SHOWN
+from .letters import write_letters
 from .series import choice_looks
 from .svg import INK, MUTED, PAPER, SERIES, Panel, banded, drawing, panel
 from .ticks import log_ticks, percent_ticks, share_axis
-from .words import batch_words, micros, millis, percent, size
+from .words import batch_words, count, micros, millis, percent
 
 #: Letters of the points that nothing beats, in the order of their cost.
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
@@ -68,11 +68,11 @@ def time_front(report: Mapping[str, Any]) -> list[Panel]:
                     marker=look.marker,
                     markersize=6,
                 )
-            _label(axes, x, y, [letter for letter, _, _ in best])
             log_ticks(axes.xaxis, axes.get_xlim())
             axes.set_xlabel("IQ to probabilities [µs a record]")
             percent_ticks(axes.yaxis)
             axes.set_ylabel("balanced accuracy")
+            write_letters(axes, x, y, [letter for letter, _, _ in best])
             title = batch_words(first["batch"]).capitalize()
             words = "; ".join(
                 f"{letter}: {row['words']}, {row['model']}, {millis(point['dwell_s'])}, "
@@ -82,31 +82,6 @@ def time_front(report: Mapping[str, Any]) -> list[Panel]:
             alt = f"Balanced accuracy against time, {title.lower()}. Not beaten: {words}."
             panels.append(panel(figure, name=f"choices-{first['batch']}", title=title, alt=alt))
     return panels
-
-
-def _label(axes: Axes, x: Sequence[float], y: Sequence[float], texts: Sequence[str]) -> None:
-    """Write a letter beside each point, where neither a letter nor a point of the front stands already."""
-    figure = axes.get_figure(root=True)
-    assert figure is not None
-    figure.draw_without_rendering()
-    points = [axes.transData.transform(pair) * 72.0 / figure.dpi for pair in zip(x, y, strict=True)]
-    taken = [(float(a), float(b)) for a, b in points]
-    for (a, b), px, py, text in zip(points, x, y, texts, strict=True):
-
-        def room(shift: tuple[float, float], a: float = a, b: float = b) -> float:
-            return min(max(abs(a + shift[0] - c) / 8, abs(b + shift[1] - d) / 9) for c, d in taken)
-
-        shift = next((one for one in _BESIDE if room(one) >= 1), max(_BESIDE, key=room))
-        taken.append((a + shift[0], b + shift[1]))
-        axes.annotate(
-            text, (px, py), xytext=shift, textcoords="offset points", ha="center", va="center", color=INK, fontsize=8
-        )
-
-
-# Places of a letter beside its point [point], the best first: the front's line leaves the upper left free.
-_BESIDE = tuple(
-    (far * x, far * y) for far in (1.0, 1.6, 2.2) for x, y in ((-8, 6), (-9, 0), (0, 10), (9, -5), (0, -10), (9, 6))
-)
 
 
 def by_dwell(report: Mapping[str, Any]) -> list[Panel]:
@@ -186,8 +161,8 @@ def stored(report: Mapping[str, Any]) -> list[Panel]:
         axes.set_xscale("log", base=2)
         axes.xaxis.set_major_locator(LogLocator(base=4))
         axes.xaxis.set_minor_locator(NullLocator())
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: size(value)))
-        axes.set_xlabel("a record; MB for a million records")
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: count(round(value))))  # powers of two, whole
+        axes.set_xlabel("bytes a record")
         percent_ticks(axes.yaxis)
         axes.set_ylabel("balanced accuracy")
         alt = f"Balanced accuracy against stored bytes. {' '.join(words)}"

@@ -349,7 +349,10 @@ def run_report(
             out, {"report.json": text, "report.html": draw_page(report), "model-card.md": model_card(report)}
         )
         parts.forget()
+        others = parts.others()
     bars.say(f"Wrote {out / 'report.html'}, {out / 'report.json'} and {out / 'model-card.md'}")
+    if others:
+        bars.say(others)
     return report
 
 

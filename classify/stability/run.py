@@ -121,6 +121,12 @@ def _shown(cell: Cell) -> str:
 
 _HEADS = ("parameter", "at", "error", "allowed", "holds", "guard")
 
+#: What the tables scroll in where they are wider than the page: a shade at the right says that there is more.
+_SCROLL = (
+    ".scroll{overflow-x:auto;background:linear-gradient(to left,#fff 14px,transparent) right/17px 100% no-repeat local,"
+    "linear-gradient(to left,#9aa4ae80,transparent) right/14px 100% no-repeat scroll}"
+)
+
 
 def _row(cell: Cell) -> tuple[str, ...]:
     return cell.parameter, cell.value, _shown(cell), f"{cell.limit:g}", "yes" if cell.holds else "NO", cell.guard
@@ -150,21 +156,25 @@ def page(cells: list[Cell]) -> str:
         "table{border-collapse:collapse;width:100%;margin:.5rem 0 2rem}th,td{text-align:left;padding:.25rem .6rem;"
         "border-bottom:1px solid #d9dee4;vertical-align:top}td{font-variant-numeric:tabular-nums}"
         "td:not(:nth-child(3),:last-child),.number{white-space:nowrap}.no{background:#fbe3e0}"
-        "@media(max-width:60rem){table{display:block;overflow-x:auto}td:last-child{min-width:18rem}}"
+        "@media(max-width:60rem){td:last-child{min-width:18rem}}"
+        "@media(max-width:40rem){td,th{padding:.25rem .5rem .25rem 0;font-size:.85rem}"
+        "td:nth-child(-n+2){white-space:normal}}" + _SCROLL
     )
     parts = [
-        "<!doctype html><html lang=en><meta charset=utf-8><title>Stability</title>",
+        "<!doctype html><html lang=en><meta charset=utf-8>"
+        "<meta name=viewport content='width=device-width,initial-scale=1'><title>Stability</title>",
         f"<style>{style}</style><h1>Stability</h1>",
         f"<p>{sum(cell.holds for cell in cells)} of {len(cells)} cells hold.</p>",
     ]
     for (stage, measure), group in groupby(cells, key=lambda cell: (cell.stage, cell.measure)):
         heads = "".join(f"<th>{head}" for head in _HEADS)
-        parts.append(f"<h2>{html.escape(stage)}</h2><p>Error: {html.escape(measure)}.</p><table><tr>{heads}")
+        parts.append(f"<h2>{html.escape(stage)}</h2><p>Error: {html.escape(measure)}.</p>")
+        parts.append(f"<div class=scroll><table><tr>{heads}")
         for cell in group:
             kind = "" if cell.holds else " class=no"
             cells_of_row = [f"<td>{html.escape(text)}" for text in _row(cell)]
             if cell.error is not None and not cell.warned:  # a number breaks nowhere, a reason may
                 cells_of_row[2] = cells_of_row[2].replace("<td>", "<td class=number>", 1)
             parts.append(f"<tr{kind}>" + "".join(cells_of_row))
-        parts.append("</table>")
+        parts.append("</table></div>")
     return "\n".join(parts) + "\n"

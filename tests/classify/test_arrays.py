@@ -84,6 +84,8 @@ def test_one_of_several_is_named(put, suffix, write):
         (".mat", b"", None, r"the file is empty \(0 bytes\)"),
         (".npy", npy(IQ)[:-5], None, "damaged or cut short"),
         (".npz", npz(iq=IQ)[:-50], None, "damaged or cut short"),
+        (".mat", b"time, i, q\n" * 40, None, "not a MATLAB file, whatever its name says: save the samples with"),
+        (".mat", b"0 1\n", None, "not a MATLAB file"),
         (".mat", mat(iq=IQ)[:-50], None, "damaged or cut short"),
         (".mat", mat(iq=IQ)[:100], None, "damaged or cut short"),
         (".npy", b"not numpy at all", None, "not an .npy file, whatever its name says"),

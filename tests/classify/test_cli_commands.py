@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from bladewing.classify.cli import main
+from bladewing.classify.files import result_folder
 from bladewing.classify.training_account import ACCOUNT, print_account
 from bladewing.models import pretrained
 
@@ -139,6 +140,32 @@ def test_a_missing_training_library_is_said_with_the_cure(monkeypatch, capsys, e
         f"bladewing: error: {name} is not installed, this command needs it: "
         "pip install -c constraints.txt '.[train]' where bladewing's source lies\n"
     )
+
+
+@pytest.mark.parametrize(
+    ("command", "module", "function"),
+    [
+        ("train", "train", "run_training"),
+        ("report", "report.run", "run_report"),
+        ("stability", "stability", "run_stability"),
+    ],
+)
+@pytest.mark.parametrize("error", [ModuleNotFoundError("No module named 'torch'", name="torch"), KeyboardInterrupt()])
+@pytest.mark.parametrize("kept", [None, "old", "a/b/part"])
+def test_a_run_that_ends_early_leaves_no_empty_folder(monkeypatch, tmp_path, command, module, function, error, kept):
+    stand_in, out = types.ModuleType(f"bladewing.classify.{module}"), tmp_path / "a" / "b"
+
+    def ends(folder, **_):
+        result_folder(folder)
+        if kept:
+            (tmp_path / kept).touch()
+        raise error
+
+    setattr(stand_in, function, ends)
+    monkeypatch.setitem(sys.modules, stand_in.__name__, stand_in)
+    assert main([command, "--out", str(out)]) == (2 if isinstance(error, ModuleNotFoundError) else 130)
+    left = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*")}
+    assert left == {None: set(), "old": {"old"}, "a/b/part": {"a", "a/b", "a/b/part"}}[kept]
 
 
 @pytest.mark.parametrize("closed", ["1", "2"])

@@ -92,6 +92,10 @@ def test_a_run_that_is_done_leaves_the_parts_of_another(tmp_path: Path) -> None:
     one.forget()
     assert not one.begun
     assert other.begun
+    held = sum(file.stat().st_size for file in (tmp_path / "parts").rglob("*.npz"))
+    assert one.others().startswith(f"{tmp_path / 'parts'} holds an unfinished run of other settings")
+    assert f"{held / 1e6:.3g} MB" in one.others()
+    assert other.others() == ""
     with other.alone():
         other.forget()
     assert not list(tmp_path.iterdir())

@@ -322,3 +322,18 @@ def test_law_is_found_again_from_times_that_follow_it() -> None:
     found = stft._fitted(copy.deepcopy(points))
     assert (found["call_us"], found["ns_each"]) == pytest.approx((4.0, 0.2))
     assert found["worst_factor"] == pytest.approx(1.0)
+
+
+def test_curves_that_are_not_drawn_are_not_described_and_the_cure_is_named(report_folder: Path) -> None:
+    page = (report_folder / "report.html").read_text(encoding="utf-8")
+    assert "Not drawn: " in page
+    assert "(dashed)" not in page
+    assert "leave <code>--quick</code> out, or set <code>front_test</code>" in page
+
+
+def test_stored_bytes_are_numbered_in_whole_bytes(report: dict[str, Any]) -> None:
+    from bladewing.classify.report.draw_front import stored
+
+    svg = stored(report)[0].svg
+    assert ">1024</text>" in svg
+    assert ">bytes a record</text>" in svg

@@ -153,6 +153,36 @@ def test_every_figure_is_seen_whole_with_readable_words_and_its_text(page: Page,
             assert across <= 1 or down <= 3, f"{where}: {one['text']!r} lies over {other['text']!r}"
 
 
+# Of each table: its name, how much wider it is than its view, and how far its caption reaches beyond the view.
+TABLES = """[...document.querySelectorAll(".scroll")].map((s) => {
+  const caption = s.querySelector("caption"), end = (e) => e.getBoundingClientRect().right;
+  return { name: caption ? caption.textContent : s.textContent.trim().slice(0, 30), over: s.scrollWidth - s.clientWidth,
+    kind: s.querySelector("table").className, cut: caption ? end(caption) - end(s) : 0 };
+})"""
+
+
+def test_on_a_phone_the_lettered_tables_and_all_captions_are_seen_whole(page: Page, html: Path) -> None:
+    page.show(html, PHONE)
+    page.value(
+        'document.querySelectorAll(".lettered tbody td:last-child").forEach((d) => (d.textContent = "19.46 ms"))'
+    )
+    tables = page.value(TABLES)
+    lettered = [table for table in tables if table["kind"] == "lettered"]
+    assert len(lettered) == 2
+    assert [table for table in lettered if table["over"] > 0] == []
+    assert [table for table in tables if table["cut"] > 1] == []
+
+
+def test_on_a_small_desk_the_tables_that_are_not_folded_are_seen_whole(page: Page, html: Path) -> None:
+    page.show(html, 1200)
+    page.value(
+        'document.querySelectorAll(".prose td:last-child").forEach((d) => (d.textContent = "no band: ".repeat(30)))'
+    )
+    tables = page.value(TABLES)
+    assert "Measured in them" in [table["name"] for table in tables if table["kind"] == "prose"]
+    assert [table for table in tables if table["kind"] in ("stack", "confusion", "prose") and table["over"] > 0] == []
+
+
 SORTED = """(() => {
   const read = (table, i) => [...table.tBodies[0].rows].map((r) => r.cells[i].dataset.v ?? r.cells[i].textContent);
   return [...document.querySelectorAll("table")].filter((t) => t.querySelector("th button")).map((table) => {

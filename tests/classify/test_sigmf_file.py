@@ -59,7 +59,7 @@ def test_unsigned_samples_are_centred(sigmf_pair, datatype, stored, middle):
     [
         ({"datatype": "rf32_le"}, r"real samples \(core:datatype rf32_le\): IQ must be complex"),
         ({"datatype": "ri16_le"}, "real samples"),
-        ({"datatype": None}, "core:datatype is None: it must be the SigMF type of the samples, such as 'cf32_le'"),
+        ({"datatype": None}, "core:datatype is missing: it must be the SigMF type of the samples, such as 'cf32_le'"),
         ({"datatype": "complex64"}, "core:datatype is 'complex64'"),
         ({"datatype": 5}, "core:datatype is 5"),
         ({"sample_rate": None}, r"no PRF \(SigMF core:sample_rate\): give --prf-hz"),

@@ -129,6 +129,8 @@ def test_the_command_writes_the_table_whole(tmp_path, monkeypatch, capsys):
     page = (tmp_path / "stability.html").read_text()
     assert "&lt;1&gt;" in page
     assert page.count("<tr class=no>") == 1
+    assert "name=viewport" in page
+    assert page.count("<div class=scroll><table>") == page.count("</table></div>") == 2
     said = capsys.readouterr().err
     assert "does not hold: comb, SNR 200 dB: 0.5" in said
     assert "2 of 3 cells hold" in said

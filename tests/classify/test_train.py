@@ -402,6 +402,19 @@ def test_a_run_that_another_one_overtook_writes_nothing_and_keeps_what_it_did(tm
     assert list((tmp_path / TRAIN_PARTS).iterdir())
 
 
+def test_a_training_says_what_another_left_unfinished_beside_it(tmp_path, capsys):
+    config = tmp_path / "one.toml"
+    config.write_text('records = 600\nmodels = ["features-linear"]\n')
+    left = tmp_path / TRAIN_PARTS / "of-another-run"
+    left.mkdir(parents=True)
+    (left / "some.npz").write_bytes(bytes(2_500_000))
+    run_training(tmp_path, config=config, progress=True)
+    said = capsys.readouterr().err
+    assert f"{tmp_path / TRAIN_PARTS} holds an unfinished run" in said
+    assert "2.5 MB" in said
+    assert left.exists()
+
+
 def test_a_file_in_the_place_of_the_folder_is_named(tmp_path):
     (tmp_path / "out").write_text("")
     with pytest.raises(BadInput, match="cannot be made a folder"):
