@@ -14,7 +14,15 @@ from .dropouts import filled
 from .measurements import BODY, EACH_ROTOR, Measurements
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .rotor.even_pulses import even_pulses
-from .rotor.family import Family, as_wheels, by_turns, find_family, slower_than_rotors, too_few_flashes
+from .rotor.family import (
+    Family,
+    as_wheels,
+    by_turns,
+    find_family,
+    slower_than_rotors,
+    told_from_multiples,
+    too_few_flashes,
+)
 from .rotor.family_edge import SPAN, edge_around, edge_of_lines, span_of, surer_edge
 from .rotor.folding import FASTEST_TIP_MPS, fastest_tip
 from .rotor.periodogram import Periodogram, prepared
@@ -90,6 +98,7 @@ def measure_record(
     out |= {"reason": as_wheels(family.data, edge[0], velocity[0])} | _named(BODY, velocity)
     if out["reason"]:
         return out
+    family = told_from_multiples(family)
     out |= _turning(family) | _geared(family)
     out |= _band(family, edge, beta_rad)
     out |= _blade(family, out, blades)

@@ -4,7 +4,7 @@ Modules, in the order in which a record passes through them
 -----------------------------------------------------------
 periodogram, clicks, strong_lines, slow_lines
     What is strong and slow is taken out, the noise made even; what then speaks for a line in each bin.
-comb_search, comb_sums, flashes, octaves, folding, flash_rate, one_sided, comb_centre, comb
+comb_search, comb_sums, flashes, octaves, folding, common_fraction, flash_rate, one_sided, comb_centre, comb
     Where a comb may be, which of its multiples and fractions it is, which line is the body's, whether all lines lie on
     one side of that; or why there is no comb.
 comb_fit, weak_lines, turning, drift, changing, changing_fit

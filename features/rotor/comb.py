@@ -12,6 +12,7 @@ from ..lines import LineSpace, squared
 from .comb_centre import centred
 from .comb_fit import CombFit, fit_combs
 from .comb_search import FINE_STEPS, MIN_SPACING_BINS, SEARCHED_RATIO, best_candidate, heights, spacing_limits
+from .common_fraction import of_one_rotor
 from .flash_rate import of_flashes
 from .folding import may_come_back
 from .periodogram import Periodogram
@@ -290,7 +291,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
         return None, _too_short(data)
     if start.score < threshold(data):
         return None, f"no comb: evidence {start.score:.1f} nats, {threshold(data):.0f} are needed"
-    start, open_orders = centred(data, of_flashes(data, start))
+    start, open_orders = centred(data, of_flashes(data, of_one_rotor(data, start)))
     fitted = fit_combs(data, start.centre, [start.spacing], [(start.low, start.high)])
     if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
         return None, f"no comb: fewer than {LEAST_LINES} lines"

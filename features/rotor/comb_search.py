@@ -12,7 +12,7 @@ from ..chopping import CHOPPING_RANGE_HZ
 from ..evidence import MOST_SNRS, Evidence
 from .comb_sums import running_sums
 from .flashes import flash_evidence
-from .folding import comes_back, outermost_orders
+from .folding import FOLDED_TIMES, comes_back, outermost_orders
 from .octaves import MULTIPLE_SHARE, coarsest
 from .periodogram import Periodogram
 
@@ -49,6 +49,10 @@ FOLDED_NATS = 8.0
 #: finer one finds some of several rotors' lines all over the span.
 SAME_BINS, UNFOLDED_SHARE, FINER = 4.0, 0.88, 0.9
 
+#: A comb of several times the spacing found needs so many times its score, if its lines that come back may be the
+#: others; and any other one to be believed where that found has lines that come back, that one's over this share.
+SAME_LINES_SHARE, HELD_SHARE = 1.01, 0.92
+
 #: Further than this from its mirror image about velocity zero a comb's lines are others than that one's [bins].
 MIRROR_BINS = 1.5
 
@@ -56,6 +60,10 @@ MIRROR_BINS = 1.5
 COARSE_STEPS = 4
 FAMILIES = 8
 FINE_STEPS = 4
+
+#: And about combs of lines that come back, which are further out; where so much speaks for any comb [nats]: near the
+#: noise the best of many would pass for one.
+FOLDED_STEPS, REFINED_FROM = 48, 50.0
 CENTRE_SHIFTS = (-0.3, 0.0, 0.3)
 
 
@@ -424,16 +432,42 @@ def _folded(
     found : Candidate
         The one chosen of them.
     """
-    scores, lows, highs = score(data.contrast, spacings, centres, outermost_orders(data, spacings))
+    spacings, (scores, lows, highs) = _refined(data, spacings, centres, most)
     own = (scores > within + FOLDED_NATS) & comes_back(highs, spacings) & (spacings > FINER * found.spacing)
-    same = own & (np.abs(spacings / found.spacing - 1) * data.pulses < SAME_BINS)
-    own = same if same.any() else own
     if not own.any():
         return None
-    spacings, centres, lows, highs = spacings[own], centres[own], lows[own], highs[own]
-    totals = _with_flashes(data, spacings, centres, (scores[own], lows, highs))
-    best = int(totals.argmax())
-    if not same.any() and UNFOLDED_SHARE * totals[best] < most:
+    totals = np.zeros(len(spacings))
+    totals[own] = _with_flashes(data, spacings[own], centres[own], (scores[own], lows[own], highs[own]))
+    same = np.abs(spacings / found.spacing - 1) * data.pulses < SAME_BINS
+    # lines of a multiple that come back may be all those of the comb found: it need not have more of them. But blades
+    # of an odd number flash twice a period, so that an even multiple speaks nearly as loudly
+    times = np.rint(spacings / found.spacing)
+    off = np.abs(spacings / np.maximum(times, 1) / found.spacing - 1) * data.pulses
+    whole = (times > 2) & (times % 2 == 1) & (off < SAME_BINS)
+    least = np.where(whole, SAME_LINES_SHARE * most, most / UNFOLDED_SHARE)
+    held = own & same
+    if held.any():
+        least = np.maximum(least, float(totals[held].max()) / np.where(times % 2 == 0, UNFOLDED_SHARE, HELD_SHARE))
+    believed = held | (own & (totals > least))
+    if not believed.any():
         return None
+    best = int(np.where(believed, totals, 0.0).argmax())
     low, high = int(lows[best]), int(highs[best])
     return Candidate(float(spacings[best]), float(centres[best]), low, high, float(totals[best]))
+
+
+def _refined(
+    data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64], most: float
+) -> tuple[NDArray[np.float64], _Scored]:
+    """Combs of lines that come back, each at the spacing near its own that speaks loudest; and what speaks for them.
+
+    Their outer lines are some spans away: they tell the spacing so much finer than lines within the span do.
+    """
+    count = FOLDED_STEPS if most > REFINED_FROM else 0
+    steps = 1 + np.arange(-count, count + 1) / (2 * FINE_STEPS * FOLDED_TIMES * data.pulses)
+    tried = (spacings[:, None] * steps).ravel()
+    about = np.repeat(centres, len(steps))
+    scored = score(data.contrast, tried, about, outermost_orders(data, tried))
+    each = np.arange(len(tried)).reshape(-1, len(steps))
+    loudest = each[:, 0] + scored[0][each].argmax(axis=1)
+    return tried[loudest], (scored[0][loudest], scored[1][loudest], scored[2][loudest])

@@ -15,6 +15,7 @@ from .comb_fit import CombFit
 from .drift import Straightened, ahead_left, straightened
 from .family_edge import edge_around, edge_of_lines, span_of
 from .flash_count import flashes_in_period
+from .flash_rate import may_be_fraction
 from .gain import Evened
 from .helicopter import Gear, find_gear
 from .periodogram import Level, Periodogram, prepared_again
@@ -49,6 +50,9 @@ FAR_OFF = 0.003
 
 #: Lines that reach so far from a body, in shares of its own speed, are a wheel's: spokes end a little within the rim.
 WHEEL = (0.8, OVER_BODY)
+
+#: A rate that may be twice to five times what it seems is told to so many times itself.
+UNTOLD_SPREAD = 4.0
 
 
 @dataclass(frozen=True)
@@ -137,6 +141,16 @@ def too_few_flashes(family: Family) -> str:
         f"dwell too short: lines about {chopping * data.prf_hz:.0f} Hz apart are not one rotor's, "
         f"to tell what they are takes {1e3 * LEAST_FLASHES / chopping / data.prf_hz:.0f} ms at least"
     )
+
+
+def told_from_multiples(family: Family) -> Family:
+    """A lone rotor's family, called not told apart where its comb may as well be that of a multiple of its rate."""
+    comb, rotors = family.comb, family.rotors
+    if family.gear is not None or len(rotors.rates) > 1:
+        return family
+    if not may_be_fraction(family.data, comb.fit.spacing, comb.last):
+        return family
+    return replace(family, rotors=not_all(rotors, family.data, UNTOLD_SPREAD * comb.chopping))
 
 
 def by_turns(family: Family, blades: int | None) -> Family:
@@ -293,7 +307,8 @@ def _changing(data: Periodogram, spectrum: Spectrum, family: Family, edge: float
     """A family of several rotors whose rates change; the one given where none do, or that does not tell them apart.
 
     Rotors that were told apart as steady ones, and are not, must be told apart as such that change. Where one side of
-    the body lies in the other, lines cross and speak for anything.
+    the body lies in the other, lines cross and speak for anything; so do those that come back from the other end of the
+    span, which are not sought.
     """
     known, comb = family.rotors, family.comb
     if family.gear is not None or (known.resolved and len(known.rates) == 1):
@@ -304,7 +319,8 @@ def _changing(data: Periodogram, spectrum: Spectrum, family: Family, edge: float
             return replace(family, ahead=left)
     unsure = replace(family, rotors=not_all(known, data)) if known.resolved else family
     reach = max(round(edge / comb.chopping), 1)
-    if not may_be_sought(data, comb.chopping, reach) or data.one_channel:
+    fills_span = family.fills_span or comb.fit.is_folded
+    if fills_span or not may_be_sought(data, comb.chopping, reach) or data.one_channel:
         return unsure
     apart = separate_rotors(data, comb, edge, ChangingSeparation)
     fits = [fit for fit in apart.fits if isinstance(fit, ChangingFit)]

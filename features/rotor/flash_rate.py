@@ -23,6 +23,10 @@ LEAST_OVER_NOISE = 10.0
 #: because the combs are asked as well: blades of an odd number flash twice a period, one on each side.
 FACTORS = {2: 0.06, 3: 0.13, 5: 0.2, 7: 0.2}
 
+#: Where a span is whole spacings but for so little [bins], no line of any multiple that comes back lies beside the
+#: comb's own, however fast the tips are.
+ALL_ROUND_BINS = 0.7
+
 
 def of_flashes(data: Periodogram, found: Candidate) -> Candidate:
     """The comb at the multiple of a comb's spacing that blades flash at, where only that tells; else the same comb.
@@ -51,6 +55,25 @@ def of_flashes(data: Periodogram, found: Candidate) -> Candidate:
         return found
     most = max(float(scores[best]), found.score)  # it is the same lines
     return Candidate(float(spacings[best]), found.centre, int(lows[best]), int(highs[best]), most)
+
+
+def may_be_fraction(data: Periodogram, spacing: float, last: int) -> bool:
+    """True where a comb may be every line there is of a multiple, and no flash tells which of them it is.
+
+    Flashes shorter than a sample are seen by chance: of tips some times as fast as the unambiguous velocity.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    spacing : float
+        Of the comb [cycles a sample].
+    last : int
+        Its outermost order.
+    """
+    if data.one_channel or not may_come_back(last, spacing) or not comes_round(spacing, data.pulses, ALL_ROUND_BINS):
+        return False
+    return not _flash_multiples(data, spacing)
 
 
 def _flash_multiples(data: Periodogram, spacing: float) -> list[int]:

@@ -38,10 +38,10 @@ def _beside_bins(ends: NDArray[np.float64], turns: NDArray[np.float64], pulses: 
     return np.asarray(np.abs(ends - np.rint(ends)) / turns * pulses, np.float64)
 
 
-def comes_round(spacing: float, pulses: int) -> bool:
+def comes_round(spacing: float, pulses: int, within_bins: float = FOLDED_BINS) -> bool:
     """True where the lines of a comb, so far apart [cycles a sample], fall on its own where they come back."""
     turns = np.asarray(1 / spacing)
-    return bool(_beside_bins(turns, turns, pulses) <= FOLDED_BINS)
+    return bool(_beside_bins(turns, turns, pulses) <= within_bins)
 
 
 def outermost_orders(data: Periodogram, spacings: NDArray[np.float64] | float) -> NDArray[np.intp]:

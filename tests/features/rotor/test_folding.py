@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
+from bladewing.features.rotor.changing import ChangingSeparation
+from bladewing.features.rotor.comb import find_comb
 from bladewing.features.rotor.comb_fit import fit_combs
 from bladewing.features.rotor.folding import FASTEST_TIP_MPS, FOLDED_BINS, outermost_orders
 from bladewing.features.rotor.periodogram import prepare
@@ -45,6 +47,38 @@ def test_the_chopping_frequency_and_the_tip_are_told_where_lines_come_back(times
     assert right >= least
     assert tips >= least - 2
     assert np.sqrt(np.mean(np.square(errors))) < 1.5
+
+
+@pytest.mark.parametrize(("times", "least"), [(3.0, 36), (4.0, 32)])
+def test_the_comb_of_far_faster_tips_is_sought_as_finely_as_they_reach(times, least):
+    right = 0
+    for seed in range(40):
+        iq, radar, (rate_hz,), _ = folded(seed, times)
+        comb, _ = find_comb(prepare(iq, **radar), 2)
+        right += comb is not None and abs(comb.chopping * radar["prf_hz"] / 2 / rate_hz - 1) < 0.01
+    assert right >= least  # it was 32 and 26, the others halves, thirds and fifths
+
+
+def test_a_fraction_of_the_chopping_frequency_is_not_sure():
+    """Where the span is whole spacings of it, the lines are the same and hardly any flash is seen."""
+    for times, seed in ((3.0, 4), (3.0, 16), (3.0, 31), (4.0, 6), (4.0, 11), (4.0, 27)):
+        iq, radar, (rate_hz,), _ = folded(seed, times)
+        found = measure(iq, **radar, blades=2)
+        if not np.isnan(found.chopping_hz):
+            assert not found.rotors_resolved
+            assert abs(found.chopping_hz - 2 * rate_hz) < 4 * found.chopping_hz_std
+
+
+def test_no_rotors_of_changing_rates_are_sought_where_lines_come_back(monkeypatch):
+    """They are of lines within the span alone: hundreds of them, fitted for seconds, told none apart."""
+
+    def sought(*_):
+        raise AssertionError
+
+    monkeypatch.setattr(ChangingSeparation, "sought", sought)
+    for seed in range(6):
+        iq, radar, _, _ = folded(seed, 1.6, count=2, spread=0.004)
+        measure(iq, **radar)
 
 
 def test_slow_rotors_whose_lines_come_back_are_not_slower_ones():
