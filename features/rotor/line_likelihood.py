@@ -19,6 +19,9 @@ LEVEL_STEPS, LONGEST_STEP = 2, 3.0
 #: In place of sums that may be 0.
 LEAST_SUM = 1e-30
 
+#: What single precision leaves of a direction that the others explain: no pivot is a smaller share of its diagonal.
+LEAST_PIVOT = 1e-6
+
 
 @dataclass(frozen=True)
 class OrderPowers:
@@ -191,7 +194,10 @@ def solved(
     for row in range(size):
         for column in range(row + 1):
             left = matrix[row, column] - sum(root[row, k] * root[column, k] for k in range(column))
-            root[row, column] = np.sqrt(left) if row == column else left / root[column, column]
+            if row == column:
+                root[row, row] = np.sqrt(np.maximum(left, LEAST_PIVOT * matrix[row, row]))
+            else:
+                root[row, column] = left / root[column, column]
         for k in range(row):
             out[row] -= root[row, k] * out[k]
         out[row] /= root[row, row]

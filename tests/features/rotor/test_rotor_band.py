@@ -134,6 +134,13 @@ def test_small_systems_are_solved_side_by_side():
     np.testing.assert_allclose(determinants, np.linalg.slogdet(whole)[1])
 
 
+def test_a_system_that_rounding_made_indefinite_is_solved_as_one_that_is_all_but_singular():
+    entries = {(0, 0): np.ones(1), (1, 0): np.ones(1), (1, 1): np.array([1 - 1e-7])}
+    found, determinants = solved(entries, np.array([[1.0], [1.0]]))
+    np.testing.assert_allclose(found[:, 0], [1, 0], atol=1e-9)
+    assert determinants[0] == pytest.approx(np.log(1e-6), abs=0.01)
+
+
 def test_scattered_lines_are_known_by_their_scatter():
     rng = np.random.default_rng(6)
     errors, stds = [], []
