@@ -233,7 +233,7 @@ def dataset(
     """Write the records of a training to disk; interrupted, the same command goes on."""
     from .dataset import run_dataset
 
-    with no_empty_folder(out), _goes_on(out):
+    with _goes_on(out):
         run_dataset(out, records=records, seed=seed, config=config, progress=True)
 
 
