@@ -138,7 +138,8 @@ def _counted_from(found: Candidate, spacing: float, centre: float, order: int, w
 def _one_sided(data: Periodogram, found: Candidate, best: Candidate, bonuses: dict[float, float]) -> dict[int, float]:
     """What speaks for strong lines that all of a comb's lines lie on one side of, by order [nats over the best].
 
-    Nothing does where the best order tells the body by how even all is about it, or where a filter took it out.
+    Nothing does where the best order tells the body by how even all is about it, where too little shows to say that, or
+    where a filter took it out.
     """
     if found.is_folded or data.one_channel:
         return {}
@@ -153,7 +154,7 @@ def _one_sided(data: Periodogram, found: Candidate, best: Candidate, bonuses: di
     if not rivals:
         return {}
     own = Sides(data, best)
-    if own.filtered_out:
+    if own.filtered_out or not own.compares:
         return {}
     even = max(own.even_nats() - FLAT, LEAST_EVEN) + max(
         (nats for place, nats in bonuses.items() if abs(place - best.centre) < best.spacing / 2), default=0.0

@@ -78,10 +78,17 @@ class Sides:
 
         One side may be weaker than the other by any factor: the edges of a blade reflect unlike.
         """
-        both = np.minimum(self._tops_after, self._tops_before) > SHOWS
-        if both.sum() < LEAST_ORDERS:
-            return 0.0
-        return self._of_levels(both) + self._of_places(both)
+        both = self._both
+        return self._of_levels(both) + self._of_places(both) if self.compares else 0.0
+
+    @property
+    def compares(self) -> bool:
+        """Whether enough shows on both sides of the line to say how even it is."""
+        return int(self._both.sum()) >= LEAST_ORDERS
+
+    @property
+    def _both(self) -> NDArray[np.bool_]:
+        return np.asarray(np.minimum(self._tops_after, self._tops_before) > SHOWS, np.bool_)
 
     def _of_levels(self, both: NDArray[np.bool_]) -> float:
         """By the level of each order."""
