@@ -62,8 +62,9 @@ FAMILIES = 8
 FINE_STEPS = 4
 
 #: And about combs of lines that come back, which are further out; where so much speaks for any comb [nats]: near the
-#: noise the best of many would pass for one.
-FOLDED_STEPS, REFINED_FROM = 48, 50.0
+#: noise the best of many would pass for one. And where the comb found reaches so far [cycles a sample]: lines that come
+#: back fill the span.
+FOLDED_STEPS, REFINED_FROM, FILLS_SPAN = 48, 50.0, 0.35
 CENTRE_SHIFTS = (-0.3, 0.0, 0.3)
 
 
@@ -432,7 +433,8 @@ def _folded(
     found : Candidate
         The one chosen of them.
     """
-    spacings, (scores, lows, highs) = _refined(data, spacings, centres, most)
+    fills_span = max(found.high, -found.low) * found.spacing > FILLS_SPAN
+    spacings, (scores, lows, highs) = _refined(data, spacings, centres, most if fills_span else 0.0)
     own = (scores > within + FOLDED_NATS) & comes_back(highs, spacings) & (spacings > FINER * found.spacing)
     if not own.any():
         return None
