@@ -171,11 +171,11 @@ class Measured:
         held = np.isfinite(self.values.chopping_hz)
         names = ("chopping_hz", "bandwidth_hz", "tip_speed_mps", "rotation_hz", "blade_length_m")
         medians: dict[str, Any] = {name: _median(getattr(self.values, name)[held]) for name in names}
-        medians |= self.body(held if held.any() else ~held)
+        telling = held if held.any() else ~held
+        medians |= self.body(telling) | {"body_velocity_range_mps": self.body_range(telling)}
         geared = np.isfinite(self.values.gear_ratio)
         pair = ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
         gear = {name: _median(getattr(self.values, name)[geared]) for name in pair}
-        medians["body_velocity_range_mps"] = self.body_range(held if held.any() else ~held)
         counts = {"dwells": len(self.iq), "with_comb": int(held.sum()), "with_second_comb": int(geared.sum())}
         beside = {"left_out_s": self.recording.left_out_s(self.iq), "remarks": list(self.remarks)}
         return {**counts, **beside, **medians, **gear, **self.over_all()}
@@ -318,12 +318,13 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     beat = wingbeat(whole, **radar) if long else None
     stop_s = start_s + pulses / recording.prf_hz
     remarks = recording.remarks(settings.dwell_s, iq, measured=True)
-    empty = sum(bool(half_empty(centred_power(scaled(dwell, unit_scale(dwell))))) for dwell in iq)
-    if whole is recording.iq and empty > ONE_SIDED * count:  # else it is told that there is one channel
-        remarks += (
-            f"one side: half of the spectrum is empty in {empty} of {counted(count)}, as of a single channel that was "
-            "made analytic: whether a body comes or goes is not told",
-        )
+    if whole is recording.iq:  # else it is told that there is one channel
+        empty = sum(bool(half_empty(centred_power(scaled(dwell, unit_scale(dwell))))) for dwell in iq)
+        if empty > ONE_SIDED * count:
+            remarks += (
+                f"one side: half of the spectrum is empty in {empty} of {counted(count)}, as of a single channel that "
+                "was made analytic: whether a body comes or goes is not told",
+            )
     return Measured(recording, iq, start_s, stop_s, values, acceleration, acceleration_std, beat, remarks)
 
 

@@ -434,7 +434,8 @@ def _folded(
         The one chosen of them.
     """
     fills_span = max(found.high, -found.low) * found.spacing > FILLS_SPAN
-    spacings, (scores, lows, highs) = _refined(data, spacings, centres, most if fills_span else 0.0)
+    count = FOLDED_STEPS if fills_span and most > REFINED_FROM else 0
+    spacings, (scores, lows, highs) = _refined(data, spacings, centres, count)
     own = (scores > within + FOLDED_NATS) & comes_back(highs, spacings) & (spacings > FINER * found.spacing)
     if not own.any():
         return None
@@ -459,13 +460,12 @@ def _folded(
 
 
 def _refined(
-    data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64], most: float
+    data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64], count: int
 ) -> tuple[NDArray[np.float64], _Scored]:
-    """Combs of lines that come back, each at the spacing near its own that speaks loudest; and what speaks for them.
+    """Combs of lines that come back, each at the loudest of so many spacings to either side of its own; their scores.
 
     Their outer lines are some spans away: they tell the spacing so much finer than lines within the span do.
     """
-    count = FOLDED_STEPS if most > REFINED_FROM else 0
     steps = 1 + np.arange(-count, count + 1) / (2 * FINE_STEPS * FOLDED_TIMES * data.pulses)
     tried = (spacings[:, None] * steps).ravel()
     about = np.repeat(centres, len(steps))
