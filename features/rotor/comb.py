@@ -141,11 +141,14 @@ def strong_multiple(
             continue
         means = np.maximum([power[strong].mean(), power[~strong].mean()], 1e-9)
         ratio = _contrast(means[0], means[1])
+        if ratio <= factor:
+            continue
         # several rotors' lines lie in one another at the low orders and may cancel at some; further out they part
         if outer[strong].any() and outer[~strong].any():
             parted = _contrast(power[outer & strong].mean(), power[outer & ~strong].mean())
-            ratio = ratio if parted > OUTER_FACTOR else 0.0
-        if ratio > factor and two_means_nats(power[strong], power[~strong]) > UNEQUAL_NATS:
+            if parted <= OUTER_FACTOR:
+                continue
+        if two_means_nats(power[strong], power[~strong]) > UNEQUAL_NATS:
             best, factor = multiple, ratio
     return best
 
