@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bladewing.classify.cli import main
 from bladewing.classify.measure import Measured, Settings, measure_recording
-from bladewing.classify.measure_words import _blades, with_error
+from bladewing.classify.measure_words import _blades, _unlike, with_error
 from bladewing.classify.recording import load_recording
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 from scipy.signal import hilbert
@@ -121,6 +121,20 @@ def test_dwells_that_tell_the_number_of_blades_are_heard_though_the_clearest_doe
     assert _blades(found) == ""
     values.rotation_hz[:2] = 160.0, 160.5
     assert _blades(found) == "; 2 blades in 2 of 4 dwells"
+
+
+def test_a_count_of_rotors_that_most_dwells_do_not_share_is_not_given_without_a_word():
+    values = SimpleNamespace(
+        chopping_hz=np.array([183.0, 368.0, 182.0, 184.0, 184.0, 189.0, np.nan]),
+        rotor_count=np.array([2.0, 1.0, 1.0, 1.0, 1.0, 2.0, np.nan]),
+        rotors_resolved=np.array([True, False, True, True, True, True, False]),
+    )
+    found = SimpleNamespace(values=values, clearest=lambda: 5)
+    assert _unlike(found) == "; the dwells do not agree on the number of rotors: 1 in 3, 2 in 2, not told apart in 1"
+    found.clearest = lambda: 2  # half of them say so
+    assert _unlike(found) == ""
+    found.clearest = lambda: 1  # "and perhaps more" is said of it
+    assert _unlike(found) == ""
 
 
 def test_a_dwell_that_hardly_tells_the_body_does_not_speak_for_the_recording(folder):
