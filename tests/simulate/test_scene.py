@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import bladewing.simulate
 import numpy as np
 import pytest
 from bladewing.simulate.bird import wingbeat_hz
@@ -287,6 +288,15 @@ def test_drawing_records_needs_no_pydantic_and_scenes_are_fetched_when_asked_for
         "s.Scene; assert 'pydantic' in sys.modules; assert not hasattr(s, 'Scenery')"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_seed_that_is_no_whole_number_is_refused_and_scenes_are_offered_by_name():
+    for wrong, said in ((1.5, "seed is 1.5: it must be a whole number"), ("1", "seed is '1'"), (-1, "not be negative")):
+        for work in (empty().plan, empty().render, lambda seed: empty().render(seed, full=True)):
+            with pytest.raises(ValueError, match=said):
+                work(wrong)
+    assert np.array_equal(empty().render(np.int64(3)).iq, empty().render(3).iq)
+    assert {"Scene", "SceneError", "draw_records"} <= set(dir(bladewing.simulate))
 
 
 def empty(**receiver) -> Scene:
