@@ -11,7 +11,7 @@ from bladewing.features.heave import heave
 from bladewing.features.steady_comb import steady_comb
 from bladewing.features.wingbeat import wingbeat
 
-from .errors import one_line
+from .errors import BadInput, one_line
 from .fusion import LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
 from .recording import Recording
@@ -180,8 +180,13 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
     Raises
     ------
     BadInput
-        `dwell_s` is not above 0.
+        `dwell_s` is not above 0, or `recording` is a path or samples alone.
     """
+    if not isinstance(recording, Recording):
+        raise BadInput(
+            f"recording is of type {type(recording).__name__}: it must be a Recording: load_recording(path, ...) reads "
+            "one, Recording(name, iq, carrier_hz, prf_hz) makes one of samples"
+        )
     dwell_s = positive(dwell_s, "dwell_s")
     iq = recording.dwells(dwell_s)
     count, wanted = iq.shape

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
-from bladewing.classify import BadInput, Classifier, answer, load_recording
+from bladewing.classify import BadInput, Classifier, Recording, answer, load_recording
 from bladewing.classify import recording as recordings
 from bladewing.classify.cli import main
 
@@ -453,3 +453,15 @@ def test_python_gives_what_the_command_says(run_json, sigmf_pair, uav_model):
     for wrong in (0, -1.0, np.nan, "0.08"):
         with pytest.raises(BadInput, match=r"^dwell_s is .*above 0"):
             answer(load_recording(path), Classifier.load(uav_model), dwell_s=wrong)
+
+
+def test_samples_in_memory_are_answered_as_a_recording_and_not_without(sigmf_pair, uav_model):
+    path, model = sigmf_pair(), Classifier.load(uav_model)
+    read = load_recording(path)
+    given = answer(Recording("cell 7", read.iq, read.carrier_hz, read.prf_hz), model)
+    assert given.track.label == answer(read, model).track.label
+    for wrong, kind in ((str(path), "str"), (read.iq, "ndarray")):
+        with pytest.raises(
+            BadInput, match=rf"^recording is of type {kind}: .* Recording\(name, iq, carrier_hz, prf_hz\)"
+        ):
+            answer(wrong, model)
