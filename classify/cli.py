@@ -190,6 +190,8 @@ def measure(
             clearest = result.clearer(clearest)
     if plot is not None and clearest is not None:
         clearest.write_plot(plot)
+        if not as_json:
+            print(f"Wrote {plot}", flush=True)
     if unreadable:
         raise typer.Exit(2)
 

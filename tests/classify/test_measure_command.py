@@ -191,7 +191,10 @@ def test_the_table_says_rate_and_blade(folder, capsys, monkeypatch):
 
 def test_the_plot_is_svg_with_the_comb_on_it(folder, tmp_path, capsys):
     target = tmp_path / "drone.svg"
+    assert main(["measure", str(folder / "drone.npy"), *RADAR, "--plot", str(target), "--json"]) == 0
+    assert all(line.startswith("{") for line in capsys.readouterr().out.splitlines())
     assert main(["measure", str(folder / "drone.npy"), *RADAR, "--plot", str(target)]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == f"Wrote {target}"
     root = ET.fromstring(target.read_text())
     assert root.tag.endswith("svg")
     titles = [e.text for e in root.iter() if e.tag.endswith("title")]
