@@ -10,6 +10,7 @@ from bladewing.features.rotor.comb import OVER_BODY
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 
 from .errors import one_line
+from .measure import CHANCE
 from .terminal import counted, print_table
 
 if TYPE_CHECKING:
@@ -90,6 +91,8 @@ def _sentence(found: "Measured") -> str:
         rotor = "blades x rate: " + " or ".join(options)
         rotor += _blades(found)
     where = f"comb in {all_together['with_comb']} of {counted(all_together['dwells'])}"
+    if all_together["with_comb"] <= CHANCE * all_together["dwells"]:
+        where += ", perhaps by chance"
     folded = str(v.band_reason[clear])
     doubts = f"{_wheel(found)}{_unsteady(found)}{_unlike(found)}"
     return f"{where}; {rotor}{body}{_gear(found)}{doubts}{folded and '; ' + folded}"

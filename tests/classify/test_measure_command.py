@@ -123,6 +123,18 @@ def test_dwells_that_tell_the_number_of_blades_are_heard_though_the_clearest_doe
     assert _blades(found) == "; 2 blades in 2 of 4 dwells"
 
 
+def test_a_comb_in_a_few_of_many_dwells_is_said_to_be_perhaps_chance(folder, tmp_path, capsys):
+    iq = white(np.random.default_rng(2), 20 * PULSES)
+    drone = np.load(folder / "drone.npy")
+    for held, caution in ((2, True), (4, False)):
+        for first in range(0, held, 2):
+            iq[first * PULSES : (first + 2) * PULSES] = drone
+        np.save(tmp_path / "few.npy", iq.astype(np.complex64))
+        assert main(["measure", str(tmp_path / "few.npy"), *RADAR, "--dwell", str(PULSES / PRF_HZ)]) == 0
+        said = capsys.readouterr().out
+        assert f"comb in {held} of 20 dwells{', perhaps by chance' if caution else ''}; blades" in said
+
+
 def test_a_count_of_rotors_that_most_dwells_do_not_share_is_not_given_without_a_word():
     values = SimpleNamespace(
         chopping_hz=np.array([183.0, 368.0, 182.0, 184.0, 184.0, 189.0, np.nan]),
