@@ -180,6 +180,20 @@ def test_tips_that_alias_later_in_the_dwell_are_warned_of(motion, rotor, shown_m
         assert any("they alias" in line for line in built.warnings()) == warned
 
 
+def test_tips_of_several_rotors_that_alias_are_one_warning_whose_prf_is_enough():
+    def warnings(prf_hz):
+        radar = {"carrier_hz": 24.125e9, "prf_hz": prf_hz, "pulses": 1000}
+        return Scene.build({"radar": radar, "uav": [{"name": "x", "airframe": "hexacopter_30cm"}]}).warnings()
+
+    (warned,) = warnings(20e3)
+    rotors = ", ".join(f"rotors[{number}]" for number in range(6))
+    assert warned.startswith(f"x: {rotors}: their tips show up to 66.7 m/s, beyond the unambiguous 62.1 m/s")
+    enough_hz = float(warned.split("a PRF of ")[1].split()[0])
+    assert warnings(enough_hz) == []
+    (lone,) = warnings(0.999 * enough_hz)
+    assert lone.startswith("x: rotors[5]: its tips show 66.7 m/s, beyond")
+
+
 @pytest.mark.parametrize("bird", [{"members": 20, "flock_velocity_mps": 10.0}, {"heave_m": 8.0}])
 def test_no_bird_of_a_flock_comes_to_the_radar(bird):
     radar, starling = {**RADAR, "pulses": round(2 * RADAR["prf_hz"])}, {"name": "x", "species": "starling"}
