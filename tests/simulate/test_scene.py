@@ -111,6 +111,23 @@ def test_a_file_that_is_no_scene_is_refused_in_one_line(tmp_path, content):
     assert len(caught.value.problems) == 1
 
 
+@pytest.mark.parametrize(
+    ("name", "cure"),
+    [
+        ("quadcoptr", "give quadcopter"),
+        ("{folder}/night", "give {folder}/night.toml"),
+        ("car", "or a shipped scene: fixed_wing,"),
+    ],
+)
+def test_what_was_meant_by_a_name_is_told(tmp_path, name, cure):
+    (tmp_path / "night.toml").write_text("")
+    with pytest.raises(SceneError, match="cannot be read: No such file") as caught:
+        Scene.load(name.format(folder=tmp_path))
+    (problem,) = caught.value.problems
+    assert cure.format(folder=tmp_path) in problem
+    assert ("shipped" in problem) == ("shipped" in cure)
+
+
 def test_a_name_that_no_file_system_holds_is_refused_in_one_line():
     with pytest.raises(SceneError, match=r"cannot be read: File name too long: give a TOML file"):
         Scene.load("a" * 300)
