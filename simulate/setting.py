@@ -67,11 +67,12 @@ class Setting(BaseModel):
     @model_validator(mode="after")
     def _ranges(self) -> "Setting":
         for part in (*self.uav, *self.bird):
-            nearest = _nearest_m(part, self.radar.pulses / self.radar.prf_hz)
+            dwell_s = self.radar.pulses / self.radar.prf_hz
+            nearest = _nearest_m(part, dwell_s)
             if not nearest > part.reach_m:
                 raise ValueError(
-                    f"{part.name}: range_m is {part.range_m}: within the dwell it comes to {nearest:.6g} m, which must "
-                    f"exceed its own reach of {part.reach_m:.6g} m"
+                    f"{part.name}: range_m is {part.range_m}: within the dwell of {dwell_s:.6g} s (pulses / PRF) it "
+                    f"comes to {nearest:.6g} m, which must exceed its own reach of {part.reach_m:.6g} m"
                 )
         return self
 

@@ -56,7 +56,7 @@ def power_spectrum(iq: np.ndarray) -> np.ndarray:
         (scene(uav=[uav(velocity=3.0)]), r"unknown field uav\[0\]\.velocity: the fields are .*velocity_mps"),
         (scene(uav=[uav(rotors=[{**ROTOR, "rpm": 3.0}])]), r"unknown field .*rpm: the fields are blade_length_m"),
         (scene(uav=[uav(range_m=0.1)]), r"range_m is 0\.1: .* must exceed its own reach of 0\.15 m"),
-        (scene(uav=[uav(range_m=1.0, velocity_mps=-30.0)]), r"within the dwell it comes to -0\.2 m"),
+        (scene(uav=[uav(range_m=1.0, velocity_mps=-30.0)]), r"dwell of 0\.04 s \(pulses / PRF\) it comes to -0\.2 m"),
         (scene(uav=[uav(range_m=1.0, velocity_mps=-90.0, acceleration_mps2=4500.0)]), r"it comes to 0\.1 m"),
         (scene(uav=[uav(name="mains")]), r"a part is named 'mains': that is the receiver's"),
         (scene(uav=[{"name": "x", "airframe": "jumbo"}]), r"airframe is 'jumbo': it must be one of type1"),
@@ -214,7 +214,7 @@ def test_tips_of_several_rotors_that_alias_are_one_warning_whose_prf_is_enough()
 @pytest.mark.parametrize("bird", [{"members": 20, "flock_velocity_mps": 10.0}, {"heave_m": 8.0}])
 def test_no_bird_of_a_flock_comes_to_the_radar(bird):
     radar, starling = {**RADAR, "pulses": round(2 * RADAR["prf_hz"])}, {"name": "x", "species": "starling"}
-    with pytest.raises(SceneError, match="within the dwell it comes to"):
+    with pytest.raises(SceneError, match=r"within the dwell of 2 s \(pulses / PRF\) it comes to"):
         Scene.build({"radar": radar, "bird": [{**starling, "range_m": 5.0, **bird}]})
     Scene.build({"radar": radar, "bird": [{**starling, "range_m": 5.0}]})
     Scene.build({"radar": radar, "bird": [{**starling, "range_m": 500.0, **bird}]})
