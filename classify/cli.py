@@ -22,6 +22,7 @@ app = typer.Typer(
     name="bladewing",
     add_completion=False,
     rich_markup_mode=None,  # else the units in [brackets] are taken for markup
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]

@@ -85,7 +85,10 @@ def test_an_option_without_its_value_points_to_no_other_help(calls, capsys):
     assert capsys.readouterr().err.endswith(" (see --help)\n")
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["predict", "--help"], ["train", "--help"], ["report", "--help"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [["--help"], ["-h"], ["predict", "--help"], ["predict", "-h"], ["train", "--help"], ["report", "--help"]],
+)
 def test_help_goes_to_stdout(capsys, arguments):
     assert main(arguments) == 0
     out, err = capsys.readouterr()
