@@ -22,6 +22,7 @@ app = typer.Typer(
     name="bladewing",
     add_completion=False,
     rich_markup_mode=None,  # else the units in [brackets] are taken for markup
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]
@@ -83,7 +84,7 @@ def _before_any_command(
     """Tell UAV, bird and clutter apart from a radar's slow-time returns."""
 
 
-@app.command()
+@app.command(short_help="Name what each recording holds: uav, bird, clutter, unknown.")
 def predict(
     recordings: Recordings,
     model: ModelName = None,
@@ -144,7 +145,7 @@ def predict(
         raise typer.Exit(2)
 
 
-@app.command()
+@app.command(short_help="Measure rotors: rate, tips, blades, body velocity.")
 def measure(
     recordings: Recordings,
     blades: Annotated[
@@ -190,11 +191,13 @@ def measure(
             clearest = result.clearer(clearest)
     if plot is not None and clearest is not None:
         clearest.write_plot(plot)
+        if not as_json:
+            print(f"Wrote {plot}", flush=True)
     if unreadable:
         raise typer.Exit(2)
 
 
-@app.command()
+@app.command(short_help="Train all models on synthetic records.")
 def train(
     out: Annotated[Path, _path_option("DIR", "Where the models and train.json go.")] = Path("out"),
     config: Config = None,
@@ -217,7 +220,7 @@ def train(
         run_training(out, records=records, seed=seed, quick=quick, config=config, data=data, progress=True)
 
 
-@app.command()
+@app.command(short_help="Write the records of a training to disk.")
 def dataset(
     out: Annotated[
         Path, typer.Argument(metavar="OUT", readable=False, help="Folder of the data set: new, or to be gone on with.")
@@ -237,7 +240,7 @@ def dataset(
         run_dataset(out, records=records, seed=seed, config=config, progress=True)
 
 
-@app.command()
+@app.command(short_help="Write one self-contained ONNX graph for a radar.")
 def export(
     out: Annotated[
         Path, typer.Argument(metavar="OUT.onnx", readable=False, help="The graph to write.", show_default=False)
@@ -264,7 +267,7 @@ def export(
     print(f"Wrote {out}: {graph}, within {worst:.0e} of predict --model {name}", flush=True)
 
 
-@app.command()
+@app.command(short_help="Measure models on fresh records: what each choice costs.")
 def report(
     out: Annotated[Path, _path_option("DIR", "Where report.html and report.json go.")] = Path("out"),
     quick: Annotated[bool, typer.Option("--quick", help="Fewer records and shorter timings.")] = False,
@@ -284,7 +287,7 @@ def report(
         run_report(out, models=models, quick=quick, seed=seed, config=config, progress=True)
 
 
-@app.command()
+@app.command(short_help="Render a scene to a SigMF recording.")
 def simulate(
     scene: Annotated[
         str,
@@ -338,7 +341,7 @@ def simulate(
             print("\n".join(said), flush=True)
 
 
-@app.command()
+@app.command(short_help="Take every stage to its extremes.")
 def stability(
     out: Annotated[Path, _path_option("DIR", "Where stability.json, .md and .html go.")] = Path("out"),
     quick: Annotated[bool, typer.Option("--quick", help="Leave out what takes minutes.")] = False,
@@ -350,7 +353,7 @@ def stability(
         run_stability(out, quick=quick, progress=True)
 
 
-@app.command()
+@app.command(short_help="Make the paper's tables again.")
 def tables(
     out: Annotated[Path, _path_option("DIR", "Where tables.md and tables.json go.")] = Path("out"),
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Root of the scenes' noise.")] = 0,

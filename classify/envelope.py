@@ -89,6 +89,8 @@ class Envelope:
         wavelength_m = SPEED_OF_LIGHT_MPS / carrier_hz
         unambiguous_mps = wavelength_m * prf_hz / 4
         if not self.carrier_min_hz <= carrier_hz <= self.carrier_max_hz:
+            if self.carrier_min_hz <= prf_hz <= self.carrier_max_hz and prf_hz > carrier_hz:
+                return f"carrier {carrier_hz:g} Hz and PRF {prf_hz:g} Hz stand in each other's place: exchange them"
             for unit, power in (("GHz", 9), ("MHz", 6)):
                 if self.carrier_min_hz <= carrier_hz * 10.0**power <= self.carrier_max_hz:
                     return (

@@ -68,6 +68,9 @@ LEAST_STD_MPS = 1e-6
 #: How fast a body is from dwell to dwell: by those that know it so well [m/s], but for so large a share at either end.
 KNOWN_MPS, ENDS = 1.0, 0.05
 
+#: Combs in no larger a share of the dwells may be chance: of noise alone one dwell in some 300 shows one.
+CHANCE = 0.1
+
 #: A recording whose spectrum has one side alone in more than this share of its dwells is of one channel.
 ONE_SIDED = 0.5
 
@@ -213,8 +216,7 @@ class Measured:
         if self.beat is None:
             return {}
         combs = int(np.isfinite(self.values.chopping_hz).sum())
-        # one false comb in a hundred dwells must not hide a bird
-        rotor = combs > 0.1 * len(self.iq)
+        rotor = combs > CHANCE * len(self.iq)  # a false comb must not hide a bird
         beat = {name: None if rotor else _number(getattr(self.beat, name)) for name in WINGBEAT}
         reason = f"no wingbeat: a rotor in {combs} of {len(self.iq)} dwells" if rotor else str(self.beat.reason) or None
         return beat | {"wingbeat_reason": reason}

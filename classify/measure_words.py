@@ -10,6 +10,7 @@ from bladewing.features.rotor.comb import OVER_BODY
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 
 from .errors import one_line
+from .measure import CHANCE
 from .terminal import counted, print_table
 
 if TYPE_CHECKING:
@@ -90,8 +91,11 @@ def _sentence(found: "Measured") -> str:
         rotor = "blades x rate: " + " or ".join(options)
         rotor += _blades(found)
     where = f"comb in {all_together['with_comb']} of {counted(all_together['dwells'])}"
+    if all_together["with_comb"] <= CHANCE * all_together["dwells"]:
+        where += ", perhaps by chance"
     folded = str(v.band_reason[clear])
-    return f"{where}; {rotor}{body}{_gear(found)}{_wheel(found)}{_unsteady(found)}{folded and '; ' + folded}"
+    doubts = f"{_wheel(found)}{_unsteady(found)}{_unlike(found)}"
+    return f"{where}; {rotor}{body}{_gear(found)}{doubts}{folded and '; ' + folded}"
 
 
 def _body(all_together: Mapping[str, Any]) -> str:
@@ -120,6 +124,22 @@ def _unsteady(found: "Measured") -> str:
     if len(chopping_hz) < LEAST_COMBS or high < UNSTEADY * low:
         return ""
     return f"; the dwells do not agree: half of their combs lie within {low:.4g} to {high:.4g} Hz"
+
+
+def _unlike(found: "Measured") -> str:
+    """Words of caution where most dwells count other rotors than the one whose rates are named; or ""."""
+    v, named = found.values, found.clearest()
+    held = np.isfinite(v.chopping_hz)
+    # that of rotors that are not told apart is a bound: it bears out no other dwell's
+    counts, dwells = np.unique(np.where(v.rotors_resolved, v.rotor_count, np.inf)[held], return_counts=True)
+    alike = dwells[counts == v.rotor_count[named]].sum()
+    if not v.rotors_resolved[named] or 2 * alike >= dwells.sum():
+        return ""
+    told = (
+        f"{count:.0f} in {n}" if count < np.inf else f"not told apart in {n}"
+        for count, n in zip(counts, dwells, strict=True)
+    )
+    return f"; the dwells do not agree on the number of rotors: {', '.join(told)}"
 
 
 def _wheel(found: "Measured") -> str:

@@ -11,12 +11,12 @@ from bladewing.features.heave import heave
 from bladewing.features.steady_comb import steady_comb
 from bladewing.features.wingbeat import wingbeat
 
-from .errors import one_line
+from .errors import BadInput, one_line
 from .fusion import LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
 from .recording import Recording
 from .samples import positive
-from .terminal import print_table
+from .terminal import counted, print_table, print_words
 from .track import Track, fuse
 
 if TYPE_CHECKING:
@@ -145,23 +145,23 @@ class Answer:
         print_table(console, table)
         shares = "  ".join(f"{name} {share:.2f}" for name, share in zip(CLASSES, self.track.probabilities, strict=True))
         line = Text("track: ").append(self.track.label, style=_COLOURS[self.track.label])
-        line.append(f"  {shares}  from {self.track.used} of {len(self.dwells.labels)} dwells")
+        line.append(f"  {shares}  from {self.track.used} of {counted(len(self.dwells.labels))}")
         if self.track.reason:
             line.append(f"  ({self.track.reason})")
-        console.print(line)
+        print_words(console, line)
         for remark in self.remarks:
             console.print(Text(remark), soft_wrap=True)
         for name, rate_hz in self.shown.items():
             whose, odds = ODDS[name]
             said = f"{_SHOWN[name].format(rate_hz)}: the odds of {_WHOSE[whose]} count {odds:g} times"
-            console.print(Text(said))
+            print_words(console, Text(said))
         if self.declared_s is not None:
             later = (
                 ""
                 if self.track.declared == self.track.label
                 else ", which later dwells and longer looks do not bear out"
             )
-            console.print(Text(f"declared {self.track.declared} after {self.declared_s:.3g} s{later}"))
+            print_words(console, Text(f"declared {self.track.declared} after {self.declared_s:.3g} s{later}"))
 
 
 def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = DWELL_S) -> Answer:
@@ -180,8 +180,13 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
     Raises
     ------
     BadInput
-        `dwell_s` is not above 0.
+        `dwell_s` is not above 0, or `recording` is a path or samples alone.
     """
+    if not isinstance(recording, Recording):
+        raise BadInput(
+            f"recording is of type {type(recording).__name__}: it must be a Recording: load_recording(path, ...) reads "
+            "one, Recording(name, iq, carrier_hz, prf_hz) makes one of samples"
+        )
     dwell_s = positive(dwell_s, "dwell_s")
     iq = recording.dwells(dwell_s)
     count, wanted = iq.shape

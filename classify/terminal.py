@@ -7,9 +7,13 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
 
 _LONGEST_LINE = 10_000
+
+#: Where fewer columns would be left for a reason, it stands behind its row unwrapped, as the terminal breaks it.
+_LEAST_WORDS = 20
 
 
 def console() -> "Console":
@@ -26,18 +30,33 @@ def counted(dwells: int) -> str:
     return f"{dwells} dwell{'s' * (dwells != 1)}"
 
 
+def print_words(console: "Console", words: "Text") -> None:
+    """Print a sentence, wrapped between its words where the terminal is narrow."""
+    for line in words.wrap(console, console.width):
+        line.rstrip()
+        console.print(line, soft_wrap=True)
+
+
 def print_table(console: "Console", table: "Table") -> None:
-    """Print a table; a terminal too narrow for what must not be wrapped gets narrow gaps, then wraps the lines."""
+    """Print a table; a terminal too narrow for what must not be wrapped gets narrow gaps, then wraps the lines.
+
+    So it does where little more than a word a line would be left for the words of the other columns.
+    """
     from rich.cells import cell_len
     from rich.text import Text
 
-    for column in table.columns:
-        if column.no_wrap:
-            column.min_width = max(cell_len(str(cell)) for cell in (column.header, *column.cells))
-    endless = console.options.update(max_width=1000)
-    table.collapse_padding = table.__rich_measure__(console, endless).minimum > console.width
-    console.width = max(console.width, table.__rich_measure__(console, endless).minimum)
-    for line in console.render_lines(table, pad=False):
+    def least() -> int:
+        return table.__rich_measure__(console, console.options.update(max_width=_LONGEST_LINE)).minimum
+
+    longest = [max(cell_len(str(cell)) for cell in (column.header, *column.cells)) for column in table.columns]
+    for column, cells in zip(table.columns, longest, strict=True):
+        column.min_width = cells if column.no_wrap else min(cells, _LEAST_WORDS)
+    table.collapse_padding = least() > console.width
+    if least() > console.width:
+        for column, cells in zip(table.columns, longest, strict=True):
+            column.no_wrap, column.min_width = True, cells
+    width = max(console.width, least())
+    for line in console.render_lines(table, console.options.update(width=width), pad=False):
         words = Text.assemble(*((part.text, part.style or "") for part in line))
         words.rstrip()
         console.print(words, soft_wrap=True)

@@ -144,17 +144,24 @@ def without_acceleration(
     ------
     ValueError
         If `iq` is not complex, holds no pulse or a value that is not finite, the frequencies are not positive, or an
-        acceleration is not finite.
+        acceleration is not finite or there is not one for every record.
     """
     samples = finite_complex(iq)
     carrier_hz, prf_hz = require_radar(carrier_hz, prf_hz)
-    acceleration = np.asarray(acceleration_mps2, np.float64)[..., None]
+    acceleration = np.asarray(acceleration_mps2, np.float64)
     if not np.isfinite(acceleration).all():
         raise ValueError(
             "acceleration_mps2 holds a value that is not finite, as `body_acceleration` gives where it finds none: "
             "put 0 there"
         )
-    return _steadied(samples, acceleration, SPEED_OF_LIGHT_MPS / carrier_hz, prf_hz)
+    records = samples.shape[:-1]
+    try:
+        each = np.broadcast_to(acceleration, records)[..., None]
+    except ValueError:
+        raise ValueError(
+            f"acceleration_mps2 has shape {acceleration.shape}: it must have that of the records of iq, {records}"
+        ) from None
+    return _steadied(samples, each, SPEED_OF_LIGHT_MPS / carrier_hz, prf_hz)
 
 
 def _steadied(

@@ -18,6 +18,21 @@ from .setting import Setting
 from .target import mean_power
 
 
+def whole_seed(seed: object) -> int:
+    """Check the root of all randomness: a whole number from 0 on.
+
+    Raises
+    ------
+    ValueError
+        It is none.
+    """
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
+        raise ValueError(f"seed is {seed!r}: it must be a whole number from 0 on")
+    if seed < 0:
+        raise ValueError(f"seed is {seed}: it must not be negative")
+    return int(seed)
+
+
 def stream(seed: int, name: str) -> Generator:
     """The generator of one part: it depends on the seed and the part's name alone."""
     return Generator(Philox(SeedSequence(seed, spawn_key=(zlib.crc32(name.encode()),))))

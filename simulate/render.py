@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .plan import Plan
 from .radar import Radar
-from .reception import Reception, clutter_echo, pulse_times_s
+from .reception import Reception, clutter_echo, pulse_times_s, whole_seed
 from .render_bird import BIRD_EFFECTS, bird_echo, bird_truth
 from .render_uav import Fidelity, full_fidelity, uav_echo, uav_truth
 from .setting import Setting
@@ -55,10 +55,9 @@ def render(scene: Setting, seed: int = 0, *, plan: Plan | None = None) -> Render
     Raises
     ------
     ValueError
-        If `seed` is negative.
+        If `seed` is no whole number, or negative.
     """
-    if seed < 0:
-        raise ValueError(f"seed is {seed}: it must not be negative")
+    seed = whole_seed(seed)
     radar = scene.sight
     jitters = plan is None or "jitter" in plan.receiver
     times = pulse_times_s(scene, seed) if jitters else radar.times_s

@@ -2,6 +2,7 @@
 
 import os
 import tomllib
+from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -77,12 +78,9 @@ class Scene(Setting):
                 raise ValueError(f"it must be a file of at most {_MOST_BYTES} bytes")
             values = tomllib.loads(file.read_text(encoding="utf-8-sig"))  # some editors begin with a mark
         except OSError as error:
-            raise SceneError(
-                [
-                    f"{name}: cannot be read: {error.strerror}: give a TOML file, or a shipped scene: "
-                    + ", ".join(shipped())
-                ]
-            ) from None
+            meant = _meant(name) if isinstance(error, FileNotFoundError) else []
+            cure = " or ".join(meant) or f"a TOML file, or a shipped scene: {', '.join(shipped())}"
+            raise SceneError([f"{name}: cannot be read: {error.strerror}: give {cure}"]) from None
         except (ValueError, RecursionError) as error:  # not UTF-8, not TOML, or nested beyond reason
             what = "is a directory" if isinstance(file, Path) and file.is_dir() else f"not TOML: {error}"
             raise SceneError([f"{name}: {what}: give a TOML file, or a shipped scene"]) from None
@@ -105,6 +103,11 @@ def shipped() -> list[str]:
     """Names of the scenes that come with the package."""
     folder = files("bladewing.simulate") / "scenes"
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def _meant(name: str) -> list[str]:
+    """What a name of nothing may stand for: the file with its suffix, the shipped scene that is written nearly so."""
+    return [file for file in (f"{name}.toml",) if os.path.isfile(file)] + get_close_matches(name, shipped(), n=1)
 
 
 def _line(problem: dict[str, Any]) -> str:

@@ -67,11 +67,12 @@ class Setting(BaseModel):
     @model_validator(mode="after")
     def _ranges(self) -> "Setting":
         for part in (*self.uav, *self.bird):
-            nearest = _nearest_m(part, self.radar.pulses / self.radar.prf_hz)
+            dwell_s = self.radar.pulses / self.radar.prf_hz
+            nearest = _nearest_m(part, dwell_s)
             if not nearest > part.reach_m:
                 raise ValueError(
-                    f"{part.name}: range_m is {part.range_m}: within the dwell it comes to {nearest:.6g} m, which must "
-                    f"exceed its own reach of {part.reach_m:.6g} m"
+                    f"{part.name}: range_m is {part.range_m}: within the dwell of {dwell_s:.6g} s (pulses / PRF) it "
+                    f"comes to {nearest:.6g} m, which must exceed its own reach of {part.reach_m:.6g} m"
                 )
         return self
 
@@ -111,6 +112,7 @@ class Setting(BaseModel):
                 "change places"
             )
         for part in self.uavs:
+            beyond: dict[str, float] = {}
             for number, rotor in enumerate(part.rotors):
                 where = f"{part.name}: rotors[{number}]"
                 tip = rotor.tip_mps(radar.dwell_s)
@@ -120,11 +122,16 @@ class Setting(BaseModel):
                 if math.cos(part.beta_rad(rotor)) < 1e-9:
                     said.append(f"{where}: seen along its axis (90 degrees) it shows no micro-Doppler")
                 elif fastest > radar.unambiguous_mps:
-                    said.append(
-                        f"{where}: its tips show {fastest:.1f} m/s, beyond the unambiguous {radar.unambiguous_mps:.1f} "
-                        f"m/s (wavelength x PRF / 4): they alias; a PRF of "
-                        f"{4 * fastest / radar.wavelength_m:.0f} Hz would not"
-                    )
+                    beyond[f"rotors[{number}]"] = fastest
+            if beyond:
+                fastest = max(beyond.values())
+                enough_hz = math.ceil(4 * fastest / radar.wavelength_m)
+                tips = "its tips show" if len(beyond) == 1 else "their tips show up to"
+                said.append(
+                    f"{part.name}: {', '.join(beyond)}: {tips} {fastest:.1f} m/s, beyond the unambiguous "
+                    f"{radar.unambiguous_mps:.1f} m/s (wavelength x PRF / 4): they alias; a PRF of {enough_hz} Hz "
+                    "would not"
+                )
         for target in (*self.uavs, *self.birds):
             fastest = target.fastest_mps(radar.dwell_s)
             if fastest > _SOUND_MPS:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .summary import front_budgets, headline_model, sentences
-from .words import MINUS, count, micros, number, percent, size, spoken
+from .words import count, micros, number, percent, size, spoken
 
 
 def model_card(report: Mapping[str, Any]) -> str:
@@ -49,7 +49,7 @@ def model_card(report: Mapping[str, Any]) -> str:
         "",
         "## Envelope",
         "",
-        *[f"- {spoken(key)}: {_bounds(value)}" for key, value in model["envelope"].items()],
+        *[f"- {line}" for line in _envelope(model["envelope"])],
         "",
         "Outside of it the answer is “unknown”, with the reason.",
         "",
@@ -146,10 +146,19 @@ def _rate(rate: Mapping[str, Any]) -> str:
     return f"{percent(rate['value'])} [{100 * rate['low']:.1f}, {100 * rate['high']:.1f}]"
 
 
-def _bounds(value: Any) -> str:
-    if isinstance(value, list):
-        return " to ".join(f"{one:g}" for one in value)
-    return f"{value:g}".replace("-", MINUS) if isinstance(value, int | float) else str(value)
+def _envelope(limits: Mapping[str, float]) -> list[str]:
+    """The radars that are answered for, in the units that people give them in."""
+
+    def between(low: str, high: str, one: float, unit: str) -> str:
+        return f"{number(limits[low] / one)} to {number(limits[high] / one)} {unit}"
+
+    return [
+        f"carrier: {between('carrier_min_hz', 'carrier_max_hz', 1e9, 'GHz')}",
+        f"PRF: {between('prf_min_hz', 'prf_max_hz', 1e3, 'kHz')}",
+        f"pulses of a dwell: {count(int(limits['pulses_min']))} to {count(int(limits['pulses_max']))}",
+        f"dwell: {number(1e3 * limits['dwell_min_s'])} ms to {number(limits['dwell_max_s'])} s",
+        f"unambiguous velocity, wavelength × PRF / 4: {number(limits['unambiguous_min_mps'])} m/s or more",
+    ]
 
 
 def _training(report: Mapping[str, Any]) -> str:

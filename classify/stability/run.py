@@ -2,7 +2,7 @@
 
 import html
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import fields
 from itertools import groupby
 from pathlib import Path
@@ -121,12 +121,6 @@ def _shown(cell: Cell) -> str:
 
 _HEADS = ("parameter", "at", "error", "allowed", "holds", "guard")
 
-#: What the tables scroll in where they are wider than the page: a shade at the right says that there is more.
-_SCROLL = (
-    ".scroll{overflow-x:auto;background:linear-gradient(to left,#fff 14px,transparent) right/17px 100% no-repeat local,"
-    "linear-gradient(to left,#9aa4ae80,transparent) right/14px 100% no-repeat scroll}"
-)
-
 
 def _row(cell: Cell) -> tuple[str, ...]:
     return cell.parameter, cell.value, _shown(cell), f"{cell.limit:g}", "yes" if cell.holds else "NO", cell.guard
@@ -149,32 +143,70 @@ def markdown(cells: list[Cell]) -> str:
     return "\n".join(lines)
 
 
+#: The page is read by daylight and at night; its tables scroll where they are wider, and a shade at the right says so.
+_STYLE = (
+    ":root{--paper:#fff;--ink:#1b1f24;--muted:#66707a;--line:#d9dee4;--shade:#9aa4ae80;--no:#fbe3e0;--link:#005a8f;"
+    "color-scheme:light}"
+    "@media(prefers-color-scheme:dark){:root{--paper:#14181c;--ink:#e4e8ec;--muted:#98a3ad;--line:#2e363d;"
+    "--shade:#4a555f80;--no:#4a2320;--link:#6bbcf0;color-scheme:dark}}"
+    "body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;padding:0 1rem;color:var(--ink);"
+    "background:var(--paper)}a{color:var(--link)}nav{columns:16rem;margin:1rem 0 2rem}nav a{display:block}"
+    "table{border-collapse:collapse;width:100%;margin:.5rem 0 2rem}th,td{text-align:left;padding:.25rem .6rem;"
+    "border-bottom:1px solid var(--line);vertical-align:top}td{font-variant-numeric:tabular-nums}"
+    "td:not(.error,.guard),.number{white-space:nowrap}.no td:not([rowspan]){background:var(--no)}"
+    "@media(max-width:60rem){.guard{min-width:18rem}}"
+    "@media(max-width:40rem){td,th{padding:.25rem .5rem .25rem 0;font-size:.85rem}"
+    ".parameter,.at{white-space:normal!important}}"
+    ".scroll{overflow-x:auto;background:linear-gradient(to left,var(--paper) 14px,transparent) right/17px 100% "
+    "no-repeat local,linear-gradient(to left,var(--shade),transparent) right/14px 100% no-repeat scroll}"
+)
+
+
 def page(cells: list[Cell]) -> str:
     """The table as one HTML page without any request outside."""
-    style = (
-        "body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;padding:0 1rem;color:#1b1f24}"
-        "table{border-collapse:collapse;width:100%;margin:.5rem 0 2rem}th,td{text-align:left;padding:.25rem .6rem;"
-        "border-bottom:1px solid #d9dee4;vertical-align:top}td{font-variant-numeric:tabular-nums}"
-        "td:not(:nth-child(3),:last-child),.number{white-space:nowrap}.no{background:#fbe3e0}"
-        "@media(max-width:60rem){td:last-child{min-width:18rem}}"
-        "@media(max-width:40rem){td,th{padding:.25rem .5rem .25rem 0;font-size:.85rem}"
-        "td:nth-child(-n+2){white-space:normal}}" + _SCROLL
-    )
+    stages = [(named, list(group)) for named, group in groupby(cells, key=lambda cell: (cell.stage, cell.measure))]
     parts = [
         "<!doctype html><html lang=en><meta charset=utf-8>"
         "<meta name=viewport content='width=device-width,initial-scale=1'><title>Stability</title>",
-        f"<style>{style}</style><h1>Stability</h1>",
-        f"<p>{sum(cell.holds for cell in cells)} of {len(cells)} cells hold.</p>",
+        f"<style>{_STYLE}</style><h1>Stability</h1>",
+        f"<p>Every stage at its extremes: errors against a more precise oracle, what is allowed, and what guards the "
+        f"numbers there. {_held(cells)} hold.</p><nav>",
     ]
-    for (stage, measure), group in groupby(cells, key=lambda cell: (cell.stage, cell.measure)):
+    for stage, alike in groupby(enumerate(stages), key=lambda part: part[1][0][0]):  # one may have several measures
+        (number, (_, some)), *more = alike
+        every = [*some, *(cell for _, (_, others) in more for cell in others)]
+        parts.append(f"<a href='#s{number}'>{html.escape(stage)}: {_held(every)}</a>")
+    parts.append("</nav>")
+    for number, ((stage, measure), some) in enumerate(stages):
         heads = "".join(f"<th>{head}" for head in _HEADS)
-        parts.append(f"<h2>{html.escape(stage)}</h2><p>Error: {html.escape(measure)}.</p>")
+        parts.append(f"<h2 id=s{number}>{html.escape(stage)}</h2><p>Error: {html.escape(measure)}.</p>")
         parts.append(f"<div class=scroll><table><tr>{heads}")
-        for cell in group:
-            kind = "" if cell.holds else " class=no"
-            cells_of_row = [f"<td>{html.escape(text)}" for text in _row(cell)]
-            if cell.error is not None and not cell.warned:  # a number breaks nowhere, a reason may
-                cells_of_row[2] = cells_of_row[2].replace("<td>", "<td class=number>", 1)
-            parts.append(f"<tr{kind}>" + "".join(cells_of_row))
+        rows = [_row(cell) for cell in some]
+        spans = {0: _spans([row[0] for row in rows]), len(_HEADS) - 1: _spans([(row[0], row[-1]) for row in rows])}
+        for n, (cell, row) in enumerate(zip(some, rows, strict=True)):
+            parts.append(f"<tr{'' if cell.holds else ' class=no'}>")
+            for column, (head, text) in enumerate(zip(_HEADS, row, strict=True)):
+                span = spans[column][n] if column in spans else 1
+                whole = head == "error" and cell.error is not None and not cell.warned  # a reason may break, no number
+                if span:
+                    told = f" rowspan={span}" if span > 1 else ""
+                    kind = "number" if whole else head
+                    parts[-1] += f"<td class={kind}{told}>{html.escape(text)}"
         parts.append("</table></div>")
     return "\n".join(parts) + "\n"
+
+
+def _held(cells: list[Cell]) -> str:
+    return f"{sum(cell.holds for cell in cells)} of {len(cells)}"
+
+
+def _spans(texts: Sequence[Hashable]) -> list[int]:
+    """How many rows a cell spans that says what those below it say; 0 for those.
+
+    Examples
+    --------
+    >>> _spans(["a", "a", "b", "a"])
+    [2, 0, 1, 1]
+    """
+    runs = [len(list(group)) for _, group in groupby(texts)]
+    return [length if first == 0 else 0 for length in runs for first in range(length)]

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import pytest
-from bladewing.classify.cli import main
+from bladewing.classify.cli import app, main
 from bladewing.classify.files import result_folder
 from bladewing.classify.training_account import ACCOUNT, print_account
 from bladewing.models import pretrained
@@ -85,7 +85,10 @@ def test_an_option_without_its_value_points_to_no_other_help(calls, capsys):
     assert capsys.readouterr().err.endswith(" (see --help)\n")
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["predict", "--help"], ["train", "--help"], ["report", "--help"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [["--help"], ["-h"], ["predict", "--help"], ["predict", "-h"], ["train", "--help"], ["report", "--help"]],
+)
 def test_help_goes_to_stdout(capsys, arguments):
     assert main(arguments) == 0
     out, err = capsys.readouterr()
@@ -113,6 +116,14 @@ def test_an_account_of_a_training_is_not_wrapped_in_a_pipe(capsys):
     lines = capsys.readouterr().out.splitlines()
     assert "          about the 95% that it is not sure of (so many that the second alone is as fast)" in lines
     assert not any(line.endswith(" ") for line in lines)
+
+
+def test_the_list_of_commands_says_whole_what_each_does(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["--help"]) == 0
+    commands = capsys.readouterr().out.split("Commands:\n")[1].splitlines()
+    assert len(commands) == len(app.registered_commands)
+    assert all(line.endswith(".") and not line.endswith("...") for line in commands)
 
 
 def test_help_shows_units(capsys):
@@ -171,7 +182,7 @@ def test_a_run_that_ends_early_leaves_no_empty_folder(monkeypatch, tmp_path, com
 @pytest.mark.parametrize("closed", ["1", "2"])
 def test_a_closed_output_is_read_by_nobody_and_nothing_goes_to_the_other(tmp_path, closed):
     # what is said of a bad file must not end up among the answers, nor the answers fail where none can be written
-    python = "import sys; from bladewing.classify.cli import main; sys.exit(main())"
+    python = "import sys; from bladewing.classify.cli import app, main; sys.exit(main())"
     command = f'exec {closed}>&-; exec "{sys.executable}" -c "{python}" predict "{tmp_path / "none.npy"}"'
     done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
     assert done.returncode == 2
@@ -181,7 +192,7 @@ def test_a_closed_output_is_read_by_nobody_and_nothing_goes_to_the_other(tmp_pat
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
 def test_an_output_that_is_full_is_told_from_the_files_that_are_written(tmp_path):
-    python = "import sys; from bladewing.classify.cli import main; sys.exit(main())"
+    python = "import sys; from bladewing.classify.cli import app, main; sys.exit(main())"
     command = [sys.executable, "-c", python, "simulate", "quadcopter", "--out", "cell"]
     with open("/dev/full", "w") as full:
         done = subprocess.run(command, cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, check=False)

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
-from bladewing.classify import BadInput, Classifier, answer, load_recording
+from bladewing.classify import BadInput, Classifier, Recording, answer, load_recording
 from bladewing.classify import recording as recordings
 from bladewing.classify.cli import main
 
@@ -209,7 +209,7 @@ def test_people_get_a_table_that_fits_80_columns(run, sigmf_pair):
     assert lines[0].endswith("one.sigmf-meta")
     assert lines[1].split() == ["start", "s", "stop", "s", "label", *NAMES, "reason"]
     assert lines[2].split() == ["0.000", "0.200", "uav", "0.80", "0.15", "0.05"]
-    assert lines[3] == "track: uav  uav 0.80  bird 0.15  clutter 0.05  from 1 of 1 dwells"
+    assert lines[3] == "track: uav  uav 0.80  bird 0.15  clutter 0.05  from 1 of 1 dwell"
     assert lines[4] == "its 0.2 s, shorter than a dwell of 1 s, are taken whole"
     assert lines[5] == "declared uav after 0.2 s"
     text = " ".join(out.split())
@@ -229,6 +229,17 @@ def test_no_number_and_no_reason_is_lost_on_a_narrow_terminal(run, sigmf_pair, m
     text = " ".join(out.split())
     assert "0.000 0.080 uav 0.80 0.15 0.05" in text
     assert all(word in text for word in ("unambiguous", "velocity", "7.5", "below", "raise", "PRF"))
+
+
+def test_words_are_wrapped_at_the_width_of_the_terminal_and_a_reason_is_no_thin_column(run, sigmf_pair, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    code, out, err = run(sigmf_pair("two", sample_rate=1000.0))
+    assert (code, err) == (0, "")
+    _, _, row, *words = out.splitlines()
+    assert "0.33 50 dwells: unambiguous velocity 7.5 m/s is below 10 m/s (wavelength x PRF / 4): raise" in row
+    assert max(map(len, words)) <= 40
+    assert not [line for line in words if line.endswith(" ")]
+    assert " ".join(" ".join(words).split()).endswith("from 0 of 50 dwells (no dwell could be judged)")
 
 
 def test_the_summary_counts_the_unreadable(run, sigmf_pair, tmp_path):
@@ -453,3 +464,15 @@ def test_python_gives_what_the_command_says(run_json, sigmf_pair, uav_model):
     for wrong in (0, -1.0, np.nan, "0.08"):
         with pytest.raises(BadInput, match=r"^dwell_s is .*above 0"):
             answer(load_recording(path), Classifier.load(uav_model), dwell_s=wrong)
+
+
+def test_samples_in_memory_are_answered_as_a_recording_and_not_without(sigmf_pair, uav_model):
+    path, model = sigmf_pair(), Classifier.load(uav_model)
+    read = load_recording(path)
+    given = answer(Recording("cell 7", read.iq, read.carrier_hz, read.prf_hz), model)
+    assert given.track.label == answer(read, model).track.label
+    for wrong, kind in ((str(path), "str"), (read.iq, "ndarray")):
+        with pytest.raises(
+            BadInput, match=rf"^recording is of type {kind}: .* Recording\(name, iq, carrier_hz, prf_hz\)"
+        ):
+            answer(wrong, model)

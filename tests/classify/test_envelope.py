@@ -22,6 +22,7 @@ C_MPS = 299_792_458.0
                              "of others nothing is known"),
         (24.125, 10e3, 1000, "carrier 24.125 Hz is no radar's: give 24.125 GHz as 24.125e9"),
         (9850.0, 10e3, 1000, "carrier 9850 Hz is no radar's: give 9850 MHz as 9850e6"),
+        (25e3, 9.85e9, 1000, "carrier 25000 Hz and PRF 9.85e+09 Hz stand in each other's place: exchange them"),
         (3e9, 25.0, 1000, "PRF 25 Hz is below 1000 Hz: give 25 kHz as 25e3, or raise the PRF to 1000 Hz or more"),
         (3e9, 999.0, 1000, "PRF 999 Hz is below 1000 Hz: raise the PRF to 1000 Hz or more"),
         (10e9, 999.0, 1000, "PRF 999 Hz is below 1000 Hz: raise the PRF to 1335 Hz or more"),

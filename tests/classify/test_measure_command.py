@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bladewing.classify.cli import main
 from bladewing.classify.measure import Measured, Settings, measure_recording
-from bladewing.classify.measure_words import _blades, with_error
+from bladewing.classify.measure_words import _blades, _unlike, with_error
 from bladewing.classify.recording import load_recording
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 from scipy.signal import hilbert
@@ -123,6 +123,32 @@ def test_dwells_that_tell_the_number_of_blades_are_heard_though_the_clearest_doe
     assert _blades(found) == "; 2 blades in 2 of 4 dwells"
 
 
+def test_a_comb_in_a_few_of_many_dwells_is_said_to_be_perhaps_chance(folder, tmp_path, capsys):
+    iq = white(np.random.default_rng(2), 20 * PULSES)
+    drone = np.load(folder / "drone.npy")
+    for held, caution in ((2, True), (4, False)):
+        for first in range(0, held, 2):
+            iq[first * PULSES : (first + 2) * PULSES] = drone
+        np.save(tmp_path / "few.npy", iq.astype(np.complex64))
+        assert main(["measure", str(tmp_path / "few.npy"), *RADAR, "--dwell", str(PULSES / PRF_HZ)]) == 0
+        said = capsys.readouterr().out
+        assert f"comb in {held} of 20 dwells{', perhaps by chance' if caution else ''}; blades" in said
+
+
+def test_a_count_of_rotors_that_most_dwells_do_not_share_is_not_given_without_a_word():
+    values = SimpleNamespace(
+        chopping_hz=np.array([183.0, 368.0, 182.0, 184.0, 184.0, 189.0, np.nan]),
+        rotor_count=np.array([2.0, 1.0, 1.0, 1.0, 1.0, 2.0, np.nan]),
+        rotors_resolved=np.array([True, False, True, True, True, True, False]),
+    )
+    found = SimpleNamespace(values=values, clearest=lambda: 5)
+    assert _unlike(found) == "; the dwells do not agree on the number of rotors: 1 in 3, 2 in 2, not told apart in 1"
+    found.clearest = lambda: 2  # half of them say so
+    assert _unlike(found) == ""
+    found.clearest = lambda: 1  # "and perhaps more" is said of it
+    assert _unlike(found) == ""
+
+
 def test_a_dwell_that_hardly_tells_the_body_does_not_speak_for_the_recording(folder):
     recording = load_recording(folder / "drone.npy", carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
     spoken = measure_recording(recording, Settings(0.0857, 2, None))
@@ -177,7 +203,10 @@ def test_the_table_says_rate_and_blade(folder, capsys, monkeypatch):
 
 def test_the_plot_is_svg_with_the_comb_on_it(folder, tmp_path, capsys):
     target = tmp_path / "drone.svg"
+    assert main(["measure", str(folder / "drone.npy"), *RADAR, "--plot", str(target), "--json"]) == 0
+    assert all(line.startswith("{") for line in capsys.readouterr().out.splitlines())
     assert main(["measure", str(folder / "drone.npy"), *RADAR, "--plot", str(target)]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == f"Wrote {target}"
     root = ET.fromstring(target.read_text())
     assert root.tag.endswith("svg")
     titles = [e.text for e in root.iter() if e.tag.endswith("title")]

@@ -43,6 +43,17 @@ def test_model_card_is_that_of_the_committed_report(figures: ModuleType, report:
     assert figures.CARD.read_text(encoding="utf-8") == model_card(report), CURE
 
 
+def test_the_envelope_stands_on_the_card_in_words_and_units(report: dict[str, Any]) -> None:
+    lines = model_card(report).split("## Envelope")[1].split("##")[0].splitlines()
+    assert [line for line in lines if line.startswith("- ")] == [
+        "- carrier: 2 to 100 GHz",
+        "- PRF: 1 to 100 kHz",
+        "- pulses of a dwell: 64 to 65\u202f536",
+        "- dwell: 5 ms to 5 s",
+        "- unambiguous velocity, wavelength × PRF / 4: 10 m/s or more",
+    ]
+
+
 def test_a_changed_figure_is_a_changed_text(figures: ModuleType, report: dict[str, Any]) -> None:
     text = figures.README.read_text(encoding="utf-8")
     other = json.loads(json.dumps(report))

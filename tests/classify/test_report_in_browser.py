@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from bladewing.classify.report.page import draw_page
 
 websocket = pytest.importorskip("websocket", reason="websocket-client is not installed: pip install '.[dev]'")
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -209,3 +210,22 @@ def test_tables_sort_both_ways_by_value(page: Page, html: Path) -> None:
         rising, falling = ([v for v in column if v not in ("", "–")] for column in (rising, falling))
         assert rising == sorted(rising, key=key)
         assert falling == sorted(falling, key=key, reverse=True)
+
+
+# Of each square of panels: how many of them stand in each of its rows.
+ROWS = """[...document.querySelectorAll(".square")].map((square) => {
+  const tops = [...square.children].map((panel) => panel.getBoundingClientRect().top);
+  return [...new Set(tops)].map((top) => tops.filter((one) => one === top).length);
+})"""
+
+
+@pytest.mark.parametrize(
+    ("width", "rows"), [(1600, [4]), (1520, [4]), (1519, [2, 2]), (DESK, [2, 2]), (760, [2, 2]), (PHONE, [1, 1, 1, 1])]
+)
+def test_no_panel_of_four_models_is_left_over(page: Page, tmp_path: Path, width: int, rows: list[int]) -> None:
+    report = json.loads((Path(__file__).parents[2] / "docs" / "report.json").read_text(encoding="utf-8"))
+    assert len(report["models"]) == 4
+    whole = tmp_path / "report.html"
+    whole.write_text(draw_page(report), encoding="utf-8")
+    page.show(whole, width)
+    assert page.value(ROWS) == [rows, rows]

@@ -130,6 +130,10 @@ def test_the_command_writes_the_table_whole(tmp_path, monkeypatch, capsys):
     assert "&lt;1&gt;" in page
     assert page.count("<tr class=no>") == 1
     assert "name=viewport" in page
+    assert "<td class=parameter rowspan=2>Gamma" in page  # said once for both
+    assert "<a href='#s0'>blade: 2 of 2</a>\n<a href='#s1'>comb: 0 of 1</a>" in page
+    assert "<h2 id=s1>comb</h2>" in page
+    assert "2 of 3 hold." in page
     assert page.count("<div class=scroll><table>") == page.count("</table></div>") == 2
     said = capsys.readouterr().err
     assert "does not hold: comb, SNR 200 dB: 0.5" in said

@@ -74,6 +74,16 @@ def test_steady_dwells_noise_and_silence_are_left_alone():
     assert np.array_equal(kept, iq.astype(np.complex64))
 
 
+def test_an_acceleration_for_every_record_is_asked_for():
+    iq = np.ones((2, 4, PULSES), np.complex64)
+    whole = without_acceleration(iq, np.full((2, 4), 3.0), **RADAR)
+    for alike in (3.0, np.full(4, 3.0), np.full((2, 1), 3.0)):
+        assert np.array_equal(without_acceleration(iq, alike, **RADAR), whole)
+    for shape in (3, (4, 2), (1, 2, 4)):
+        with pytest.raises(ValueError, match=r"acceleration_mps2 has shape .*: it must have that .* iq, \(2, 4\)"):
+            without_acceleration(iq, np.ones(shape), **RADAR)
+
+
 def test_acceleration_batch_gain_and_scale():
     iq = accelerated(np.stack([rotors([57.7], body=5.0)] * 2), np.array([[8.0], [-20.0]]))
     iq = iq + white(np.random.default_rng(4), 2, PULSES)

@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import bladewing.simulate
 import numpy as np
 import pytest
 from bladewing.simulate.bird import wingbeat_hz
@@ -55,7 +56,7 @@ def power_spectrum(iq: np.ndarray) -> np.ndarray:
         (scene(uav=[uav(velocity=3.0)]), r"unknown field uav\[0\]\.velocity: the fields are .*velocity_mps"),
         (scene(uav=[uav(rotors=[{**ROTOR, "rpm": 3.0}])]), r"unknown field .*rpm: the fields are blade_length_m"),
         (scene(uav=[uav(range_m=0.1)]), r"range_m is 0\.1: .* must exceed its own reach of 0\.15 m"),
-        (scene(uav=[uav(range_m=1.0, velocity_mps=-30.0)]), r"within the dwell it comes to -0\.2 m"),
+        (scene(uav=[uav(range_m=1.0, velocity_mps=-30.0)]), r"dwell of 0\.04 s \(pulses / PRF\) it comes to -0\.2 m"),
         (scene(uav=[uav(range_m=1.0, velocity_mps=-90.0, acceleration_mps2=4500.0)]), r"it comes to 0\.1 m"),
         (scene(uav=[uav(name="mains")]), r"a part is named 'mains': that is the receiver's"),
         (scene(uav=[{"name": "x", "airframe": "jumbo"}]), r"airframe is 'jumbo': it must be one of type1"),
@@ -108,6 +109,23 @@ def test_a_file_that_is_no_scene_is_refused_in_one_line(tmp_path, content):
     with pytest.raises(SceneError, match=r"not TOML|cannot be read: No such file") as caught:
         Scene.load(path)
     assert len(caught.value.problems) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "cure"),
+    [
+        ("quadcoptr", "give quadcopter"),
+        ("{folder}/night", "give {folder}/night.toml"),
+        ("car", "or a shipped scene: fixed_wing,"),
+    ],
+)
+def test_what_was_meant_by_a_name_is_told(tmp_path, name, cure):
+    (tmp_path / "night.toml").write_text("")
+    with pytest.raises(SceneError, match="cannot be read: No such file") as caught:
+        Scene.load(name.format(folder=tmp_path))
+    (problem,) = caught.value.problems
+    assert cure.format(folder=tmp_path) in problem
+    assert ("shipped" in problem) == ("shipped" in cure)
 
 
 def test_a_name_that_no_file_system_holds_is_refused_in_one_line():
@@ -179,10 +197,24 @@ def test_tips_that_alias_later_in_the_dwell_are_warned_of(motion, rotor, shown_m
         assert any("they alias" in line for line in built.warnings()) == warned
 
 
+def test_tips_of_several_rotors_that_alias_are_one_warning_whose_prf_is_enough():
+    def warnings(prf_hz):
+        radar = {"carrier_hz": 24.125e9, "prf_hz": prf_hz, "pulses": 1000}
+        return Scene.build({"radar": radar, "uav": [{"name": "x", "airframe": "hexacopter_30cm"}]}).warnings()
+
+    (warned,) = warnings(20e3)
+    rotors = ", ".join(f"rotors[{number}]" for number in range(6))
+    assert warned.startswith(f"x: {rotors}: their tips show up to 66.7 m/s, beyond the unambiguous 62.1 m/s")
+    enough_hz = float(warned.split("a PRF of ")[1].split()[0])
+    assert warnings(enough_hz) == []
+    (lone,) = warnings(0.999 * enough_hz)
+    assert lone.startswith("x: rotors[5]: its tips show 66.7 m/s, beyond")
+
+
 @pytest.mark.parametrize("bird", [{"members": 20, "flock_velocity_mps": 10.0}, {"heave_m": 8.0}])
 def test_no_bird_of_a_flock_comes_to_the_radar(bird):
     radar, starling = {**RADAR, "pulses": round(2 * RADAR["prf_hz"])}, {"name": "x", "species": "starling"}
-    with pytest.raises(SceneError, match="within the dwell it comes to"):
+    with pytest.raises(SceneError, match=r"within the dwell of 2 s \(pulses / PRF\) it comes to"):
         Scene.build({"radar": radar, "bird": [{**starling, "range_m": 5.0, **bird}]})
     Scene.build({"radar": radar, "bird": [{**starling, "range_m": 5.0}]})
     Scene.build({"radar": radar, "bird": [{**starling, "range_m": 500.0, **bird}]})
@@ -287,6 +319,15 @@ def test_drawing_records_needs_no_pydantic_and_scenes_are_fetched_when_asked_for
         "s.Scene; assert 'pydantic' in sys.modules; assert not hasattr(s, 'Scenery')"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_seed_that_is_no_whole_number_is_refused_and_scenes_are_offered_by_name():
+    for wrong, said in ((1.5, "seed is 1.5: it must be a whole number"), ("1", "seed is '1'"), (-1, "not be negative")):
+        for work in (empty().plan, empty().render, lambda seed: empty().render(seed, full=True)):
+            with pytest.raises(ValueError, match=said):
+                work(wrong)
+    assert np.array_equal(empty().render(np.int64(3)).iq, empty().render(3).iq)
+    assert {"Scene", "SceneError", "draw_records"} <= set(dir(bladewing.simulate))
 
 
 def empty(**receiver) -> Scene:
