@@ -208,6 +208,9 @@ class Classifier:
     def __reduce__(self) -> NoReturn:
         raise TypeError("a classifier is neither pickled nor copied deeply: load it in each process, Classifier.load()")
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name or 'without a name'}>"
+
     @property
     def name(self) -> str:
         """Of the model, as it stands on the ladder; empty where its file does not say."""

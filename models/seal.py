@@ -27,10 +27,8 @@ def _digest_span(onnx_bytes: bytes) -> tuple[int, int]:
     """Return where the 64 characters stand; refuse a file with none or several."""
     spans = [match.span(1) for match in _ENTRY.finditer(onnx_bytes)]
     if len(spans) != 1:
-        raise ValueError(
-            f"not a bladewing model: {len(spans)} entries {SEAL_KEY!r} in its metadata where there must be 1;"
-            " use a file that `bladewing train` wrote"
-        )
+        found = f"{len(spans)} seals, where there must be one" if spans else "no seal"
+        raise ValueError(f"not a bladewing model: it bears {found}: use a file that `bladewing train` wrote")
     return spans[0]
 
 

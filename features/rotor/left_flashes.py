@@ -13,10 +13,10 @@ from ..lines import squared
 from .folding import FILLED
 from .periodogram import Periodogram
 
-#: Asked where lines fill the span out to this share of where further ones may come back: else what lies past them
-#: tells the noise. And where the rotors found have less than this share of the samples' power: strong lines leave some
-#: of themselves. Of lone rotors at 8 to 25 dB they have more in 19 of 20.
-NEARLY_FILLED, LEAST_EXPLAINED = FILLED / 1.1, 0.6
+#: Asked where lines fill the span out to this share of where further ones may come back, or those of a rotor a quarter
+#: faster would: else what lies past them tells the noise. And where the rotors found have less than this share of the
+#: samples' power: strong lines leave some of themselves. Of lone rotors at 8 to 25 dB they have more in 19 of 20.
+NEARLY_FILLED, LEAST_EXPLAINED = FILLED / 1.25, 0.6
 
 #: What is left is another rotor's where its power, over that at like angles, is so many times as uneven as noise: 1.5
 #: to 20 where rotors were not found, and up to 1.35 of 200 lone ones at -8 to 25 dB.

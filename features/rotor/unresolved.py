@@ -133,9 +133,10 @@ def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[float, 
     low, high = 2 * fits[0].spacing, 0.9 * edge
     within = usable & (away < high) & (away > low)
     beyond = usable & (away > 1.1 * edge)
-    nothing_beyond = edge > 0.5  # where lines come back from the other end of the span the floor tells the noise
-    if within.sum() < LEAST_BINS or (beyond.sum() < LEAST_BINS and not nothing_beyond):
+    if within.sum() < LEAST_BINS:
         return 0.0, False
+    # where lines come back from the other end of the span, or leave too little of it, the floor tells the noise
+    nothing_beyond = edge > 0.5 or beyond.sum() < LEAST_BINS
     noise = 1.0 if nothing_beyond else float(power[beyond].mean())
     over = float(power[within].mean()) - noise
     lines = sum(float((np.abs(fit.amplitudes) ** 2).sum()) for fit in fits) * pulses

@@ -48,6 +48,21 @@ def rotors_by_chance(
     return echo / np.sqrt(np.mean(np.abs(echo) ** 2))
 
 
+def folded(
+    seed: int, times: float, *, count: int = 1, spread: float = 0.0, snr_db: float = 15.0, velocity_mps: float = 5.0
+) -> tuple[np.ndarray, dict[str, float], np.ndarray, float]:
+    """Rotors whose tips are so many times as fast as the unambiguous velocity: record, radar, rates, tip speed."""
+    rng = np.random.default_rng(seed)
+    rates_hz = rng.uniform(75, 130) * (1 + spread * np.linspace(-1, 1, count) if count > 1 else np.ones(1))
+    tip_mps = 2 * np.pi * rates_hz.max() * 0.15
+    prf_hz = 4 * tip_mps / times / WAVELENGTH_M * rng.uniform(0.95, 1.05)
+    times_s = np.arange(int(0.1 * prf_hz)) / prf_hz
+    echo = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=WAVELENGTH_M, length_m=0.15)
+    iq = (echo + 5) * np.exp(-4j * np.pi * velocity_mps * times_s / WAVELENGTH_M)
+    iq = iq + 10 ** (-snr_db / 20) * white(rng, len(times_s))
+    return iq.astype(np.complex64), {"carrier_hz": CARRIER_HZ, "prf_hz": prf_hz}, rates_hz, tip_mps
+
+
 def family_of(iq: np.ndarray) -> tuple[Periodogram, Family]:
     """A record of the paper's radar made ready, and its line family."""
     spectrum = doppler_spectrum(iq, carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)

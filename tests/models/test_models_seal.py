@@ -76,7 +76,7 @@ def test_a_second_seal_is_refused():
 def test_a_second_seal_entry_is_refused():
     model = onnx.load_model_from_string(SEALED)
     model.metadata_props.add(key=SEAL_KEY, value=PLACEHOLDER)
-    with pytest.raises(ValueError, match="2 entries"):
+    with pytest.raises(ValueError, match="2 seals"):
         verify(model.SerializeToString())
 
 

@@ -10,22 +10,7 @@ from bladewing.features.rotor.folding import FASTEST_TIP_MPS, FOLDED_BINS, outer
 from bladewing.features.rotor.periodogram import prepare
 from bladewing.simulate import RotorMotion, rotor_echo
 
-from ..signals import CARRIER_HZ, WAVELENGTH_M, rotors_by_chance, tone, white
-
-BLADE_M = 0.15
-
-
-def folded(seed, times, *, count=1, spread=0.0, snr_db=15.0, velocity_mps=5.0):
-    """Rotors whose tips are so many times as fast as the unambiguous velocity: record, radar, rates, tip speed."""
-    rng = np.random.default_rng(seed)
-    rates_hz = rng.uniform(75, 130) * (1 + spread * np.linspace(-1, 1, count) if count > 1 else np.ones(1))
-    tip_mps = 2 * np.pi * rates_hz.max() * BLADE_M
-    prf_hz = 4 * tip_mps / times / WAVELENGTH_M * rng.uniform(0.95, 1.05)
-    times_s = np.arange(int(0.1 * prf_hz)) / prf_hz
-    echo = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=WAVELENGTH_M, length_m=BLADE_M)
-    iq = (echo + 5) * np.exp(-4j * np.pi * velocity_mps * times_s / WAVELENGTH_M)
-    iq = iq + 10 ** (-snr_db / 20) * white(rng, len(times_s))
-    return iq.astype(np.complex64), {"carrier_hz": CARRIER_HZ, "prf_hz": prf_hz}, rates_hz, tip_mps
+from ..signals import CARRIER_HZ, WAVELENGTH_M, folded, rotors_by_chance, tone, white
 
 
 @pytest.mark.parametrize(("times", "least"), [(1.2, 17), (1.6, 13), (1.9, 8)])
