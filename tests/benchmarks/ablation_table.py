@@ -13,10 +13,11 @@ from bladewing.classify.train_network import CLASS_OF_KIND, kinds_of
 from bladewing.features import INPUT_SHAPES
 from bladewing.features.schema import FEATURES, LEVEL_CHANNELS
 from bladewing.models.augment import VelocityMirror
-from bladewing.models.calibration import negative_log_likelihood, softmax
+from bladewing.models.calibration import softmax
 from bladewing.models.cnn import SpectrumNet
 from bladewing.models.training import Course, Lessons, network_scores, train_network
 from numpy.typing import NDArray
+from sklearn.metrics import log_loss
 
 from .baselines_table import judged
 
@@ -78,7 +79,7 @@ def trial(
         augment=mirror,
     )
     scores, labels = network_scores(net, test), sets["bench"].labels
-    return (*judged(scores, labels), negative_log_likelihood(softmax(scores), labels))
+    return (*judged(scores, labels), log_loss(labels, softmax(scores)))
 
 
 def main() -> None:
