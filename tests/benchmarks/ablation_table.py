@@ -69,14 +69,13 @@ def trial(
     shapes = {name: INPUT_SHAPES[name] for name in names}
     net = SpectrumNet(shapes, seed=seed, **({"kinds": CLASS_OF_KIND} if kinds else {}))
     train, validate, test = (inputs_of(sets[purpose], names, held) for purpose in ("train", "validate", "bench"))
-    mirror = VelocityMirror(axes={names[0]: -1}, odd={})
     train_network(
         net,
         Lessons(train, sets["train"].labels, kinds_of(sets["train"]) if kinds else None),
         (validate, sets["validate"].labels),
         Course(epochs),
         seed=seed,
-        augment=mirror,
+        augment=VelocityMirror(names[0], -1),
     )
     scores, labels = network_scores(net, test), sets["bench"].labels
     return (*judged(scores, labels), log_loss(labels, softmax(scores)))
