@@ -69,12 +69,9 @@ def of_one_rotor(data: Periodogram, found: Candidate) -> Candidate:
 
 def _lines_there(data: Periodogram, comb: Candidate) -> tuple[float, float]:
     """Share of a comb's lines, of those that can be seen, that are there; and what one speaks for on average [nats]."""
-    rows = data.contrast.rows
     order = np.arange(comb.low, comb.high + 1)
     frequency = comb.centre + comb.spacing * order[order != 0]
-    frequency = frequency[data.usable(frequency)]
-    place = np.rint(frequency * rows.shape[1]).astype(np.intp) % rows.shape[1]
-    nats: NDArray[np.float32] = rows[:, place]
+    nats: NDArray[np.float32] = data.contrast.rows[:, data.bins_of(frequency[data.usable(frequency)])]
     if not nats.size:
         return 1.0, 0.0
     best = nats[nats.sum(axis=1).argmax()]
