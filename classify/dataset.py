@@ -20,7 +20,7 @@ from typing import Any
 from bladewing.simulate import Radar, draw_records, stream
 from bladewing.simulate.dataset import KIND_CLASS, RADAR_GROUP, Records, draw_radar
 
-from .errors import BadInput, unreadable
+from .errors import BadInput, unreadable, unwritable
 from .files import clear_litter, no_empty_folder, only_writer, read_bounded, settle, write_whole
 from .gather import in_order
 from .progress import Progress
@@ -211,7 +211,7 @@ def _writable(folder: Path) -> Iterator[None]:
         except OSError as error:
             never = error.errno in (errno.EEXIST, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.EROFS)
             cure = "give another folder" if never else "what is whole stays; the same command goes on"
-            raise BadInput(f"{folder}: cannot be written: {error.strerror or error}: {cure}") from None
+            raise unwritable(folder, error, cure) from None
 
 
 def _begun(folder: Path, plan: DataSetPlan, bars: Progress) -> dict[str, Contents]:
