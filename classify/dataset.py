@@ -10,7 +10,7 @@ import hashlib
 import json
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import lru_cache, partial
 from importlib.metadata import version
@@ -20,8 +20,8 @@ from typing import Any
 from bladewing.simulate import Radar, draw_records, stream
 from bladewing.simulate.dataset import KIND_CLASS, RADAR_GROUP, Records, draw_radar
 
-from .errors import BadInput, unreadable
-from .files import clear_litter, only_writer, read_bounded, settle, write_whole
+from .errors import BadInput, unreadable, unwritable
+from .files import clear_litter, no_empty_folder, only_writer, read_bounded, settle, write_whole
 from .gather import in_order
 from .progress import Progress
 from .shards import Contents, intact, read_shard, shard_bytes, write_shard
@@ -198,23 +198,20 @@ def _draw(folder: Path, seed: int, shard: Shard) -> Contents:
 @contextmanager
 def _writable(folder: Path) -> Iterator[None]:
     """Have a folder to oneself; faults of the disk become errors of one line."""
-    made = [place for place in (folder, *folder.parents) if not place.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        settle(folder)  # another command's files, decided and not yet renamed, are no litter
-        with only_writer(folder, wait=False):
-            yield
-    except BlockingIOError:
-        made.clear()  # one that began at this very moment has nothing in it yet
-        raise BadInput(f"{folder}: another process is writing there: let it finish, or give another folder") from None
-    except OSError as error:
-        never = error.errno in (errno.EEXIST, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.EROFS)
-        cure = "give another folder" if never else "what is whole stays; the same command goes on"
-        raise BadInput(f"{folder}: cannot be written: {error.strerror or error}: {cure}") from None
-    finally:
-        with suppress(OSError):  # they stay once anything is in them
-            for place in made:
-                place.rmdir()
+    with no_empty_folder(folder) as made:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            settle(folder)  # another command's files, decided and not yet renamed, are no litter
+            with only_writer(folder, wait=False):
+                yield
+        except BlockingIOError:
+            made.clear()  # one that began at this very moment has nothing in it yet
+            cure = "let it finish, or give another folder"
+            raise BadInput(f"{folder}: another process is writing there: {cure}") from None
+        except OSError as error:
+            never = error.errno in (errno.EEXIST, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.EROFS)
+            cure = "give another folder" if never else "what is whole stays; the same command goes on"
+            raise unwritable(folder, error, cure) from None
 
 
 def _begun(folder: Path, plan: DataSetPlan, bars: Progress) -> dict[str, Contents]:

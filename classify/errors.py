@@ -19,6 +19,11 @@ def unreadable(path: object, error: OSError, cure: str = "name a file that can b
     return BadInput(f"{error.filename or path}: cannot be read: {error.strerror or error}: {cure}")
 
 
+def unwritable(path: object, error: OSError, cure: str) -> BadInput:
+    """What the system says of a file or a folder that it did not write."""
+    return BadInput(f"{path}: cannot be written: {error.strerror or error}: {cure}")
+
+
 class Interrupted(Exception):  # noqa: N818 - no error: the user stopped it
     """A long run was stopped by Ctrl-C, and goes on from what it has kept."""
 

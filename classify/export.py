@@ -19,7 +19,7 @@ from bladewing.models.seal import SEAL_KEY, seal
 from onnx import TensorProto, helper
 from scipy import fft
 
-from .errors import BadInput
+from .errors import BadInput, unwritable
 from .files import read_bounded, write_whole
 from .inference import Classifier
 from .labels import CLASSES, UNKNOWN
@@ -99,7 +99,7 @@ def export_raw_iq(
     try:
         write_whole(Path(out), written)
     except OSError as error:
-        raise BadInput(f"{os.fspath(out)}: cannot be written: {error.strerror or error}: give another file") from None
+        raise unwritable(os.fspath(out), error, "give another file") from None
     return worst
 
 

@@ -162,14 +162,15 @@ def result_folder(path: str | os.PathLike[str]) -> Path:
 
 
 @contextlib.contextmanager
-def no_empty_folder(path: str | os.PathLike[str]) -> Iterator[None]:
+def no_empty_folder(path: str | os.PathLike[str]) -> Iterator[list[Path]]:
     """Around a run that writes to a folder: what it makes of that and those above goes again where it stays empty.
 
-    A run that is stopped early, or that lacks a library, leaves nothing then.
+    A run that is stopped early, or that lacks a library, leaves nothing then. Who finds that the folders are another's
+    clears the list of them that the ``with`` gives.
     """
     made = [folder for folder in (Path(path), *Path(path).parents) if not os.path.exists(folder)]
     try:
-        yield
+        yield made
     finally:
         with contextlib.suppress(OSError):  # of the first that holds something, all above do
             for folder in made:

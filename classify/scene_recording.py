@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import BadInput
+from .errors import BadInput, unwritable
 from .files import read_bounded, settle, write_together
 
 if TYPE_CHECKING:
@@ -68,9 +68,7 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
     try:
         write_together(stem.parent, files)
     except OSError as error:
-        raise BadInput(
-            f"{stem}: cannot be written: {error.strerror or error}: give a folder that can be written to"
-        ) from None
+        raise unwritable(stem, error, "give a folder that can be written to") from None
     return [stem.parent / file for file in files]
 
 

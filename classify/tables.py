@@ -15,7 +15,7 @@ from bladewing.features.notch import body_line
 from bladewing.features.spectrum import doppler_spectrum
 from bladewing.simulate.scene import Scene
 
-from .errors import BadInput
+from .errors import unwritable
 from .files import result_folder, write_together
 from .measure_words import with_error
 from .table_measures import MEASURED_DB, SIMULATED_DB, PaperMeasures, by_the_papers_rules, strongest_line_db, theory
@@ -244,7 +244,7 @@ def run_tables(out: Path, seed: int = 0) -> dict[str, list[Row]]:
     try:
         write_together(out, {"tables.md": markdown(tables), "tables.json": text})
     except OSError as error:
-        raise BadInput(f"{out}: cannot be written: {error.strerror or error}: give a folder") from None
+        raise unwritable(out, error, "give a folder") from None
     return tables
 
 

@@ -2,17 +2,13 @@
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .fusion import CORRELATION, LOOKS, ODDS
-from .labels import CLASSES, UNKNOWN, decide
+from .labels import CLASSES, UNKNOWN
 from .samples import positive
-
-LONGER = 5
-"""Dwells of each look that comes without its length."""
 
 FITTED_DWELL_S = 0.08
 """Dwell that `LOOKS` was fitted to [s]."""
@@ -61,10 +57,9 @@ def fuse(
     probabilities: ArrayLike,
     labels: Sequence[str] | NDArray[np.str_],
     *,
-    longer: Looks | Mapping[int, Looks] | None = None,
+    rule: Decide,
+    longer: Mapping[int, Looks] | None = None,
     shown: Collection[str] = (),
-    accept: Sequence[float] = (0.5, 0.5, 0.5),
-    rule: Decide | None = None,
     correlation: float = CORRELATION,
     dwell_s: float = FITTED_DWELL_S,
 ) -> Track:
@@ -87,17 +82,15 @@ def fuse(
         Shape (dwells, 3), order ("uav", "bird", "clutter").
     labels
         Shape (dwells,), as `Prediction.labels`.
+    rule
+        Labels and reasons of probabilities (n, 3), as `Classifier.decide`.
     longer
         By their lengths in dwells, keys of `LOOKS`: probabilities and labels of the looks at so many dwells in a row;
-        number k of length n is known after dwell k n. Looks without their length are of `LONGER` dwells.
+        number k of length n is known after dwell k n.
     shown
         What the whole track shows, of the keys of `ODDS`: a comb that stays, a wingbeat, a body that heaves as wings
         lift it or sways as a walker's does. It speaks at the end, not while dwells come in; that nothing is found
         says nothing.
-    accept
-        Least probability at which each class is named, as `Classifier.accept`.
-    rule
-        Instead of `accept`: labels and reasons of probabilities (n, 3), as `Classifier.decide`.
     correlation
         Between the evidence of two dwells, 0 (independent) to 1 (many are worth one).
     dwell_s
@@ -123,7 +116,10 @@ def fuse(
     dwell_mean, used = _running_mean(p, heard)
     counts = weights(dwell_s)
     total, weight = counts[1] * dwell_mean, np.full(len(p), counts[1])
-    for length, looks in _by_length(longer).items():
+    for length, looks in (longer or {}).items():
+        if length not in LOOKS or length == 1:
+            allowed = ", ".join(str(key) for key in LOOKS if key > 1)
+            raise ValueError(f"looks at {length} dwells have no weight: their length must be one of {allowed}")
         look_p, whole = _heard(*looks)
         silent = np.flatnonzero(~heard) // length
         whole[silent[silent < len(whole)]] = False
@@ -142,7 +138,6 @@ def fuse(
         whose, odds = ODDS[name]
         fused[-1, CLASSES.index(whose)] *= odds
     fused[-1] /= fused[-1].sum() if shown else 1  # the only dwell of a track stays as it is, to the last digit
-    rule = rule or partial(decide, accept=accept)
     named, reasons = rule(fused)
     doubted, _ = rule(_doubted(fused, named))
     # the same class, or halved odds would let the second speak
@@ -162,16 +157,6 @@ def weights(dwell_s: float) -> dict[int, float]:
     known_s = FITTED_DWELL_S * np.array(list(LOOKS))
     counts = np.interp(np.log(dwell_s * np.array(list(LOOKS))), np.log(known_s), list(LOOKS.values()))
     return dict(zip(LOOKS, counts.tolist(), strict=True))
-
-
-def _by_length(longer: Looks | Mapping[int, Looks] | None) -> Mapping[int, Looks]:
-    """Longer looks by their lengths in dwells, checked."""
-    looks = {} if longer is None else longer if isinstance(longer, Mapping) else {LONGER: longer}
-    for length in looks:
-        if length not in LOOKS or length == 1:
-            known = ", ".join(str(key) for key in LOOKS if key > 1)
-            raise ValueError(f"looks at {length} dwells have no weight: their length must be one of {known}")
-    return looks
 
 
 def _doubted(p: NDArray[np.float64], named: NDArray[np.str_]) -> NDArray[np.float64]:

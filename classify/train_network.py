@@ -115,7 +115,7 @@ def _trained(
             Course(**settings.model_dump(include={field.name for field in fields(Course)})),
             seed=seed,
             # no measurement is signed, so only the picture is mirrored
-            augment=VelocityMirror(axes={signal: -2 if image else -1}, odd={}),
+            augment=VelocityMirror(signal, -2 if image else -1),
             snapshot=parts.arrays(epochs_part) if parts else None,
             on_snapshot=partial(parts.keep_arrays, epochs_part) if parts else None,
             on_epoch=lambda epoch, epochs, _: on_fraction(epoch / epochs),

@@ -56,8 +56,8 @@ def measure(
         Angle between the line of sight and the rotor plane [rad], 0 <= beta < pi/2.
     on_record : callable, optional
         Called after each record with the number of those done: one of 3000 pulses takes some hundredths of a second,
-        and up to two where several rotors change or are not told apart, at 77 GHz up to ten; one of 65 536 pulses a
-        quarter of a minute.
+        and up to two where several rotors change or are not told apart; at 77 GHz half a second to five, and up to ten
+        of eight rotors; one of 65 536 pulses a quarter of a minute.
 
     Returns
     -------

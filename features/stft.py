@@ -62,29 +62,6 @@ class Stft:
         return np.median(self.power, axis=(-2, -1)) / np.float32(np.log(2))
 
 
-def stft_shape(pulses: int, prf_hz: float, window_s: float, overlap: float) -> tuple[int, int]:
-    """Frames and bins of `stft`: 4 bytes for each are its storage.
-
-    Parameters
-    ----------
-    pulses : int
-        Pulses of a record.
-    prf_hz, window_s, overlap : float
-        As for `stft`.
-
-    Returns
-    -------
-    frames, bins : int
-
-    Raises
-    ------
-    ValueError
-        If the overlap is not in 0..1 (1 excluded), or the window is shorter than 4 samples or longer than the record.
-    """
-    window, hop = _window(pulses, prf_hz, window_s, overlap)
-    return (pulses - window) // hop + 1, window
-
-
 def stft(
     iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float, window_s: float = 4e-3, overlap: float = 0.9
 ) -> Stft:
@@ -108,7 +85,8 @@ def stft(
     Raises
     ------
     ValueError
-        See `stft_shape`; or `iq` is not complex or holds no pulse, or a frequency is not positive.
+        If the overlap is not in 0..1 (1 excluded), the window is shorter than 4 samples or longer than the record, `iq`
+        is not complex or holds no pulse, or a frequency is not positive.
 
     Notes
     -----
@@ -116,21 +94,16 @@ def stft(
     """
     samples = as_complex(iq)
     carrier_hz, prf_hz = require_radar(carrier_hz, prf_hz)
-    window, hop = _window(samples.shape[-1], prf_hz, window_s, overlap)
+    if not 0 <= overlap < 1:
+        raise ValueError(f"overlap is {overlap!r}: it must be at least 0 and below 1")
+    window, pulses = round(window_s * prf_hz), samples.shape[-1]
+    if not 4 <= window <= pulses:
+        raise ValueError(f"window_s is {window_s!r}, {window} samples: it must hold 4 to {pulses} (all) samples")
+    hop = max(1, round(window * (1 - overlap)))
     cut = np.lib.stride_tricks.sliding_window_view(samples, window, axis=-1)[..., ::hop, :]
     taper = (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(window) / window)).astype(np.float32)
     spectra = fft.fftshift(fft.fft(cut * taper, axis=-1), axes=-1)
     return Stft(squared(spectra), carrier_hz, prf_hz, hop)
-
-
-def _window(pulses: int, prf_hz: float, window_s: float, overlap: float) -> tuple[int, int]:
-    """Samples of a window and from window to window."""
-    if not 0 <= overlap < 1:
-        raise ValueError(f"overlap is {overlap!r}: it must be at least 0 and below 1")
-    window = round(window_s * prf_hz)
-    if not 4 <= window <= pulses:
-        raise ValueError(f"window_s is {window_s!r}, {window} samples: it must hold 4 to {pulses} (all) samples")
-    return window, max(1, round(window * (1 - overlap)))
 
 
 def flash_period_s(frames: Stft) -> NDArray[np.float64]:

@@ -1,6 +1,6 @@
 """Changes of a training batch that leave its class as it is, because physics says so."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import torch
 from torch import Tensor
@@ -13,18 +13,17 @@ class VelocityMirror:
 
     Parameters
     ----------
-    axes
-        Input name to the axis of velocity in it, the batch being axis 0; that axis must be symmetric about zero.
-    odd
-        Input name to the indices of the measurements that change their sign with the velocity.
+    signal
+        Name of the input that shows the velocity; no other has a sign.
+    axis
+        The axis of velocity in it, the batch being axis 0; it must be symmetric about zero.
     """
 
-    def __init__(self, *, axes: Mapping[str, int], odd: Mapping[str, Sequence[int]]) -> None:
-        self.axes = dict(axes)
-        self.odd = {name: list(indices) for name, indices in odd.items()}
+    def __init__(self, signal: str, axis: int) -> None:
+        self.signal, self.axis = signal, axis
 
     def __call__(self, batch: Mapping[str, Tensor], rng: torch.Generator) -> dict[str, Tensor]:
-        """Return the batch with some of its records mirrored; the same records in every input.
+        """Return the batch with some of its records mirrored.
 
         Parameters
         ----------
@@ -38,16 +37,7 @@ class VelocityMirror:
         dict
             Input name to tensor of the same shape.
         """
-        count = len(next(iter(batch.values())))
-        turned = torch.rand(count, generator=rng) < 0.5
-        result = dict(batch)
-        for name, axis in self.axes.items():
-            values = result[name]
-            mask = turned.to(values.device).reshape((-1,) + (1,) * (values.ndim - 1))
-            result[name] = torch.where(mask, values.flip(axis), values)
-        for name, indices in self.odd.items():
-            values = result[name].clone()
-            sign = 1 - 2 * turned.to(values)
-            values[:, indices] *= sign[:, None]
-            result[name] = values
-        return result
+        values = batch[self.signal]
+        turned = torch.rand(len(values), generator=rng) < 0.5
+        mask = turned.to(values.device).reshape((-1,) + (1,) * (values.ndim - 1))
+        return {**batch, self.signal: torch.where(mask, values.flip(self.axis), values)}

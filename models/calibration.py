@@ -82,25 +82,6 @@ class Calibration:
         return softmax(self.scale * np.asarray(scores, dtype=np.float64) + np.asarray(self.bias))
 
 
-def negative_log_likelihood(probabilities: ArrayLike, labels: NDArray[np.integer]) -> float:
-    """Return the mean negative log probability of the true class.
-
-    Parameters
-    ----------
-    probabilities
-        Shape (n, 3).
-    labels
-        Shape (n,), whole numbers 0 to 2.
-
-    Returns
-    -------
-    float
-        Nats a record; 0 is perfect, log 3 = 1.10 knows nothing.
-    """
-    truth = np.asarray(probabilities, dtype=np.float64)[np.arange(len(labels)), labels]
-    return float(-np.log(np.maximum(truth, np.finfo(np.float64).tiny)).mean())
-
-
 def fit_vector_scaling(scores: NDArray[np.floating], labels: NDArray[np.integer]) -> Calibration:
     """Fit one scale and a bias for each class by maximum likelihood, the biases lightly held at 0.
 

@@ -150,13 +150,12 @@ def train_network(
     course: Course,
     *,
     seed: int,
-    device: str = "auto",
     augment: Augment | None = None,
     snapshot: Snapshot | None = None,
     on_snapshot: OnSnapshot | None = None,
     on_epoch: OnEpoch | None = None,
 ) -> TrainingResult:
-    """Train in place, and leave the network in its best state, on the CPU, ready for inference.
+    """Train in place, on a GPU where there is one, and leave the network in its best state, on the CPU.
 
     Measures the standardisation of the inputs, then runs Muon (matrices, kernels) and Adam (all else) on a one-cycle
     schedule. The best state is that of the least validation loss. On a CPU the outcome is a function of the seed, bit
@@ -174,8 +173,6 @@ def train_network(
         How long, and how fast.
     seed
         Draws the order of the records and the augmentation.
-    device
-        "auto" (a GPU where there is one), or any that torch knows: "cpu", "cuda", ...
     augment
         Changes each training batch.
     snapshot
@@ -202,7 +199,7 @@ def train_network(
     count = lessons.require(net)
     require_labels(validation[1], net.require(validation[0]), "validation labels")
     started = time.perf_counter()
-    place = torch.device(("cuda" if torch.cuda.is_available() else "cpu") if device == "auto" else device)
+    place = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     epochs, batch = course.epochs, min(course.batch, count)
     steps = count // batch
     net.standardise_by(lessons.inputs)

@@ -202,7 +202,7 @@ def train_picture(
         (inputs("validate"), sets["validate"].labels),
         Course(config.front_epochs, batch=_BATCH),
         seed=config.seed,
-        augment=VelocityMirror(axes={signal: 2}, odd={}) if picture.has_velocity else None,
+        augment=VelocityMirror(signal, 2) if picture.has_velocity else None,
         on_epoch=lambda epoch, epochs, _: on_done(epoch / epochs),
     )
 

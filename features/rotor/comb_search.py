@@ -244,6 +244,22 @@ def score(
     return best.astype(np.float64), -reach[0], reach[1]
 
 
+#: Of combs: what speaks for each [nats], and its outermost orders, low <= 0 <= high.
+_Scored = tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]
+
+
+def loudest_of_each(
+    data: Periodogram,
+    tried: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    outermost: NDArray[np.intp] | None = None,
+) -> tuple[NDArray[np.float64], _Scored]:
+    """Of the spacings tried for each comb, shape (combs, spacings), the loudest; and what `score` gives for that."""
+    scores, lows, highs = score(data.contrast, tried.ravel(), np.repeat(centres, tried.shape[1]), outermost)
+    loudest = scores.reshape(tried.shape).argmax(axis=1) + np.arange(0, tried.size, tried.shape[1])
+    return tried.ravel()[loudest], (scores[loudest], lows[loudest], highs[loudest])
+
+
 def even_scores(
     evidence: Evidence, spacings: NDArray[np.float64], centres: NDArray[np.float64], furthest: float = 0.5
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
@@ -390,10 +406,6 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     return _folded(data, spacings, centres, scored[0], float(all_totals.max()), found) or found
 
 
-#: Of combs: what speaks for each [nats], and its outermost orders, low <= 0 <= high.
-_Scored = tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]
-
-
 def _with_flashes(
     data: Periodogram,
     spacings: NDArray[np.float64],
@@ -437,7 +449,10 @@ def _folded(
     ends_within = max(found.high, -found.low) * found.spacing < FILLS_SPAN
     if fastest_tip(data) <= 0.5 or (is_loud and ends_within):
         return None
-    spacings, (scores, lows, highs) = _refined(data, spacings, centres, FOLDED_STEPS if is_loud else 0)
+    # outer lines are some spans away: they tell the spacing so much finer than lines within the span do
+    count = FOLDED_STEPS if is_loud else 0
+    tried = spacings[:, None] * (1 + np.arange(-count, count + 1) / (2 * FINE_STEPS * FOLDED_TIMES * data.pulses))
+    spacings, (scores, lows, highs) = loudest_of_each(data, tried, centres, outermost_orders(data, tried.ravel()))
     own = (scores > within + FOLDED_NATS) & comes_back(highs, spacings) & (spacings > FINER * found.spacing)
     if not own.any():
         return None
@@ -459,19 +474,3 @@ def _folded(
     best = int(np.where(believed, totals, 0.0).argmax())
     low, high = int(lows[best]), int(highs[best])
     return Candidate(float(spacings[best]), float(centres[best]), low, high, float(totals[best]))
-
-
-def _refined(
-    data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64], count: int
-) -> tuple[NDArray[np.float64], _Scored]:
-    """Combs of lines that come back, each at the loudest of so many spacings to either side of its own; their scores.
-
-    Their outer lines are some spans away: they tell the spacing so much finer than lines within the span do.
-    """
-    steps = 1 + np.arange(-count, count + 1) / (2 * FINE_STEPS * FOLDED_TIMES * data.pulses)
-    tried = (spacings[:, None] * steps).ravel()
-    about = np.repeat(centres, len(steps))
-    scored = score(data.contrast, tried, about, outermost_orders(data, tried))
-    each = np.arange(len(tried)).reshape(-1, len(steps))
-    loudest = each[:, 0] + scored[0][each].argmax(axis=1)
-    return tried[loudest], (scored[0][loudest], scored[1][loudest], scored[2][loudest])

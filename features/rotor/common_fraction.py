@@ -5,10 +5,13 @@ them. A fifth of one rate is then a sixth of another's, and a comb at that holds
 either. But a rotor's comb has nearly all of its lines, and of such a one most are not there.
 """
 
+from dataclasses import replace
+from itertools import starmap
+
 import numpy as np
 from numpy.typing import NDArray
 
-from .comb_search import FINE_STEPS, FLASH_SHARE, Candidate, score, spacing_limits
+from .comb_search import FINE_STEPS, FLASH_SHARE, Candidate, loudest_of_each, spacing_limits
 from .flashes import flash_evidence
 from .folding import may_come_back
 from .periodogram import Periodogram
@@ -53,28 +56,20 @@ def of_one_rotor(data: Periodogram, found: Candidate) -> Candidate:
     steps = 1 + np.arange(-OFF_BINS * FINE_STEPS, OFF_BINS * FINE_STEPS + 1) / (FINE_STEPS * data.pulses)
     # such a comb may count about any of its lines, or about a place at rest where none is seen
     centres = np.array(sorted({found.centre, *data.strong.centres}))
-    spacings = np.broadcast_to(found.spacing * multiples[:, None] * steps, (len(centres), len(multiples), len(steps)))
-    about = np.broadcast_to(centres[:, None, None], spacings.shape).ravel()
-    scores, lows, highs = score(data.contrast, spacings.ravel(), about)
-    each = np.arange(len(scores)).reshape(-1, len(steps))
-    loudest = each[:, 0] + scores[each].argmax(axis=1)
-    whole = [
-        Candidate(float(spacings.flat[i]), float(about[i]), int(lows[i]), int(highs[i]), float(scores[i]))
-        for i in loudest
-    ]
-    whole = [one for one in whole if _is_whole(data, one)]
+    tried = np.tile(found.spacing * multiples[:, None] * steps, (len(centres), 1))
+    about = np.repeat(centres, len(multiples))
+    spacings, (scores, lows, highs) = loudest_of_each(data, tried, about)
+    each = zip(*(values.tolist() for values in (spacings, about, lows, highs, scores)), strict=True)
+    whole = [one for one in starmap(Candidate, each) if _is_whole(data, one)]
     best = max((_with_its_flashes(data, one) for one in whole), key=lambda one: one.score, default=found)
     return best if best.score > WHOLE_SHARE * found.score else found
 
 
 def _lines_there(data: Periodogram, comb: Candidate) -> tuple[float, float]:
     """Share of a comb's lines, of those that can be seen, that are there; and what one speaks for on average [nats]."""
-    rows = data.contrast.rows
     order = np.arange(comb.low, comb.high + 1)
     frequency = comb.centre + comb.spacing * order[order != 0]
-    frequency = frequency[data.usable(frequency)]
-    place = np.rint(frequency * rows.shape[1]).astype(np.intp) % rows.shape[1]
-    nats: NDArray[np.float32] = rows[:, place]
+    nats: NDArray[np.float32] = data.contrast.rows[:, data.bins_of(frequency[data.usable(frequency)])]
     if not nats.size:
         return 1.0, 0.0
     best = nats[nats.sum(axis=1).argmax()]
@@ -92,4 +87,4 @@ def _with_its_flashes(data: Periodogram, comb: Candidate) -> Candidate:
     reach = (np.array([comb.low]), np.array([comb.high]))
     flashes = flash_evidence(data, np.array([comb.spacing]), np.array([comb.centre]), *reach)
     total = comb.score + min(float(flashes[0]), FLASH_SHARE * comb.score)
-    return Candidate(comb.spacing, comb.centre, comb.low, comb.high, total)
+    return replace(comb, score=total)

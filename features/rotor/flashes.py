@@ -64,11 +64,11 @@ def flash_evidence(
     lows, highs : ndarray of int, shape (combs,)
         Outermost orders, low <= 0 <= high.
     """
-    size, reach = len(data.amplitude), np.stack([-lows, highs])
+    reach = np.stack([-lows, highs])
     order = np.arange(1, reach.max(initial=0) + 1)
     frequency = centres[:, None] + np.array([-1, 1])[:, None, None] * spacings[:, None] * order
     counted = data.usable(frequency) & (order <= reach[..., None])
-    left, right = np.where(counted, data.amplitude[np.rint(frequency * size).astype(np.intp) % size], 0)
+    left, right = np.where(counted, data.amplitude[data.bins_of(frequency)], 0)
     apart = flash_nats(np.stack([left, right])).sum(axis=0)
     # J_-n = (-1)^n J_n: one step for both sides, with half a turn more on the one where the blades are of odd number
     turned = left * np.where(order % 2, -1, 1).astype(np.float32)

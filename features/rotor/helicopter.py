@@ -210,10 +210,9 @@ def _rival(rest: Periodogram, evidence: Evidence, hidden: NDArray[np.bool_], bes
     multiple = _closest(rest, evidence, best.spacing * MULTIPLES[best.spacing * MULTIPLES < 0.4], best.centre)
     if multiple.score > MULTIPLE_SHARE * best.score:
         return multiple.spacing
-    size = len(rest.power)
 
     def mean_excess(orders: NDArray[np.floating]) -> float:
-        place = np.rint((best.centre + best.spacing * orders) * size).astype(np.intp) % size
+        place = rest.bins_of(best.centre + best.spacing * orders)
         place = place[~hidden[place]]
         return float(rest.power[place].mean() - 1) if len(place) else 0.0
 

@@ -131,15 +131,18 @@ class Periodogram:
         size = len(self.power)
         return self.usable(np.arange(size) / size)
 
-    def at(self, frequency: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Power over the local level at frequencies [cycles a sample], any shape; aliases are folded."""
+    def bins_of(self, frequency: NDArray[np.floating]) -> NDArray[np.intp]:
+        """The bins of `power` at frequencies [cycles a sample], any shape; aliases are folded."""
         size = len(self.power)
-        return self.power[np.rint(frequency * size).astype(np.intp) % size]
+        return np.rint(frequency * size).astype(np.intp) % size
+
+    def at(self, frequency: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Power over the local level at frequencies [cycles a sample]."""
+        return self.power[self.bins_of(frequency)]
 
     def level_at(self, frequency: NDArray[np.floating]) -> NDArray[np.float64]:
         """Local level at frequencies [cycles a sample]."""
-        size = len(self.level)
-        return self.level[np.rint(frequency * size).astype(np.intp) % size]
+        return self.level[self.bins_of(frequency)]
 
     def usable(self, frequency: NDArray[np.floating]) -> NDArray[np.bool_]:
         """True where a line at this frequency [cycles a sample] is not touched by what was taken out."""

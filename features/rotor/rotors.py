@@ -264,13 +264,11 @@ class Separation:
 
     def _loudest_in(self, data: Periodogram, rates: NDArray[np.float64], *, is_apart: bool) -> Sought:
         """The same in a record, by the powers of the lines and their flashes."""
-        size = len(data.power)
         powers, reach = even_scores(data.contrast, rates, np.full(len(rates), self.centre), self.furthest)
         order = np.arange(1, reach.max() + 1)
         frequency = self.centre + np.array([-1, 1])[:, None, None] * rates[:, None] * order
         seen = data.usable(frequency) & (order <= reach[:, None])
-        place = np.rint(frequency * size).astype(np.intp) % size
-        flashes = flash_nats(np.where(seen, data.amplitude[place], 0)).sum(axis=0)
+        flashes = flash_nats(np.where(seen, data.amplitude[data.bins_of(frequency)], 0)).sum(axis=0)
         sums = powers + flashes
         best = int(sums.argmax())
         return Sought(float(rates[best]), int(reach[best]), float(sums[best]), is_apart)

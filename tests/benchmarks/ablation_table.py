@@ -13,10 +13,11 @@ from bladewing.classify.train_network import CLASS_OF_KIND, kinds_of
 from bladewing.features import INPUT_SHAPES
 from bladewing.features.schema import FEATURES, LEVEL_CHANNELS
 from bladewing.models.augment import VelocityMirror
-from bladewing.models.calibration import negative_log_likelihood, softmax
+from bladewing.models.calibration import softmax
 from bladewing.models.cnn import SpectrumNet
 from bladewing.models.training import Course, Lessons, network_scores, train_network
 from numpy.typing import NDArray
+from sklearn.metrics import log_loss
 
 from .baselines_table import judged
 
@@ -68,17 +69,16 @@ def trial(
     shapes = {name: INPUT_SHAPES[name] for name in names}
     net = SpectrumNet(shapes, seed=seed, **({"kinds": CLASS_OF_KIND} if kinds else {}))
     train, validate, test = (inputs_of(sets[purpose], names, held) for purpose in ("train", "validate", "bench"))
-    mirror = VelocityMirror(axes={names[0]: -1}, odd={})
     train_network(
         net,
         Lessons(train, sets["train"].labels, kinds_of(sets["train"]) if kinds else None),
         (validate, sets["validate"].labels),
         Course(epochs),
         seed=seed,
-        augment=mirror,
+        augment=VelocityMirror(names[0], -1),
     )
     scores, labels = network_scores(net, test), sets["bench"].labels
-    return (*judged(scores, labels), negative_log_likelihood(softmax(scores), labels))
+    return (*judged(scores, labels), log_loss(labels, softmax(scores)))
 
 
 def main() -> None:

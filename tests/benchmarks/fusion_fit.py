@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 from bladewing.classify import Classifier
 from bladewing.classify.fusion import CORRELATION, LOOKS, ODDS
-from bladewing.classify.labels import CLASSES
+from bladewing.classify.labels import CLASSES, decide
 from bladewing.classify.predict import long_look
 from bladewing.classify.track import fuse
-from bladewing.models.calibration import expected_calibration_error, negative_log_likelihood
+from bladewing.models.calibration import expected_calibration_error
 from bladewing.simulate import draw_records
 from scipy import optimize
 
@@ -61,6 +61,11 @@ def means(tracks: Arrays, after: int, length: int) -> np.ndarray:
     return np.log(np.maximum(tracks[f"p{length}"][:, : after // length].astype(np.float64), 1e-6)).mean(axis=1)
 
 
+def nats_a_track(p: np.ndarray, labels: np.ndarray) -> float:
+    """Mean negative log probability of the true class."""
+    return float(-np.log(np.maximum(p[np.arange(len(labels)), labels], np.finfo(float).tiny)).mean())
+
+
 class Model:
     """The pieces that are fitted, in one vector: logarithms of weights and odds, and the correlation's logit.
 
@@ -89,7 +94,7 @@ class Model:
 
         def loss(values: np.ndarray) -> float:
             read = self.read(values)
-            nats = [negative_log_likelihood(fused(held[k], k, shown, *read), tracks["label"]) for k in AFTER]
+            nats = [nats_a_track(fused(held[k], k, shown, *read), tracks["label"]) for k in AFTER]
             return float(np.mean(nats)) + RIDGE * float(values @ values)
 
         self.values = optimize.minimize(loss, self.values, method="L-BFGS-B").x
@@ -123,11 +128,12 @@ def checked(tracks: Arrays) -> None:
     """Compare `fused` with the product's own `fuse`, at the constants as they are."""
     held = {length: means(tracks, WHOLE, length) for length in LOOKS}
     odds = {name: factor for name, (_, factor) in ODDS.items()}
+    rule = partial(decide, accept=(0.5,) * len(CLASSES))  # the labels are not compared
     here = fused(held, WHOLE, tracks, CORRELATION, LOOKS, odds)
     for row in range(50):
         longer = {length: (tracks[f"p{length}"][row], tracks[f"label{length}"][row]) for length in LOOKS if length > 1}
         found = [name for name in odds if tracks[name][row]]
-        there = fuse(tracks["p1"][row], tracks["label1"][row], longer=longer, shown=found).probabilities
+        there = fuse(tracks["p1"][row], tracks["label1"][row], rule=rule, longer=longer, shown=found).probabilities
         np.testing.assert_allclose(there, here[row], atol=1e-5)
 
 
@@ -158,7 +164,7 @@ def gains(tracks: Arrays) -> None:
             clear = (test["snr_db"] >= 0) | (test["kind"] == "noise")
             right = p.argmax(axis=1) == test["label"]
             accuracy = np.mean([np.mean(right[clear & (test["label"] == k)]) for k in range(len(CLASSES))])
-            nats = negative_log_likelihood(p, test["label"])
+            nats = nats_a_track(p, test["label"])
             cells.append(f"{accuracy:10.3f} {nats:8.4f} {expected_calibration_error(p, test['label']):9.3f}")
         print(f"{name:21s}" + "   ".join(cells))
     print("accuracy at 0 dB and above, balanced; nats a track and calibration error at every SNR")

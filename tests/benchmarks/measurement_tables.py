@@ -4,21 +4,21 @@ Shares stand with the 95 % interval that the number of draws leaves them (Wilson
 """
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from itertools import product
 from pathlib import Path
 from time import thread_time
+from typing import Any
 
 import numpy as np
 from bladewing.classify.recording import load_recording
-from bladewing.features import measure
+from bladewing.features import Measurements, measure
 from bladewing.features.stft import PAPER_SETTINGS, flash_bandwidth_hz, flash_period_s, stft
 from bladewing.simulate import Radar
 from bladewing.simulate.dataset import draw_target, powered
 from bladewing.simulate.laws import WIDTH, Draws
 from bladewing.simulate.receiver import FAULT_CHANCE, Receiver
-from numpy.typing import ArrayLike
 from scipy.stats import chi2
 
 from . import records
@@ -139,25 +139,15 @@ AIRFRAMES_RPM = ((4, 3500, 20), (6, 3720, 15), (8, 3840, 18))
 
 def single_rotors(draws: int) -> None:
     """Rates of four to eight rotors, and the smearing index of one against them."""
-    print(f"single rotors, {draws} draws a row: number right and resolved, each rate within 0.2 %, smearing index")
+    print(f"single rotors, {draws} draws a row; AUC: of the smearing index, against one rotor's")
+    print(f"rotors     SNR | {_TOLD_APART}    AUC")
     for (count, highest_rpm, least_rpm), snr_db in product(AIRFRAMES_RPM, (0, 10, 20, 30)):
         rng = np.random.default_rng(snr_db)
-        number, rates, ones, several, spent = [], [], [], [], 0.0
-        for _ in range(draws):
-            rpm = records.apart(rng, count, least_rpm, 3395, highest_rpm)
-            options = {"snr_db": snr_db, "body_db": 20, "velocity_mps": rng.uniform(-30, 30)}
-            iq = records.record(rng, rpm / 60, **options)
-            start = thread_time()
-            found = measure(iq, **records.RADAR)
-            spent += thread_time() - start
-            several.append(float(found.smearing_index))
-            number.append(bool(found.rotor_count == count and found.rotors_resolved))
-            rates.append(number[-1] and bool(np.all(np.abs(found.rotor_rates_hz[:count] / (rpm / 30) - 1) < 0.002)))
-            ones.append(float(measure(records.record(rng, rpm[:1] / 60, **options), **records.RADAR).smearing_index))
-        area = np.mean(np.nan_to_num(np.array(several))[:, None] > np.nan_to_num(np.array(ones))[None, :])
-        hits = f"number {share(np.array(number))}, and rates {share(np.array(rates))}"
-        cost_ms = 1e3 * spent / draws
-        print(f"{count} rotors, SNR {snr_db:3d} dB: {hits}, AUC {area:.3f}, {cost_ms:.0f} ms", flush=True)
+        several = list(_measured(rng, snr_db, _hovering(rng, draws, count, highest_rpm, least_rpm)))
+        ones = _measured(rng, snr_db, _hovering(rng, draws, 1, highest_rpm))
+        index, of_one = (np.nan_to_num([float(m.smearing_index) for _, m, _ in some]) for some in (several, ones))
+        area = np.mean(index[:, None] > of_one)
+        print(f"{count:6d}  {snr_db:3d} dB | {_told_apart(several)}  {area:.3f}", flush=True)
 
 
 def drifting(draws: int) -> None:
@@ -197,8 +187,10 @@ def changing(draws: int) -> None:
     print(f"change     SNR | {_TOLD_APART}")
     for change, snr_db in product((0.0, 0.003, 0.01, 0.02), (0, 10, 20)):
         rng = np.random.default_rng(int(1000 * change) + snr_db + 7)
-        row = _told_apart(draws, rng, 4, snr_db, lambda rng, c=change: {"change": c * rng.uniform(-1, 1, 4)})
-        print(f"{100 * change:4.1f} % {snr_db:4d} dB | {row}", flush=True)
+        measured = _measured(
+            rng, snr_db, _hovering(rng, draws, 4), lambda rng, c=change: {"change": c * rng.uniform(-1, 1, 4)}
+        )
+        print(f"{100 * change:4.1f} % {snr_db:4d} dB | {_told_apart(measured)}", flush=True)
 
 
 def gains(draws: int) -> None:
@@ -207,29 +199,39 @@ def gains(draws: int) -> None:
     print(f"rotors  gain             SNR | {_TOLD_APART}")
     for count, (name, gain), snr_db in product((1, 4), records.GAINS.items(), (0, 10, 20)):
         rng = np.random.default_rng(100 * count + snr_db + 7)
-        row = _told_apart(draws, rng, count, snr_db, lambda _, gain=gain: {"gain": gain})
-        print(f"{count:6d}  {name:13s} {snr_db:4d} dB | {row}", flush=True)
+        measured = _measured(rng, snr_db, _hovering(rng, draws, count), lambda _, gain=gain: {"gain": gain})
+        print(f"{count:6d}  {name:13s} {snr_db:4d} dB | {_told_apart(measured)}", flush=True)
+
+
+def _measured(
+    rng: np.random.Generator,
+    snr_db: float,
+    rates_hz: Iterable[np.ndarray],
+    drawn: Callable[[np.random.Generator], dict[str, Any]] = lambda _: {},
+) -> Iterator[tuple[np.ndarray, Measurements, float]]:
+    """The rates of each record's rotors [Hz], with options drawn for it, what is measured of it and that time [ms]."""
+    for rates in rates_hz:
+        options = {"snr_db": snr_db, "body_db": 20, "velocity_mps": rng.uniform(-30, 30), **drawn(rng)}
+        iq = records.record(rng, rates, **options)
+        start = thread_time()
+        found = measure(iq, **records.RADAR)
+        yield rates, found, 1e3 * (thread_time() - start)
+
+
+def _hovering(rng: np.random.Generator, draws: int, count: int, highest_rpm: float = 3500, least_rpm: float = 20):
+    """Rates of so many rotors, 3395 rpm and more, so far apart at least [Hz], as often as asked for."""
+    return (records.apart(rng, count, least_rpm, 3395, highest_rpm) / 60 for _ in range(draws))
 
 
 _TOLD_APART = "all of them, resolved  wrong | within 0.2 %           normalised variance     ms"
 
 
-def _told_apart(
-    draws: int,
-    rng: np.random.Generator,
-    count: int,
-    snr_db: float,
-    drawn: Callable[[np.random.Generator], dict[str, ArrayLike]],
-) -> str:
-    """How often so many rotors are told apart in records with some options drawn for each, and how well."""
-    told, wrong, near, off, took = [], 0, [], [], 0.0
-    for _ in range(draws):
-        rates_hz = (records.apart(rng, count, 20, 3395, 3500) if count > 1 else rng.uniform(3395, 3500, 1)) / 60
-        options = {"snr_db": snr_db, "body_db": 20, "velocity_mps": rng.uniform(-30, 30)}
-        iq = records.record(rng, rates_hz, **drawn(rng), **options)
-        start = thread_time()
-        found = measure(iq, **records.RADAR)
-        took += thread_time() - start
+def _told_apart(measured: Iterable[tuple[np.ndarray, Measurements, float]]) -> str:
+    """How often the rotors of records are told apart, and how well."""
+    told, wrong, near, off, took_ms = [], 0, [], [], []
+    for rates_hz, found, own_ms in measured:
+        count = len(rates_hz)
+        took_ms.append(own_ms)
         told.append(found.rotors_resolved and found.rotor_count == count)
         wrong += bool(found.rotors_resolved and found.rotor_count != count)
         if told[-1]:
@@ -237,10 +239,10 @@ def _told_apart(
             near.append(np.abs(away / rates_hz / 2).max() < 2e-3)
             off += list(away / found.rotor_rates_hz_std[:count])
     if not off:
-        return f"{share(np.array(told))}   {wrong:3d} | {1e3 * took / draws:59.0f}"
+        return f"{share(np.array(told))}   {wrong:3d} | {np.mean(took_ms):59.0f}"
     return (
         f"{share(np.array(told))}   {wrong:3d} | {share(np.array(near))}  {variance(np.array(off))}  "
-        f"{1e3 * took / draws:5.0f}"
+        f"{np.mean(took_ms):5.0f}"
     )
 
 
@@ -250,12 +252,11 @@ def near_rotors(draws: int) -> None:
     for snr_db in (0, 10):
         for apart_rpm in (2, 4, 7, 10, 13, 16, 20):
             rng = np.random.default_rng(apart_rpm)
-            rows = []
-            for _ in range(draws):
-                rpm = rng.uniform(3395, 3480) + np.array([0.0, apart_rpm])
-                iq = records.record(rng, rpm / 60, snr_db=snr_db, body_db=20, velocity_mps=rng.uniform(-30, 30))
-                found = measure(iq, **records.RADAR)
-                rows.append((found.rotor_count, found.rotors_resolved, 30 * found.rotor_spread_hz))
+            rates_hz = ((rng.uniform(3395, 3480) + np.array([0.0, apart_rpm])) / 60 for _ in range(draws))
+            rows = [
+                (m.rotor_count, m.rotors_resolved, 30 * m.rotor_spread_hz)
+                for _, m, _ in _measured(rng, snr_db, rates_hz)
+            ]
             count, resolved, spread = np.array(rows, float).T
             print(
                 f"SNR {snr_db:3d} dB, {apart_rpm:2d} rpm: one {np.mean(count == 1):.2f} two {np.mean(count == 2):.2f} "
@@ -271,11 +272,9 @@ def random_rotors(draws: int) -> None:
         for count in (1, 2, 4, 6, 8):
             rng = np.random.default_rng(100 * count + snr_db)
             rows = []
-            for _ in range(draws):
-                rpm = np.sort(3450 * (1 + 0.03 * (rng.uniform(size=count) - 0.5)))
-                iq = records.record(rng, rpm / 60, snr_db=snr_db, body_db=20, velocity_mps=rng.uniform(-30, 30))
-                found = measure(iq, **records.RADAR)
-                spread = 30 * float(found.rotor_spread_hz) / max(float(np.ptp(rpm)), 1e-9)
+            some = (np.sort(57.5 * (1 + 0.03 * (rng.uniform(size=count) - 0.5))) for _ in range(draws))
+            for rates_hz, found, _ in _measured(rng, snr_db, some):
+                spread = float(found.rotor_spread_hz) / 2 / max(float(np.ptp(rates_hz)), 1e-9)
                 rows.append((found.rotor_count == count, bool(found.rotors_resolved), spread))
             right, resolved, spread = np.array(rows, float).T
             print(

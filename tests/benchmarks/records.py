@@ -34,7 +34,7 @@ def apart(rng: np.random.Generator, count: int, least: float, low: float, high: 
     """Rates of chance within a range, rising, each at least so far from the next, any unit."""
     while True:
         rates = np.sort(rng.uniform(low, high, count))
-        if np.diff(rates).min() >= least:
+        if np.diff(rates).min(initial=np.inf) >= least:
             return rates
 
 

@@ -1,3 +1,5 @@
+from functools import partial
+
 import numpy as np
 import pytest
 from bladewing.classify.fusion import CORRELATION, LOOKS, ODDS
@@ -5,7 +7,7 @@ from bladewing.classify.inference import Classifier, Envelope, Prediction
 from bladewing.classify.labels import CLASSES, UNKNOWN, decide
 from bladewing.classify.predict import answer
 from bladewing.classify.recording import Recording
-from bladewing.classify.track import FITTED_DWELL_S, LONGER, fuse, weights
+from bladewing.classify.track import FITTED_DWELL_S, fuse, weights
 from bladewing.simulate import Radar, Scene, draw_records
 from bladewing.simulate.catalogue import AIRFRAMES
 from hypothesis import assume, given
@@ -27,18 +29,22 @@ def labelled(p):
     return decide(p, ACCEPT)[0]
 
 
+def fused(p, labels, *, accept=ACCEPT, **options):
+    return fuse(p, labels, rule=partial(decide, accept=accept), **options)
+
+
 @given(dwells(), st.randoms(use_true_random=False))
 def test_order_does_not_matter(p, random):
     order = list(range(len(p)))
     random.shuffle(order)
-    one, other = fuse(p, labelled(p), accept=ACCEPT), fuse(p[order], labelled(p)[order], accept=ACCEPT)
+    one, other = fused(p, labelled(p)), fused(p[order], labelled(p)[order])
     np.testing.assert_allclose(one.probabilities, other.probabilities, atol=1e-6)
 
 
 @given(dwells(most=1))
 def test_one_dwell_is_left_as_it_is(p):
     assume(np.ptp(p) > 1e-3)  # a uniform one says nothing: see below
-    track = fuse(p, labelled(p), accept=ACCEPT)
+    track = fused(p, labelled(p))
     np.testing.assert_array_equal(track.probabilities, p[0])
     assert track.label == labelled(p)[0]
     assert track.used == 1
@@ -48,17 +54,17 @@ def test_one_dwell_is_left_as_it_is(p):
 def test_agreement_sharpens(p, count, correlation):
     best = int(np.argmax(p[0]))
     assume(p[0, best] - np.sort(p[0])[1] > 0.01)
-    many = np.repeat(p, count, axis=0)
-    fused = fuse(many, labelled(many), accept=ACCEPT, correlation=correlation).probabilities
-    more = fuse(np.repeat(p, count + 1, axis=0), labelled(np.repeat(p, count + 1, axis=0)), accept=ACCEPT,
-                correlation=correlation).probabilities  # fmt: skip
-    assert fused[best] > p[0, best] or p[0, best] > 0.9999
-    assert more[best] >= fused[best] - 1e-6
+    fewer, more = (
+        fused(many, labelled(many), correlation=correlation).probabilities[best]
+        for many in (np.repeat(p, number, axis=0) for number in (count, count + 1))
+    )
+    assert fewer > p[0, best] or p[0, best] > 0.9999
+    assert more >= fewer - 1e-6
 
 
 @given(dwells(), st.floats(0, 1))
 def test_a_track_is_a_distribution(p, correlation):
-    track = fuse(p, labelled(p), accept=ACCEPT, correlation=correlation)
+    track = fused(p, labelled(p), correlation=correlation)
     assert track.probabilities.dtype == np.float32
     assert np.all(track.probabilities >= 0)
     assert track.probabilities.sum() == pytest.approx(1, abs=1e-5)
@@ -70,7 +76,7 @@ def test_a_track_is_a_distribution(p, correlation):
 def test_dwells_outside_the_envelope_change_nothing(p, count):
     silent = np.full((count, 3), 1 / 3, dtype=np.float32)
     labels = np.concatenate([labelled(p), np.full(count, UNKNOWN)])
-    alone, mixed = fuse(p, labelled(p), accept=ACCEPT), fuse(np.concatenate([p, silent]), labels, accept=ACCEPT)
+    alone, mixed = fused(p, labelled(p)), fused(np.concatenate([p, silent]), labels)
     np.testing.assert_array_equal(alone.probabilities, mixed.probabilities)
     assert (alone.label, alone.used) == (mixed.label, mixed.used)
 
@@ -78,37 +84,37 @@ def test_dwells_outside_the_envelope_change_nothing(p, count):
 def test_independent_evidence_multiplies_and_full_correlation_counts_once():
     p = np.array([[0.5, 0.3, 0.2], [0.6, 0.2, 0.2]])
     product = p[0] * p[1] / np.sum(p[0] * p[1])
-    np.testing.assert_allclose(fuse(p, labelled(p), correlation=0).probabilities, product, rtol=1e-6)
+    np.testing.assert_allclose(fused(p, labelled(p), correlation=0).probabilities, product, rtol=1e-6)
     twice = p[[0, 0]]
-    np.testing.assert_allclose(fuse(twice, labelled(twice), correlation=1).probabilities, p[0], rtol=1e-6)
+    np.testing.assert_allclose(fused(twice, labelled(twice), correlation=1).probabilities, p[0], rtol=1e-6)
 
 
 def test_correlated_dwells_are_never_worth_more_than_the_limit():
     # 1 / 0.25 = 4 dwells: odds of 2 to 1 grow to at most 2^4 to 1, however long the track.
     p = np.tile([0.5, 0.25, 0.25], (10_000, 1))
-    uav, bird, _ = fuse(p, labelled(p), correlation=0.25).probabilities
+    uav, bird, _ = fused(p, labelled(p), correlation=0.25).probabilities
     assert uav / bird == pytest.approx(2**4, rel=1e-2)
 
 
 def test_dwells_that_are_not_sure_add_up_to_an_answer():
     p = np.tile(np.float32([0.55, 0.25, 0.20]), (5, 1))
     assert set(labelled(p)) == {UNKNOWN}
-    assert fuse(p, labelled(p), accept=ACCEPT, correlation=0.72).label == "uav"
+    assert fused(p, labelled(p), correlation=0.72).label == "uav"
 
 
 def test_contradiction_is_unknown():
     p = np.float32([[0.9, 0.05, 0.05], [0.05, 0.9, 0.05]])
-    track = fuse(p, labelled(p), accept=ACCEPT)
+    track = fused(p, labelled(p))
     assert track.label == UNKNOWN
     assert track.reason.startswith("not sure: best ")
 
 
 @given(dwells(), st.floats(0, 1))
 def test_declared_at_the_first_dwell_that_names_a_class_at_half_the_odds(p, correlation):
-    track = fuse(p, labelled(p), accept=ACCEPT, correlation=correlation)
+    track = fused(p, labelled(p), correlation=correlation)
     safe = []
     for n in range(1, len(p) + 1):
-        so_far = fuse(p[:n], labelled(p)[:n], accept=ACCEPT, correlation=correlation)
+        so_far = fused(p[:n], labelled(p)[:n], correlation=correlation)
         best = float(so_far.probabilities.max())
         needed = 0.6 / 0.4 * 2  # odds
         odds = best / max(1 - best, 1e-9)
@@ -131,13 +137,13 @@ def test_declared_is_what_is_named_with_its_own_odds_halved_also_where_another_i
 
 def test_a_declaration_stands_though_later_dwells_disagree():
     p = np.float32([[0.9, 0.05, 0.05]] + [[0.05, 0.05, 0.9]] * 9)
-    track = fuse(p, labelled(p), accept=ACCEPT)
+    track = fused(p, labelled(p))
     assert (track.declared, track.declared_after, track.label) == ("uav", 1, "clutter")
 
 
 def test_silent_dwells_take_their_time_before_a_declaration():
     p = np.float32([[1 / 3] * 3] * 3 + [[0.9, 0.05, 0.05]])
-    track = fuse(p, [UNKNOWN] * 3 + ["uav"], accept=ACCEPT)
+    track = fused(p, [UNKNOWN] * 3 + ["uav"])
     assert (track.declared, track.declared_after, track.used) == ("uav", 4, 1)
 
 
@@ -148,7 +154,7 @@ def test_stopping_early_keeps_what_calibrated_probabilities_promise():
     truth = rng.integers(0, 3, 1500)
     seen = rng.normal(size=(1500, 20, 3)) + 0.5 * np.eye(3)[truth][:, None]
     p = np.exp(0.5 * seen) / np.exp(0.5 * seen).sum(axis=-1, keepdims=True)
-    tracks = [fuse(one, decide(one, ACCEPT)[0], accept=(0.8,) * 3, correlation=0) for one in p]
+    tracks = [fused(one, decide(one, ACCEPT)[0], accept=(0.8,) * 3, correlation=0) for one in p]
     declared = np.array([track.declared_after > 0 for track in tracks])
     right = np.array([track.declared == CLASSES[index] for track, index in zip(tracks, truth, strict=True)])[declared]
     assert declared.mean() > 0.5
@@ -166,27 +172,18 @@ def test_longer_looks_count_by_their_weight_from_when_they_are_there(p, two, fiv
     looks = {2: two, 5: five, 12: twelve}
     longer = {length: (x, labelled(x)) for length, x in looks.items()}
     for n in (1, 2, 4, 5, 11, 12, 30):
-        found = fuse(p[:n], labelled(p)[:n], longer=longer, accept=ACCEPT).probabilities
+        found = fused(p[:n], labelled(p)[:n], longer=longer).probabilities
         means = {1: mean_log(p[:n])} | {k: mean_log(x[: n // k]) for k, x in looks.items() if n >= k}
         mean = sum(LOOKS[k] * x for k, x in means.items()) / sum(LOOKS[k] for k in means)
         odds = np.exp(n / (1 + (n - 1) * CORRELATION) * (mean - mean.max()))
         assert found == pytest.approx(odds / odds.sum(), abs=1e-5)
 
 
-def test_looks_without_their_length_are_of_five_dwells():
-    p, looks = np.tile(np.float32([0.5, 0.3, 0.2]), (10, 1)), np.float32([[0.2, 0.7, 0.1], [0.1, 0.6, 0.3]])
-    plain = fuse(p, labelled(p), longer=(looks, labelled(looks)))
-    by_length = fuse(p, labelled(p), longer={LONGER: (looks, labelled(looks))})
-    assert LONGER == 5
-    np.testing.assert_array_equal(plain.probabilities, by_length.probabilities)
-    assert plain.probabilities[1] > fuse(p, labelled(p)).probabilities[1]
-
-
 @pytest.mark.parametrize("length", [1, 7])
 def test_a_length_without_a_weight_is_refused(length):
     p = np.tile(np.float32([0.5, 0.3, 0.2]), (10, 1))
     with pytest.raises(ValueError, match=f"looks at {length} dwells have no weight: their length must be one of 2, 5"):
-        fuse(p, labelled(p), longer={length: (p, labelled(p))})
+        fused(p, labelled(p), longer={length: (p, labelled(p))})
 
 
 def test_looks_count_by_their_duration():
@@ -204,14 +201,14 @@ def test_looks_count_by_their_duration():
     for dwell_s, counts in ((FITTED_DWELL_S / 2, [1, 1]), (0.5, [weights(0.5)[1], weights(0.5)[2]])):
         mean = np.average([np.log(p).mean(axis=0), np.log(looks[0])], axis=0, weights=counts)
         expected = np.exp(2 / (1 + CORRELATION) * mean)
-        found = fuse(p, labelled(p), longer={2: (looks, labelled(looks))}, dwell_s=dwell_s)
+        found = fused(p, labelled(p), longer={2: (looks, labelled(looks))}, dwell_s=dwell_s)
         assert found.probabilities == pytest.approx(expected / expected.sum(), rel=1e-5)
 
 
 def test_a_silent_longer_look_changes_nothing():
-    p = np.tile(np.float32([0.55, 0.25, 0.2]), (LONGER, 1))
-    alone = fuse(p, labelled(p), accept=ACCEPT)
-    silent = fuse(p, labelled(p), longer=(np.full((1, 3), 1 / 3), [UNKNOWN]), accept=ACCEPT)
+    p = np.tile(np.float32([0.55, 0.25, 0.2]), (5, 1))
+    alone = fused(p, labelled(p))
+    silent = fused(p, labelled(p), longer={5: (np.full((1, 3), 1 / 3), [UNKNOWN])})
     np.testing.assert_array_equal(alone.probabilities, silent.probabilities)
 
 
@@ -221,15 +218,15 @@ def test_a_longer_look_at_a_silent_dwell_is_left_out():
     p[7] = 1 / 3
     said = np.where(np.arange(10) == 7, UNKNOWN, "uav")
     looks = np.float32([[0.1, 0.8, 0.1], [0.8, 0.1, 0.1]])
-    both = fuse(p, said, longer={5: (looks, ["bird", "uav"])})
-    first = fuse(p, said, longer={5: (looks[:1], ["bird"])})
+    both = fused(p, said, longer={5: (looks, ["bird", "uav"])})
+    first = fused(p, said, longer={5: (looks[:1], ["bird"])})
     np.testing.assert_array_equal(both.probabilities, first.probabilities)
-    assert first.probabilities[1] > fuse(p, said).probabilities[1]
+    assert first.probabilities[1] > fused(p, said).probabilities[1]
 
 
 @pytest.mark.parametrize("count", [0, 1, 7])
 def test_unknown_when_no_dwell_could_be_judged(count):
-    track = fuse(np.full((count, 3), 1 / 3), np.full(count, UNKNOWN), accept=ACCEPT)
+    track = fused(np.full((count, 3), 1 / 3), np.full(count, UNKNOWN))
     assert (track.label, track.used) == (UNKNOWN, 0)
     np.testing.assert_array_equal(track.probabilities, np.float32([1 / 3] * 3))
     assert track.reason == "no dwell could be judged"
@@ -237,7 +234,7 @@ def test_unknown_when_no_dwell_could_be_judged(count):
 
 def test_one_certain_dwell_cannot_rule_a_class_out():
     p = np.float32([[0, 0, 1]] + [[0.9, 0.05, 0.05]] * 20)
-    assert fuse(p, labelled(p), accept=ACCEPT).label == "uav"
+    assert fused(p, labelled(p)).label == "uav"
 
 
 @pytest.mark.parametrize(
@@ -250,7 +247,7 @@ def test_one_certain_dwell_cannot_rule_a_class_out():
 )
 def test_bad_arguments(p, labels, correlation, message):
     with pytest.raises(ValueError, match=message):
-        fuse(p, labels, correlation=correlation)
+        fused(p, labels, correlation=correlation)
 
 
 @pytest.mark.parametrize(
@@ -264,7 +261,7 @@ def test_bad_arguments(p, labels, correlation, message):
 )
 def test_what_a_track_cannot_be_fused_with_is_refused(options, message):
     with pytest.raises(ValueError, match=message):
-        fuse(np.full((2, 3), [0.8, 0.1, 0.1]), ["uav"] * 2, **options)
+        fused(np.full((2, 3), [0.8, 0.1, 0.1]), ["uav"] * 2, **options)
 
 
 def test_reason_shows_that_the_probability_is_below_the_limit():
@@ -283,7 +280,7 @@ def test_reason_shows_that_the_probability_is_below_the_limit():
 def test_what_the_whole_track_shows_multiplies_odds_at_the_end_alone(shown, name, factor):
     # a little ahead, and limits so low that what is found lets the class be declared
     p = [[0.45 if other == name else 0.275 for other in CLASSES]] * 4
-    plain, more = (fuse(p, ["unknown"] * 4, accept=(0.3,) * 3, shown=found) for found in ((), shown))
+    plain, more = (fused(p, ["unknown"] * 4, accept=(0.3,) * 3, shown=found) for found in ((), shown))
     best = CLASSES.index(name)
     odds = [track.probabilities / (1 - track.probabilities) for track in (plain, more)]
     assert odds[1][best] == pytest.approx(factor * odds[0][best], rel=1e-5)
