@@ -27,6 +27,9 @@ RIVAL_DB, WEAKEST_DB = 2.0, 8.0
 #: Nor one that noise alone might be: the highest bin of 10 000 spectra stood at 13 dB.
 NOISE_TOP_DB = 13.5
 
+#: What is known to this share of the unambiguous span is not known: anywhere in it is 0.29.
+UNTOLD_SHARE = 0.2
+
 #: Lines from and up to so far off pull at the body's [bins]: nearer ones are one with it, the lobe ends further out.
 BESIDE_BINS = (1.5, 8.0)
 
@@ -64,7 +67,7 @@ def body_velocity(
     -------
     velocity_mps, std_mps : float
         Positive when the range grows. Without a comb, that of the strongest line, if one moves of that; NaN where none
-        stands out.
+        stands out, or where it may lie anywhere.
     """
     own, level_db = data.strong.centres[0], data.strong.centres_db[0]
     if fit is None:
@@ -85,7 +88,8 @@ def body_velocity(
             turns, std = fit.centre, float(np.hypot(fit.centre_std, offset * slow))
         elif steady and fit.centre_std < std:
             turns, std = fit.centre, float(np.hypot(fit.centre_std, apart))
-    return -folded(turns) * data.span_mps, float(np.hypot(std, open_std)) * data.span_mps
+    std = float(np.hypot(std, open_std))
+    return (-folded(turns) * data.span_mps, std * data.span_mps) if std < UNTOLD_SHARE else (np.nan, np.nan)
 
 
 def _likeliest(data: Periodogram, spectrum: Spectrum, blades: bool) -> tuple[float, float, float]:

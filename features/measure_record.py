@@ -40,6 +40,9 @@ FURTHEST_EDGE, EDGE_DEVIATIONS = 0.48, 3.0
 #: Fitted lines that tell the edge of several rotors to no more than this share of it leave it to all about the orders.
 UNSURE_SHARE = 0.03
 
+#: An edge that is known to no more than this share of itself is none.
+LOST_SHARE = 0.3
+
 #: Why there is no band where one channel was made analytic: the lines on both sides of the body lie in one another.
 ONE_CHANNEL = "no band: one side of the spectrum is empty, one channel has both folded onto the other: record I and Q"
 
@@ -94,6 +97,9 @@ def measure_record(
     else:
         middle = family.rotors.fits[0] if len(family.rotors.rates) > 1 else family.comb.fit
         steady, open_std = family.rotors.resolved, family.comb.body_std
+        # of rotors not told apart lines lie all around the circle: any of them may be the middle
+        if not (family.is_told_apart or family.comb.body_has_line) and (family.fills_span or middle.is_folded):
+            open_std = 0.5
         velocity = body_velocity(family.data, spectrum, middle, steady=steady, open_std=open_std)
     out |= {"reason": as_wheels(family.data, edge[0], velocity[0])} | _named(BODY, velocity)
     if out["reason"]:
@@ -225,6 +231,8 @@ def _band(family: Family, edge: tuple[float, float], beta_rad: float | None) -> 
             if span < fastest_tip(data)
             else f"no band: lines reach some {FASTEST_TIP_MPS:.0f} m/s from the body, faster than any blade's tip"
         )
+    elif std > LOST_SHARE * away:
+        why = "no band: where the lines end is lost in the noise: a longer dwell may show it"
     if why:
         away = std = np.nan
     # counted from a line beside the body's, the family is so much the wider on one side

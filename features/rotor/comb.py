@@ -86,6 +86,8 @@ class Comb:
         Strong lines are this many spacings apart: 1 for equal blades (or a lone one), else the number of blades.
     body_std : float
         Standard deviation of the body's place, where several of its lines may be the body's [cycles a sample].
+    body_has_line : bool
+        Whether a line that stands out tells the body.
     blades : int
         How many blades unequal lines speak for; 1 where they are equal.
     blades_sure : bool
@@ -97,6 +99,7 @@ class Comb:
     last: int
     per_turn: int
     body_std: float
+    body_has_line: bool
     blades: int
     blades_sure: bool
 
@@ -294,7 +297,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
         return None, _too_short(data)
     if start.score < threshold(data):
         return None, f"no comb: evidence {start.score:.1f} nats, {threshold(data):.0f} are needed"
-    start, open_orders = centred(data, of_flashes(data, of_one_rotor(data, start)))
+    start, open_orders, has_line = centred(data, of_flashes(data, of_one_rotor(data, start)))
     fitted = fit_combs(data, start.centre, [start.spacing], [(start.low, start.high)])
     if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
         return None, f"no comb: fewer than {LEAST_LINES} lines"
@@ -324,4 +327,4 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"
     last = max(start.high, -start.low)
     is_sure = per_turn > 1 and not may_come_back(last, fit.spacing)  # further lines fall on every so many-th
-    return Comb(fit, fitted[1], last, per_turn, open_orders * fit.spacing, per_turn, is_sure), ""
+    return Comb(fit, fitted[1], last, per_turn, open_orders * fit.spacing, has_line, per_turn, is_sure), ""

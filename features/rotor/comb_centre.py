@@ -70,7 +70,7 @@ OUT_OF_SKIRT = 12.0
 OPEN_NATS, NEAR_ORDERS = 3.0, 3
 
 
-def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
+def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, bool]:
     """Count a comb from the line that is most likely the body's.
 
     A rotor's lines reach equally far to both sides of the body and are as strong on both, and the body's own line is
@@ -89,9 +89,11 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
         The same comb.
     open_orders : float
         Standard deviation of the body's order, of those that may be the body's as well; 0 where none is as likely.
+    has_line : bool
+        Whether a line that stands out tells the body.
     """
     evidence = data.contrast
-    best, most = found, -np.inf
+    best, most, line_nats = found, -np.inf, 0.0
     totals: dict[int, float] = {}
     bonuses, even = _bonuses(data, found)
     shifts = [round((centre - found.centre) / found.spacing) for centre in bonuses]
@@ -105,7 +107,7 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
         total = float(own[index]) + bonus + even.get(shift, 0.0)
         totals[shift] = max(totals.get(shift, -np.inf), total)
         if total > most:
-            most = total
+            most, line_nats = total, bonus
             best = found if centre == found.centre else _counted_from(found, float(steps[index]), centre, shift, within)
     # as one-sided lines of a strong line's, all that speaks for the best order speaks for that one
     for shift, nats in _one_sided(data, found, best, bonuses).items():
@@ -126,7 +128,7 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float]:
     if found.is_folded:
         _, (reach,) = even_scores(evidence, np.array([best.spacing]), np.array([best.centre]), furthest)
         best = replace(best, centre=best.centre - round(best.centre), low=-int(reach), high=int(reach))
-    return best, float(np.sqrt((likely * away**2).sum() / likely.sum()))
+    return best, float(np.sqrt((likely * away**2).sum() / likely.sum())), line_nats >= TELLS
 
 
 def _counted_from(found: Candidate, spacing: float, centre: float, order: int, within: int) -> Candidate:

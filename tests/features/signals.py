@@ -49,7 +49,14 @@ def rotors_by_chance(
 
 
 def folded(
-    seed: int, times: float, *, count: int = 1, spread: float = 0.0, snr_db: float = 15.0, velocity_mps: float = 5.0
+    seed: int,
+    times: float,
+    *,
+    count: int = 1,
+    spread: float = 0.0,
+    snr_db: float = 15.0,
+    velocity_mps: float = 5.0,
+    body: float = 5.0,
 ) -> tuple[np.ndarray, dict[str, float], np.ndarray, float]:
     """Rotors whose tips are so many times as fast as the unambiguous velocity: record, radar, rates, tip speed."""
     rng = np.random.default_rng(seed)
@@ -58,7 +65,7 @@ def folded(
     prf_hz = 4 * tip_mps / times / WAVELENGTH_M * rng.uniform(0.95, 1.05)
     times_s = np.arange(int(0.1 * prf_hz)) / prf_hz
     echo = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=WAVELENGTH_M, length_m=0.15)
-    iq = (echo + 5) * np.exp(-4j * np.pi * velocity_mps * times_s / WAVELENGTH_M)
+    iq = (echo + body) * np.exp(-4j * np.pi * velocity_mps * times_s / WAVELENGTH_M)
     iq = iq + 10 ** (-snr_db / 20) * white(rng, len(times_s))
     return iq.astype(np.complex64), {"carrier_hz": CARRIER_HZ, "prf_hz": prf_hz}, rates_hz, tip_mps
 

@@ -7,7 +7,7 @@ from bladewing.features.rotor import rotors
 from bladewing.features.rotor.comb import LEAST_REACH_MPS
 from bladewing.simulate import Radar, draw_records
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors_by_chance, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, folded, rotors_by_chance, white
 from .signals import rotors as blades
 
 RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
@@ -84,3 +84,13 @@ def test_a_short_dwell_does_not_tell_a_moving_rotor_from_hum_and_so_does_not_ref
         iq = (blades + 3) * np.exp(-4j * np.pi * rng.uniform(3, 15) * times_s / WAVELENGTH_M)
         found = measure(10 * iq + white(rng, len(times_s)), carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
         assert found.chopping_hz == pytest.approx(chopping_hz, rel=0.01)
+
+
+@pytest.mark.parametrize(("times", "count", "seed"), [(0.5, 1, 3), (0.5, 2, 7), (0.8, 4, 3)])
+def test_an_edge_that_is_lost_in_the_noise_is_none(times, count, seed):
+    """Tips of 35 +- 31, 45 +- 43 and 7 +- 16 m/s were told of such of 75 to 106."""
+    iq, radar, _, _ = folded(seed, times, count=count, spread=0.03, snr_db=-12.0)
+    found = measure(iq, **radar)
+    assert np.isfinite(found.chopping_hz)
+    assert np.isnan([found.tip_speed_mps, found.bandwidth_hz]).all()
+    assert "lost in the noise" in str(found.band_reason)

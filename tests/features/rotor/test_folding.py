@@ -159,3 +159,22 @@ def test_lines_that_fill_a_span_slower_than_rotors_are_none_of_something_slow(pr
         assert f"raise it to {12 / unambiguous_mps * prf_hz / 1e3:.1f} kHz at least" in reason
     else:
         assert "no rotor" in reason
+
+
+@pytest.mark.parametrize(("times", "seed"), [(1.1, 5), (1.1, 8), (1.5, 7), (2.2, 5)])
+def test_a_body_without_a_line_is_not_told_where_lines_not_told_apart_fill_the_span(times, seed):
+    """Lines lie all around the circle, and any of them may be the middle: these were surely 4 to 105 m/s off."""
+    iq, radar, (rate_hz,), _ = folded(seed, times, body=0.0)
+    found = measure(iq, **radar)
+    assert found.chopping_hz == pytest.approx(2 * rate_hz, rel=0.01)
+    assert not found.rotors_resolved
+    assert np.isnan(found.body_velocity_mps)
+
+
+def test_a_body_without_a_line_is_told_by_lines_that_come_back_beside_the_others():
+    told = 0
+    for seed in range(7):
+        iq, radar, _, _ = folded(seed, 1.5, body=0.0)
+        found = measure(iq, **radar)
+        told += abs(found.body_velocity_mps - 5.0) < 4 * found.body_velocity_mps_std < 12
+    assert told == 7
