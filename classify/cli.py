@@ -313,6 +313,7 @@ def simulate(
     from bladewing.simulate.render import render
     from bladewing.simulate.scene import Scene, SceneError
 
+    from .progress import Progress
     from .scene_recording import write_rendering
 
     if out is None and not explain:
@@ -332,7 +333,9 @@ def simulate(
     said = [plan.explain() if plan else "full fidelity: nothing is left out"] if explain else []
     try:
         if out is not None:
-            rendering = render(found, seed, plan=plan)
+            parts = len(found.uavs) + len(found.birds) + len(found.clutters) + 1  # and the receiver
+            with Progress(visible=True, passing=True) as bars, bars.phase("render", parts) as on_part:
+                rendering = render(found, seed, plan=plan, on_part=on_part)
             for warning in rendering.warnings[len(told) :]:  # what shows as it is drawn
                 complain(f"{scene}: {warning}", kind="warning")
             said += [str(path) for path in write_rendering(out, rendering, found, seed)]

@@ -1,5 +1,6 @@
 """From a scene to slow-time IQ, at the fidelity that a plan asks for or at the full one."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,7 +37,9 @@ class Rendering:
     warnings: list[str] = field(default_factory=list)
 
 
-def render(scene: Setting, seed: int = 0, *, plan: Plan | None = None) -> Rendering:
+def render(
+    scene: Setting, seed: int = 0, *, plan: Plan | None = None, on_part: Callable[[int], None] | None = None
+) -> Rendering:
     """Render a scene.
 
     Parameters
@@ -47,6 +50,8 @@ def render(scene: Setting, seed: int = 0, *, plan: Plan | None = None) -> Render
         Root of all randomness, >= 0. Every part has a stream of its own, so switching one off changes no other.
     plan : Plan, optional
         What to keep, planned for the same seed; by default everything, at full fidelity.
+    on_part : callable, optional
+        Called after each UAV, bird and clutter with the number of those rendered.
 
     Returns
     -------
@@ -63,20 +68,26 @@ def render(scene: Setting, seed: int = 0, *, plan: Plan | None = None) -> Render
     times = pulse_times_s(scene, seed) if jitters else radar.times_s
     signal = np.zeros(radar.pulses, np.complex128)
     truth: list[dict[str, Any]] = []
+
+    def rendered(part: dict[str, Any]) -> None:
+        truth.append(part)
+        if on_part:
+            on_part(len(truth))
+
     for uav in scene.uavs:
         how = plan.fidelity[uav.name] if plan else full_fidelity(uav, radar)
         signal += uav_echo(uav, radar, times, how)
-        truth.append(uav_truth(uav))
+        rendered(uav_truth(uav))
     for bird in scene.birds:
         how = plan.fidelity[bird.name] if plan else Fidelity(frozenset(BIRD_EFFECTS), None)
         signal += bird_echo(bird, radar, times, how)
-        truth.append(bird_truth(bird))
+        rendered(bird_truth(bird))
     warnings = scene.warnings()
     for part in scene.clutters:
         iq, drawn, unused = clutter_echo(part, radar, seed)
         signal += iq
         warnings += [f"{part.name}.values: {name} changes nothing of a clutter of kind {part.kind}" for name in unused]
-        truth.append({"name": part.name, "label": "clutter", "kind": part.kind, "level_db": part.level_db, **drawn})
+        rendered({"name": part.name, "label": "clutter", "kind": part.kind, "level_db": part.level_db, **drawn})
     reception = Reception(scene, seed)
     warnings += [f"receiver.values: {name} changes nothing of a receiver" for name in reception.unused]
     kept = plan.receiver & reception.effects if plan else reception.effects

@@ -15,7 +15,7 @@ from bladewing.simulate.parts import BOUNDS, MOST, bounds_of
 from bladewing.simulate.radar import Radar
 from bladewing.simulate.receiver import EFFECT_OF, FAULT_CHANCE
 from bladewing.simulate.reception import Chosen, Reception
-from bladewing.simulate.render import Rendering
+from bladewing.simulate.render import Rendering, render
 from bladewing.simulate.render_bird import _cycle_rad, heave_range_m, members
 from bladewing.simulate.scene import Scene, SceneError, shipped
 from hypothesis import given, settings
@@ -639,3 +639,11 @@ def test_a_shaken_airframe_turns_its_echo_at_the_rate_of_the_shaking():
     turned = np.unwrap(np.angle(iq * iq[0].conj()))
     expected = 0.4 * np.sin(2 * np.pi * 75.0 * np.arange(1000) / 25e3)
     np.testing.assert_allclose(turned - turned.mean(), expected - expected.mean(), atol=1e-4)
+
+
+def test_every_part_that_is_rendered_is_told():
+    told = []
+    scene = Scene.load("gulls_and_drone")
+    parts = len(scene.uavs) + len(scene.birds) + len(scene.clutters)
+    assert len(render(scene, on_part=told.append).truth) == parts
+    assert told == list(range(1, parts + 1))
