@@ -46,7 +46,7 @@ def print_measured(found: "Measured", console: "Console") -> None:
         table.add_row(
             f"{found.start_s[n]:.3f}",
             with_error(v.body_velocity_mps[n], v.body_velocity_mps_std[n]),
-            with_error(v.chopping_hz[n], v.chopping_hz_std[n]),
+            _rate_with_error(v.chopping_hz[n], v.chopping_hz_std[n]),
             count,
             with_error(v.bandwidth_hz[n], v.bandwidth_hz_std[n]),
             with_error(v.tip_speed_mps[n], v.tip_speed_mps_std[n]),
@@ -197,6 +197,17 @@ def with_error(value: float, std: float) -> str:
         return f"{value:.5f} +- <0.00001"
     digits = 0 if std >= 9.5 else min(5, 1 - math.floor(math.log10(std)))
     return f"{value:.{digits}f} +- {std:.{digits}f}"
+
+
+def _rate_with_error(value: float, std: float) -> str:
+    """`with_error` of a rate, which may be some times what is seen where its deviation is larger than itself.
+
+    Examples
+    --------
+    >>> _rate_with_error(190.4, 219.9)
+    '>=190.4'
+    """
+    return f">={value:.4g}" if std > value else with_error(value, std)
 
 
 def signed(velocity_mps: float, std_mps: float) -> str:
