@@ -99,7 +99,7 @@ def measure_record(
         steady, open_std = family.rotors.resolved, family.comb.body_std
         # of rotors not told apart lines lie all around the circle: any of them may be the middle
         if not (family.is_told_apart or family.comb.body_has_line) and (family.fills_span or middle.is_folded):
-            open_std = 0.5
+            open_std = np.inf
         velocity = body_velocity(family.data, spectrum, middle, steady=steady, open_std=open_std)
     out |= {"reason": as_wheels(family.data, edge[0], velocity[0])} | _named(BODY, velocity)
     if out["reason"]:

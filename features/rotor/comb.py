@@ -11,7 +11,15 @@ from ..chopping import CHOPPING_RANGE_HZ
 from ..lines import LineSpace, squared
 from .comb_centre import centred
 from .comb_fit import CombFit, fit_combs
-from .comb_search import FINE_STEPS, MIN_SPACING_BINS, SEARCHED_RATIO, best_candidate, heights, spacing_limits
+from .comb_search import (
+    FINE_STEPS,
+    MIN_SPACING_BINS,
+    SEARCHED_RATIO,
+    best_candidate,
+    factors_about,
+    heights,
+    spacing_limits,
+)
 from .common_fraction import of_one_rotor
 from .flash_rate import of_flashes
 from .folding import may_come_back
@@ -241,8 +249,7 @@ def slower_spacing(data: Periodogram, fit: CombFit) -> float | None:
 
 def _scores_near(data: Periodogram, fit: CombFit, spacings: NDArray[np.float64]) -> NDArray[np.float64]:
     """What speaks for combs of about these spacings, about the centre of another [nats]."""
-    steps = 1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (FINE_STEPS * data.pulses)
-    tried = np.outer(spacings, steps)
+    tried = np.outer(spacings, factors_about(data.pulses, FINE_STEPS, FINE_STEPS))
     scores = heights(data.contrast, tried.ravel(), np.full(tried.size, fit.centre)).reshape(tried.shape)
     return np.asarray(scores.max(axis=1), np.float64)
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..bodies import LINE_DB
-from .comb_search import FINE_STEPS, Candidate, even_scores
+from .comb_search import FINE_STEPS, Candidate, even_scores, factors_about
 from .folding import outermost_orders
 from .one_sided import Sides
 from .periodogram import Periodogram
@@ -93,7 +93,7 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, bool
         Whether a line that stands out tells the body.
     """
     evidence = data.contrast
-    best, most, line_nats = found, -np.inf, 0.0
+    best, most = found, -np.inf
     totals: dict[int, float] = {}
     bonuses, even = _bonuses(data, found)
     shifts = [round((centre - found.centre) / found.spacing) for centre in bonuses]
@@ -107,7 +107,7 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, bool
         total = float(own[index]) + bonus + even.get(shift, 0.0)
         totals[shift] = max(totals.get(shift, -np.inf), total)
         if total > most:
-            most, line_nats = total, bonus
+            most = total
             best = found if centre == found.centre else _counted_from(found, float(steps[index]), centre, shift, within)
     # as one-sided lines of a strong line's, all that speaks for the best order speaks for that one
     for shift, nats in _one_sided(data, found, best, bonuses).items():
@@ -116,6 +116,7 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, bool
     if totals[shift] > most:
         most = totals[shift]
         best = _counted_from(found, best.spacing, found.centre + found.spacing * shift, shift, within)
+    has_line = _line_nats(bonuses, best) >= TELLS
     chosen = round((best.centre - found.centre) / found.spacing)
     near = chosen + np.arange(-NEAR_ORDERS, NEAR_ORDERS + 1)
     others = np.setdiff1d(np.append(near, list(even)).astype(np.intp), list(totals))
@@ -128,13 +129,19 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, bool
     if found.is_folded:
         _, (reach,) = even_scores(evidence, np.array([best.spacing]), np.array([best.centre]), furthest)
         best = replace(best, centre=best.centre - round(best.centre), low=-int(reach), high=int(reach))
-    return best, float(np.sqrt((likely * away**2).sum() / likely.sum())), line_nats >= TELLS
+    return best, float(np.sqrt((likely * away**2).sum() / likely.sum())), has_line
 
 
 def _counted_from(found: Candidate, spacing: float, centre: float, order: int, within: int) -> Candidate:
     """A comb counted from one of its orders, its spacing and centre as given [cycles a sample]."""
     low, high = max(min(found.low - order, 0), -within), min(max(found.high - order, 0), within)
     return Candidate(spacing, centre, low, high, found.score)
+
+
+def _line_nats(bonuses: dict[float, float], comb: Candidate) -> float:
+    """What speaks for the line that a comb is counted from besides the comb [nats]."""
+    own = (nats for place, nats in bonuses.items() if abs(place - comb.centre) < comb.spacing / 2)
+    return max(own, default=0.0)
 
 
 def _one_sided(data: Periodogram, found: Candidate, best: Candidate, bonuses: dict[float, float]) -> dict[int, float]:
@@ -158,9 +165,7 @@ def _one_sided(data: Periodogram, found: Candidate, best: Candidate, bonuses: di
     own = Sides(data, best)
     if own.filtered_out or not own.compares:
         return {}
-    even = max(own.even_nats() - FLAT, LEAST_EVEN) + max(
-        (nats for place, nats in bonuses.items() if abs(place - best.centre) < best.spacing / 2), default=0.0
-    )
+    even = max(own.even_nats() - FLAT, LEAST_EVEN) + _line_nats(bonuses, best)
     out: dict[int, float] = {}
     for place, sides in rivals.items():
         nats = bonuses[place] + max(sides.even_nats() - FLAT, 0.0) - even
@@ -182,7 +187,7 @@ def _scores_about(
 
     The scores are of shape (spacings, *places.shape).
     """
-    steps = found.spacing * (1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * data.pulses))
+    steps = found.spacing * factors_about(data.pulses, FINE_STEPS, 2 * FINE_STEPS)
     tried = np.repeat(steps, places.size), np.tile(places.ravel(), len(steps))
     scores, _ = even_scores(data.contrast, *tried, _furthest(data, found)[1])
     return steps, scores.reshape(len(steps), *places.shape)

@@ -120,6 +120,11 @@ def _grid(pulses: int, shortest: float, longest: float) -> _Grid:
     return _Grid(periods, lags, starts, 1 / np.sqrt(variance))
 
 
+def factors_about(pulses: int, steps: int, per_bin: int) -> NDArray[np.float64]:
+    """Factors of the spacings tried about one: so many steps to each side, so many of them to a bin at the PRF."""
+    return np.asarray(1 + np.arange(-steps, steps + 1) / (per_bin * pulses), np.float64)
+
+
 def spacing_limits(pulses: int, prf_hz: float) -> tuple[float, float]:
     """Smallest and largest spacing sought [cycles a sample]; empty where the first is not below the second."""
     low, high = CHOPPING_RANGE_HZ
@@ -375,14 +380,14 @@ def best_candidate(data: Periodogram) -> Candidate | None:
                 octaves = spacing * np.array(OCTAVES)
                 octaves = octaves[(octaves >= low) & (octaves <= high)]
                 tried.append((octaves, centre))
-    factors = 1 + np.arange(-COARSE_STEPS, COARSE_STEPS + 1) / data.pulses
+    factors = factors_about(data.pulses, COARSE_STEPS, 1)
     spacings = np.concatenate([np.outer(s, factors).ravel() for s, _ in tried])
     centres = np.concatenate([np.full(len(s) * len(factors), c) for s, c in tried])
     scores = _loudness(data, spacings, centres)
     if not len(scores):
         return None
     chosen = _families(spacings, scores, centres, data.pulses)
-    fine = 1 + np.arange(-FINE_STEPS, FINE_STEPS + 1) / (2 * FINE_STEPS * data.pulses)
+    fine = factors_about(data.pulses, FINE_STEPS, 2 * FINE_STEPS)
     # a line's frequency is known to a hundredth of a bin; the phase of a correlation tells less
     shifts = [(0.0,) if centres[i] in data.strong.centres else CENTRE_SHIFTS for i in chosen]
     family = np.repeat(np.arange(len(chosen)), [len(fine) * len(s) for s in shifts])
@@ -451,7 +456,7 @@ def _folded(
         return None
     # outer lines are some spans away: they tell the spacing so much finer than lines within the span do
     count = FOLDED_STEPS if is_loud else 0
-    tried = spacings[:, None] * (1 + np.arange(-count, count + 1) / (2 * FINE_STEPS * FOLDED_TIMES * data.pulses))
+    tried = spacings[:, None] * factors_about(data.pulses, count, 2 * FINE_STEPS * FOLDED_TIMES)
     spacings, (scores, lows, highs) = loudest_of_each(data, tried, centres, outermost_orders(data, tried.ravel()))
     own = (scores > within + FOLDED_NATS) & comes_back(highs, spacings) & (spacings > FINER * found.spacing)
     if not own.any():

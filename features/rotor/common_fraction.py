@@ -11,7 +11,7 @@ from itertools import starmap
 import numpy as np
 from numpy.typing import NDArray
 
-from .comb_search import FINE_STEPS, FLASH_SHARE, Candidate, loudest_of_each, spacing_limits
+from .comb_search import FINE_STEPS, FLASH_SHARE, Candidate, factors_about, loudest_of_each, spacing_limits
 from .flashes import flash_evidence
 from .folding import may_come_back
 from .periodogram import Periodogram
@@ -53,7 +53,7 @@ def of_one_rotor(data: Periodogram, found: Candidate) -> Candidate:
     multiples = np.array([multiple for multiple in MULTIPLES if multiple * found.spacing <= highest])
     if there > FEW_THERE or not len(multiples):
         return found
-    steps = 1 + np.arange(-OFF_BINS * FINE_STEPS, OFF_BINS * FINE_STEPS + 1) / (FINE_STEPS * data.pulses)
+    steps = factors_about(data.pulses, OFF_BINS * FINE_STEPS, FINE_STEPS)
     # such a comb may count about any of its lines, or about a place at rest where none is seen
     centres = np.array(sorted({found.centre, *data.strong.centres}))
     tried = np.tile(found.spacing * multiples[:, None] * steps, (len(centres), 1))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..lines import squared
-from .comb_search import FINE_STEPS, Candidate, score, spacing_limits
+from .comb_search import FINE_STEPS, Candidate, factors_about, score, spacing_limits
 from .flashes import flash_evidence
 from .folding import comes_round, may_come_back, outermost_orders
 from .periodogram import PADDING, Periodogram
@@ -45,7 +45,7 @@ def of_flashes(data: Periodogram, found: Candidate) -> Candidate:
     multiples = [multiple for multiple in _flash_multiples(data, found.spacing) if multiple * found.spacing <= highest]
     if not multiples:
         return found
-    steps = 1 + np.arange(-2 * FINE_STEPS, 2 * FINE_STEPS + 1) / (FINE_STEPS * data.pulses)
+    steps = factors_about(data.pulses, 2 * FINE_STEPS, FINE_STEPS)
     spacings = np.outer(multiples, found.spacing * steps).ravel()
     centres = np.full(len(spacings), found.centre)
     scores, lows, highs = score(data.contrast, spacings, centres, outermost_orders(data, spacings))

@@ -15,7 +15,7 @@ from ..evidence import MOST_SNRS, Evidence, line_evidence
 from ..lines import sum_of_lines
 from .comb import Comb, powers_over_noise, strong_multiple
 from .comb_fit import MARGIN_ORDERS, CombFit, fit_combs
-from .comb_search import FINE_STEPS, Candidate, heights, score, spacing_limits
+from .comb_search import FINE_STEPS, Candidate, factors_about, heights, score, spacing_limits
 from .comb_sums import running_sums
 from .periodogram import LEAST_LEVEL, Periodogram, local_level
 from .rotors import MOST_GEAR, Rotors, separate_rotors
@@ -267,8 +267,7 @@ def _geometric(low: float, high: float, pulses: int) -> NDArray[np.float64]:
 
 def _closest(rest: Periodogram, evidence: Evidence, spacings: NDArray[np.float64], centre: float) -> Candidate:
     """The best of spacings and of those near them."""
-    factors = 1 + 0.25 / rest.pulses * np.arange(-2 * FINE_STEPS, 2 * FINE_STEPS + 1)
-    tried = np.outer(spacings, factors).ravel()
+    tried = np.outer(spacings, factors_about(rest.pulses, 2 * FINE_STEPS, FINE_STEPS)).ravel()
     best = tried[[heights(evidence, tried, np.full(len(tried), centre)).argmax()]]
     (height,), (low,), (high,) = score(evidence, best, np.array([centre]))
     return Candidate(float(best[0]), centre, int(low), int(high), float(height))
