@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from bladewing.models import DEFAULT_MODEL
 
 from .errors import BadInput, Interrupted
 from .exits import complain, exit_code, mend_streams
@@ -61,7 +62,7 @@ ModelName = Annotated[
     typer.Option(
         metavar="NAME|FILE",
         help="A shipped model, an .onnx file, cascade, or fast, balanced or best.",
-        show_default="spectrum-cnn",
+        show_default=DEFAULT_MODEL,
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object a line: one a dwell, a closing one a recording.")]
@@ -253,7 +254,7 @@ def export(
         typer.Option(
             metavar="NAME|FILE",
             help="A shipped model, an .onnx file, fast, balanced or best: of models of one file, not the cascade.",
-            show_default="spectrum-cnn",
+            show_default=DEFAULT_MODEL,
         ),
     ] = None,
 ) -> None:

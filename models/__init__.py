@@ -63,7 +63,7 @@ LADDER: dict[str, Rung] = {
 }
 """Name of a model (the stem of its file) to what it is."""
 
-DEFAULT_MODEL = "spectrum-cnn"
+DEFAULT_MODEL = "spectrum-cnn-wide"
 """The model that is used where none is named."""
 
 KIND_SCORES = "kind_scores"

@@ -1,4 +1,4 @@
-"""What each part of the evidence brings the default network: trained with it and without, on the same records.
+"""What each part of the evidence brings `spectrum-cnn`: trained with it and without, on the same records.
 
 Run: python -m tests.benchmarks.ablation_table [--records N] [--epochs N] [--seeds N]. The table it wrote last stands in
 docs/ablation.md. A part of the measurements is taken away by holding it at zero.

@@ -100,7 +100,7 @@ def mixed_model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def tiny_models(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of two models that cost nothing, under a known name and a strange one."""
     folder = tmp_path_factory.mktemp("models")
-    (folder / "spectrum-cnn.onnx").write_bytes(model_bytes(slope=0.05))
+    (folder / "spectrum-cnn-wide.onnx").write_bytes(model_bytes(slope=0.05))
     (folder / "always-uav.onnx").write_bytes(model_bytes(bias=np.log([0.8, 0.15, 0.05])))
     return folder
 
@@ -141,7 +141,7 @@ def few_choices(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(choices, "network_bytes", linear_bytes)
     patch.setattr(front, "peak_bytes", lambda *_: 1_000_000)
     # there is no train.json that could tell of a cascade
-    of_account, told = run._cascade, {"cascade": {"stages": ["spectrum-cnn", "always-uav"]}}
+    of_account, told = run._cascade, {"cascade": {"stages": ["spectrum-cnn-wide", "always-uav"]}}
     patch.setattr(run, "_cascade", lambda given, _: of_account(given, told))
 
 

@@ -8,8 +8,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from bladewing.classify import BadInput, Classifier, inference, model_file
-from bladewing.classify.model_file import model_names
+from bladewing.classify.model_file import chosen_name, model_names
 from bladewing.features import model_inputs
+from bladewing.models import DEFAULT_MODEL
 from bladewing.models.calibration import NEVER
 from bladewing.simulate import Radar, draw_records
 from hypothesis import given, settings
@@ -324,8 +325,7 @@ def test_names_and_paths_that_lead_nowhere(tmp_path):
 def test_every_shipped_model_loads_and_answers():
     if not model_names():
         pytest.skip("no model is shipped in this checkout: `make train` writes them")
-    assert model_names()[0] == "spectrum-cnn"
-    assert Classifier.load().metadata["name"] == "spectrum-cnn"
+    assert model_names()[0] == Classifier.load().name == DEFAULT_MODEL == chosen_name("best")
     for name in model_names():
         model = Classifier.load(name)
         assert model.metadata["name"] == name

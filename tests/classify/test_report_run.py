@@ -38,7 +38,7 @@ def test_report_holds_the_data_of_every_figure(report: dict[str, Any]) -> None:
         *("trade", "front", "fft_against_stft", "time_law", "storage", "examples", "stft_pictures", "tables"),
         *("training", "config", "families"),
     }
-    assert [model["name"] for model in report["models"]] == ["spectrum-cnn", "always-uav", "cascade"]
+    assert [model["name"] for model in report["models"]] == ["spectrum-cnn-wide", "always-uav", "cascade"]
     first, second, both = report["models"]
     assert both["bytes"] == first["bytes"] + second["bytes"]
     assert (both["sha256"], both["inputs"]) == (None, first["inputs"])
@@ -50,7 +50,7 @@ def test_report_holds_the_data_of_every_figure(report: dict[str, Any]) -> None:
     for part in report["cost"]["batches"]:
         assert {(row["stage"], row["name"]) for row in part["stages"]} == {
             *(("fft", "fft"), ("input", "features")),
-            *((stage, name) for stage in ("model", "chain") for name in ("spectrum-cnn", "always-uav")),
+            *((stage, name) for stage in ("model", "chain") for name in ("spectrum-cnn-wide", "always-uav")),
             ("chain", "cascade"),
         }
         assert all(row["ratio_to_fft"] > 0 for row in part["stages"])
@@ -253,7 +253,7 @@ def test_no_models_is_one_clear_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["features", "herm", "cascade"])
 def test_a_model_of_a_name_that_the_report_needs_is_refused(tiny_models: Path, tmp_path: Path, name: str) -> None:
-    (tmp_path / f"{name}.onnx").write_bytes((tiny_models / "spectrum-cnn.onnx").read_bytes())
+    (tmp_path / f"{name}.onnx").write_bytes((tiny_models / "spectrum-cnn-wide.onnx").read_bytes())
     with pytest.raises(BadInput, match=rf"{name}\.onnx has the name of what the report makes itself: rename the file"):
         run.run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
 
@@ -262,14 +262,14 @@ def test_a_model_of_a_name_that_the_report_needs_is_refused(tiny_models: Path, t
 def test_a_train_json_of_something_else_is_told_before_anything_is_measured(
     tiny_models: Path, tmp_path: Path, text: str
 ) -> None:
-    (tmp_path / "spectrum-cnn.onnx").write_bytes((tiny_models / "spectrum-cnn.onnx").read_bytes())
+    (tmp_path / "spectrum-cnn-wide.onnx").write_bytes((tiny_models / "spectrum-cnn-wide.onnx").read_bytes())
     (tmp_path / "train.json").write_text(text)
     with pytest.raises(BadInput, match=r"train\.json: not .*: remove it or train again"):
         run.run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
 
 
 def test_a_train_json_that_never_ends_is_told_too(tiny_models: Path, tmp_path: Path) -> None:
-    (tmp_path / "spectrum-cnn.onnx").write_bytes((tiny_models / "spectrum-cnn.onnx").read_bytes())
+    (tmp_path / "spectrum-cnn-wide.onnx").write_bytes((tiny_models / "spectrum-cnn-wide.onnx").read_bytes())
     os.mkfifo(tmp_path / "train.json")
     with pytest.raises(BadInput, match=r"train\.json: not JSON: it is no regular file: remove it or train again"):
         run.run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
