@@ -12,6 +12,11 @@ from .samples import positive
 _ROUNDING = 1e-9  # relative: 0.005 s x 25 kHz must be 125 pulses, whatever the last bit says
 
 
+def exchanged(carrier_hz: float, prf_hz: float) -> str:
+    """What is said of a carrier that is below the PRF."""
+    return f"carrier {carrier_hz:g} Hz and PRF {prf_hz:g} Hz stand in each other's place: exchange them"
+
+
 @dataclass(frozen=True)
 class Envelope:
     """The limits within which a model was trained; all of them count as inside.
@@ -90,7 +95,7 @@ class Envelope:
         unambiguous_mps = wavelength_m * prf_hz / 4
         if not self.carrier_min_hz <= carrier_hz <= self.carrier_max_hz:
             if self.carrier_min_hz <= prf_hz <= self.carrier_max_hz and prf_hz > carrier_hz:
-                return f"carrier {carrier_hz:g} Hz and PRF {prf_hz:g} Hz stand in each other's place: exchange them"
+                return exchanged(carrier_hz, prf_hz)
             for unit, power in (("GHz", 9), ("MHz", 6)):
                 if self.carrier_min_hz <= carrier_hz * 10.0**power <= self.carrier_max_hz:
                     return (

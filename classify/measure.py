@@ -15,7 +15,7 @@ from bladewing.features.one_channel import half_empty, made_analytic
 from bladewing.features.spectrum import centred_power, scaled, unit_scale
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
-from .envelope import Envelope
+from .envelope import Envelope, exchanged
 from .errors import BadInput
 from .progress import Progress
 from .recording import Recording
@@ -294,12 +294,16 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     Raises
     ------
     BadInput
-        The recording holds fewer than 2 pulses, a dwell more than `MOST_PULSES`, or a frequency is no radar's.
+        The recording holds fewer than 2 pulses, a dwell more than `MOST_PULSES`, or a frequency is no radar's or stands
+        in the other's place.
     """
     if len(recording.iq) < 2:
         raise BadInput(f"{recording.name}: 1 pulse: a measurement needs at least 2")
     if beyond := beyond_radars(recording.carrier_hz, recording.prf_hz):
-        raise BadInput(f"{recording.name}: {beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3")
+        what = f"{beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3"
+        if not beyond_radars(recording.prf_hz, recording.carrier_hz):
+            what = exchanged(recording.carrier_hz, recording.prf_hz)
+        raise BadInput(f"{recording.name}: {what}")
     iq = recording.dwells(settings.dwell_s, least=2)
     if iq.shape[1] > MOST_PULSES:
         raise BadInput(

@@ -11,7 +11,7 @@ from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 
 from .errors import one_line
 from .measure import CHANCE
-from .terminal import counted, print_table
+from .terminal import counted, print_table, print_words
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -56,12 +56,10 @@ def print_measured(found: "Measured", console: "Console") -> None:
     for short, reasons in silent.items():
         detail = reasons[0][len(short) + 1 :].strip()
         detail = detail and f"{': ' if len(set(reasons)) == 1 else ', e.g. '}{detail}"
-        console.print(Text(f"{counted(len(reasons))}: {short}{detail}"), soft_wrap=True)
-    for remark in found.remarks:
-        console.print(Text(remark), soft_wrap=True)
-    console.print(Text(_sentence(found)), soft_wrap=True)
-    if beat := _beat(found):
-        console.print(Text(beat), soft_wrap=True)
+        print_words(console, Text(f"{counted(len(reasons))}: {short}{detail}"))
+    for sentence in (*found.remarks, _sentence(found), _beat(found)):
+        if sentence:
+            print_words(console, Text(sentence))
 
 
 def _sentence(found: "Measured") -> str:

@@ -150,7 +150,7 @@ class Answer:
             line.append(f"  ({self.track.reason})")
         print_words(console, line)
         for remark in self.remarks:
-            console.print(Text(remark), soft_wrap=True)
+            print_words(console, Text(remark))
         for name, rate_hz in self.shown.items():
             whose, odds = ODDS[name]
             said = f"{_SHOWN[name].format(rate_hz)}: the odds of {_WHOSE[whose]} count {odds:g} times"

@@ -18,6 +18,7 @@ from .discretes import DISCRETES, draw_discrete
 from .laws import LAWS, WIDTH, Draws
 from .radar import SPEED_OF_LIGHT_MPS, Radar
 from .receiver import NormalsOf, Receiver
+from .reception import from_zero
 from .target import Target, mean_power
 from .uav import ROTORS, draw_uav
 
@@ -149,7 +150,7 @@ def draw_records(
     Raises
     ------
     ValueError
-        If `purpose` or `kind` is unknown, or `count`, `seed` or `start` is negative.
+        If `purpose` or `kind` is unknown, or `count`, `seed` or `start` is no whole number or negative.
     """
     _require(purpose, count=count, seed=seed, start=start)
     if kind is not None and kind not in KIND_CLASS:
@@ -167,12 +168,11 @@ def draw_records(
 
 
 def _require(purpose: str, **numbers: int) -> None:
-    """A purpose that is one, and numbers that are not negative."""
+    """A purpose that is one, and whole numbers from 0 on."""
     if purpose not in PURPOSES:
         raise ValueError(f"purpose is {purpose!r}: it must be one of {', '.join(PURPOSES)}")
     for name, value in numbers.items():
-        if value < 0:
-            raise ValueError(f"{name} is {value}: it must not be negative")
+        from_zero(value, name)
 
 
 def draw_radar(seed: int, purpose: str, group: int) -> Radar:
@@ -192,7 +192,7 @@ def draw_radar(seed: int, purpose: str, group: int) -> Radar:
     Raises
     ------
     ValueError
-        If `purpose` is unknown, or `seed` or `group` is negative.
+        If `purpose` is unknown, or `seed` or `group` is no whole number or negative.
     """
     _require(purpose, seed=seed, group=group)
     sequence = SeedSequence(seed, spawn_key=(PURPOSES[purpose], _RADAR_STREAM + group))
@@ -223,7 +223,7 @@ def stream(seed: int, purpose: str, count: int, *, start: int = 0) -> Iterator[R
     Raises
     ------
     ValueError
-        At the first record asked for, if `purpose` is unknown or a number is negative.
+        At the first record asked for, if `purpose` is unknown or a number is no whole one or negative.
     """
     _require(purpose, count=count, seed=seed, start=start)
     at, stop = start, start + count

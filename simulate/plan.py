@@ -18,7 +18,7 @@ from .bounds import UavBounds, bird_bound
 from .bounds_receiver import ReceiverBounds
 from .parts import UavPart
 from .radar import Radar
-from .reception import pulse_times_s, whole_seed
+from .reception import from_zero, pulse_times_s
 from .render_bird import BIRD_EFFECTS
 from .render_uav import UAV_EFFECTS, Fidelity, full_fidelity
 from .setting import Setting
@@ -140,7 +140,7 @@ def make_plan(scene: Setting, seed: int = 0, *, tolerance_db: float = -10.0) -> 
     ValueError
         If the tolerance is NaN, or the seed no whole number or negative.
     """
-    seed = whole_seed(seed)
+    seed = from_zero(seed)
     if np.isnan(tolerance_db):
         raise ValueError(f"tolerance_db is {tolerance_db}: it must be a number [dB]")
     radar = scene.sight

@@ -18,19 +18,19 @@ from .setting import Setting
 from .target import mean_power
 
 
-def whole_seed(seed: object) -> int:
-    """Check the root of all randomness: a whole number from 0 on.
+def from_zero(value: object, name: str = "seed") -> int:
+    """Check a whole number from 0 on, as the root of all randomness is.
 
     Raises
     ------
     ValueError
         It is none.
     """
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
-        raise ValueError(f"seed is {seed!r}: it must be a whole number from 0 on")
-    if seed < 0:
-        raise ValueError(f"seed is {seed}: it must not be negative")
-    return int(seed)
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise ValueError(f"{name} is {value!r}: it must be a whole number from 0 on")
+    if value < 0:
+        raise ValueError(f"{name} is {value}: it must not be negative")
+    return int(value)
 
 
 def stream(seed: int, name: str) -> Generator:

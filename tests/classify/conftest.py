@@ -75,6 +75,12 @@ def model_bytes(
     return seal(content) if sealed else content
 
 
+@pytest.fixture(autouse=True)
+def _wide_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no terminal's width that the tests are started with wrap a sentence."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+
+
 @pytest.fixture(scope="session")
 def make_model() -> Callable[..., bytes]:
     return model_bytes

@@ -194,11 +194,18 @@ def test_the_reason_for_no_rotor_is_given_whole(folder, capsys):
 def test_the_table_says_rate_and_blade(folder, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     assert main(["measure", str(folder / "drone.npy"), *RADAR, "--blades", "2"]) == 0
-    said = capsys.readouterr().out
+    wrapped = capsys.readouterr().out
+    said = " ".join(wrapped.split())
     assert "chopping Hz" in said
     assert f"2-blade rotors at {60 * RATE_HZ:.0f} rpm, blade at least" in said
     assert f"body {VELOCITY_MPS:+.2f} +- 0.01 m/s" in said
-    assert max(map(len, said.splitlines()[1:-1])) <= 80
+    assert max(map(len, wrapped.splitlines()[1:])) <= 80
+
+
+def test_a_carrier_below_the_prf_is_told_as_exchanged(folder, capsys):
+    assert main(["measure", str(folder / "drone.npy"), "--carrier-hz", "35e3", "--prf-hz", "9.85e9"]) == 2
+    told = "drone.npy: carrier 35000 Hz and PRF 9.85e+09 Hz stand in each other's place: exchange them\n"
+    assert capsys.readouterr().err.endswith(told)
 
 
 def test_the_plot_is_svg_with_the_comb_on_it(folder, tmp_path, capsys):

@@ -172,6 +172,12 @@ def test_a_stream_of_less_than_nothing_is_refused(wrong):
         draw_radar(1, "train", -1)
 
 
+@pytest.mark.parametrize("seed", [1.5, True, "1", None])
+def test_a_seed_that_is_no_whole_number_is_refused(seed):
+    with pytest.raises(ValueError, match=f"seed is {seed!r}: it must be a whole number from 0 on"):
+        draw_records(Radar(9.85e9, 25e3, 256), 1, seed)
+
+
 def test_a_purpose_that_is_none_is_told_by_all_that_draw():
     with pytest.raises(ValueError, match="purpose is 'tset': it must be one of train"):
         draw_radar(1, "tset", 0)
