@@ -100,7 +100,7 @@ class UavBounds:
     def _blades(self, rotor: RotorPart) -> list[tuple[float, Amplitude]]:
         """Amplitude and angle of each blade."""
         angle = rotor_angle_rad(rotor, self.times_s, True)
-        level = 10 ** (rotor.flash_db / 20)
+        level = self.part.amplitude(rotor.flash_db)
         return [(level * a, angle + TWO_PI * n / rotor.blades) for n, a in enumerate(rotor.amplitudes)]
 
     def _phase(self, rotor: RotorPart) -> float:
@@ -141,7 +141,7 @@ class UavBounds:
                 flash += amplitude * (1 + np.abs(rotor.edge_asymmetry * np.sin(theta))) * moment(0, z)
             out += flash * self._hub_chord(rotor.offset_m, rotor.bearing_deg)
         for point in self.part.body:
-            out += 10 ** (point.level_db / 20) * self._hub_chord(point.offset_m, point.bearing_deg)
+            out += self.part.amplitude(point.level_db) * self._hub_chord(point.offset_m, point.bearing_deg)
         return out
 
     def _hub_chord(self, offset_m: float, bearing_deg: float) -> Amplitude:
@@ -158,8 +158,8 @@ class UavBounds:
 
     def _apart(self, path_rad: Amplitude) -> Amplitude:
         """What scatterers off the line of sight add to a turn of the whole echo: they move a little less than it."""
-        total = sum(10 ** (r.flash_db / 20) * 2 * sum(r.amplitudes) for r in self.part.rotors)
-        total += sum(10 ** (b.level_db / 20) for b in self.part.body)
+        total = sum(self.part.amplitude(r.flash_db) * 2 * sum(r.amplitudes) for r in self.part.rotors)
+        total += sum(self.part.amplitude(b.level_db) for b in self.part.body)
         return total * np.minimum(2, np.abs(path_rad)) * (self.part.reach_m / self.centre_m.min()) ** 2
 
     def acceleration(self) -> Amplitude:

@@ -16,9 +16,8 @@ from .bird import draw_bird
 from .clutter import draw_clutter, draw_ground
 from .discretes import DISCRETES, draw_discrete
 from .laws import LAWS, WIDTH, Draws
-from .radar import SPEED_OF_LIGHT_MPS, Radar
+from .radar import SPEED_OF_LIGHT_MPS, Radar, whole
 from .receiver import NormalsOf, Receiver
-from .reception import from_zero
 from .target import Target, mean_power
 from .uav import ROTORS, draw_uav
 
@@ -172,7 +171,7 @@ def _require(purpose: str, **numbers: int) -> None:
     if purpose not in PURPOSES:
         raise ValueError(f"purpose is {purpose!r}: it must be one of {', '.join(PURPOSES)}")
     for name, value in numbers.items():
-        from_zero(value, name)
+        whole(value, name)
 
 
 def draw_radar(seed: int, purpose: str, group: int) -> Radar:

@@ -158,9 +158,13 @@ class TargetPart(Part):
 
 
 class UavPart(TargetPart):
-    """A UAV: body scatterers and rotors, or the name of an `airframe` of the catalogue that brings both."""
+    """A UAV: body scatterers and rotors, or the name of an `airframe` of the catalogue that brings both.
+
+    `gain_db` is added to the levels of all of them, so that an airframe of the catalogue is as loud as it is to be.
+    """
 
     airframe: str | None = None
+    gain_db: Level = 0.0
     beta_deg: Aspect = 0.0
     vibration_rad: NotNegative = 0.0
     vibration_hz: Positive = 50.0
@@ -189,6 +193,10 @@ class UavPart(TargetPart):
     def reach_m(self) -> float:
         """Distance of the farthest scatterer from the centre [m]."""
         return max([r.offset_m + r.blade_length_m for r in self.rotors] + [b.offset_m for b in self.body])
+
+    def amplitude(self, level_db: float) -> float:
+        """Of a scatterer of that level, over the rms of the noise; `gain_db` is added."""
+        return float(10 ** ((level_db + self.gain_db) / 20))
 
     def beta_rad(self, rotor: RotorPart) -> float:
         """Angle between the line of sight and a rotor's plane [rad]."""

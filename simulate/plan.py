@@ -17,8 +17,8 @@ import numpy as np
 from .bounds import UavBounds, bird_bound
 from .bounds_receiver import ReceiverBounds
 from .parts import UavPart
-from .radar import Radar
-from .reception import from_zero, pulse_times_s
+from .radar import Radar, whole
+from .reception import pulse_times_s
 from .render_bird import BIRD_EFFECTS
 from .render_uav import UAV_EFFECTS, Fidelity, full_fidelity
 from .setting import Setting
@@ -140,7 +140,7 @@ def make_plan(scene: Setting, seed: int = 0, *, tolerance_db: float = -10.0) -> 
     ValueError
         If the tolerance is NaN, or the seed no whole number or negative.
     """
-    seed = from_zero(seed)
+    seed = whole(seed, "seed")
     if np.isnan(tolerance_db):
         raise ValueError(f"tolerance_db is {tolerance_db}: it must be a number [dB]")
     radar = scene.sight
@@ -190,8 +190,8 @@ def make_plan(scene: Setting, seed: int = 0, *, tolerance_db: float = -10.0) -> 
 
 def _strongest(scene: Setting) -> float:
     """Power of the strongest part of the scene."""
-    levels = [point.level_db for uav in scene.uavs for point in uav.body]
-    levels += [rotor.flash_db for uav in scene.uavs for rotor in uav.rotors]
+    levels = [point.level_db + uav.gain_db for uav in scene.uavs for point in uav.body]
+    levels += [rotor.flash_db + uav.gain_db for uav in scene.uavs for rotor in uav.rotors]
     levels += [max(bird.wing_db, bird.body_db) for bird in scene.birds]
     return float(10 ** (max(levels, default=0.0) / 10))
 

@@ -11,6 +11,19 @@ from numpy.typing import NDArray
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 
 
+def whole(value: object, name: str, least: int = 0) -> int:
+    """Check a whole number, as a count or a seed is.
+
+    Raises
+    ------
+    ValueError
+        It is none, or less than the least.
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
+        raise ValueError(f"{name} is {value!r}: it must be a whole number of at least {least}")
+    return int(value)
+
+
 @dataclass(frozen=True)
 class Radar:
     """A pulsed radar looking at one range cell, one complex sample a pulse.
@@ -44,9 +57,7 @@ class Radar:
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
             object.__setattr__(self, name, float(value))
-        if isinstance(self.pulses, bool) or not isinstance(self.pulses, Integral) or self.pulses < 1:
-            raise ValueError(f"pulses is {self.pulses!r}: it must be a whole number of at least 1")
-        object.__setattr__(self, "pulses", int(self.pulses))
+        object.__setattr__(self, "pulses", whole(self.pulses, "pulses", 1))
 
     @property
     def wavelength_m(self) -> float:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .plan import Plan
-from .radar import Radar
-from .reception import Reception, clutter_echo, from_zero, pulse_times_s
+from .radar import Radar, whole
+from .reception import Reception, clutter_echo, pulse_times_s
 from .render_bird import BIRD_EFFECTS, bird_echo, bird_truth
 from .render_uav import Fidelity, full_fidelity, uav_echo, uav_truth
 from .setting import Setting
@@ -62,7 +62,7 @@ def render(
     ValueError
         If `seed` is no whole number, or negative.
     """
-    seed = from_zero(seed)
+    seed = whole(seed, "seed")
     radar = scene.sight
     jitters = plan is None or "jitter" in plan.receiver
     times = pulse_times_s(scene, seed) if jitters else radar.times_s

@@ -86,7 +86,7 @@ def uav_echo(part: UavPart, radar: Radar, times_s: NDArray[np.float64], how: Fid
     for rotor in part.rotors:
         hub = hub_range_m(centre, rotor.offset_m, np.deg2rad(rotor.bearing_deg), far_field=not near_hubs)
         angle = rotor_angle_rad(rotor, times_s, "wander" in how.effects)
-        level = 10 ** (rotor.flash_db / 20) * np.exp(1j * np.deg2rad(rotor.hub_phase_deg))
+        level = part.amplitude(rotor.flash_db) * np.exp(1j * np.deg2rad(rotor.hub_phase_deg))
         beta = part.beta_rad(rotor)
         if how.points is None:
             blades = rotor_echo(
@@ -113,7 +113,7 @@ def uav_echo(part: UavPart, radar: Radar, times_s: NDArray[np.float64], how: Fid
             )
     for point in part.body:
         place = hub_range_m(centre, point.offset_m, np.deg2rad(point.bearing_deg), far_field=not near_hubs)
-        amplitude = 10 ** (point.level_db / 20) * np.exp(1j * np.deg2rad(point.phase_deg))
+        amplitude = part.amplitude(point.level_db) * np.exp(1j * np.deg2rad(point.phase_deg))
         out += amplitude * range_echo(place, wavelength)
     if "vibration" in how.effects and part.vibration_rad:
         out *= np.exp(1j * vibration_rad(part, times_s))
@@ -148,8 +148,8 @@ def uav_truth(part: UavPart) -> dict[str, Any]:
         "blade_length_m": [rotor.blade_length_m for rotor in part.rotors],
         "chopping_hz": [abs(rotor.rotation_hz) * _flashes(rotor) for rotor in part.rotors],
         "line_spacing_hz": [abs(rotor.rotation_hz) * _repeats(rotor) for rotor in part.rotors],
-        "flash_db": [rotor.flash_db for rotor in part.rotors],
-        "body_db": [point.level_db for point in part.body],
+        "flash_db": [rotor.flash_db + part.gain_db for rotor in part.rotors],
+        "body_db": [point.level_db + part.gain_db for point in part.body],
     }
 
 

@@ -39,19 +39,18 @@ def drawn(rng: np.random.Generator, airframe: str, fastest_mps: float = FASTEST_
     fields = AIRFRAMES[airframe].fields
     lowered_db, beta_deg, velocity_mps = rng.choice(LOWERED_DB), rng.uniform(0, 60), rng.uniform(-1, 1) * fastest_mps
     rotors = [
-        rotor
-        | {"flash_db": rotor["flash_db"] - lowered_db, "beta_deg": beta_deg}
-        | {"phase_deg": rng.uniform(0, 360), "hub_phase_deg": rng.uniform(0, 360)}
+        rotor | {"beta_deg": beta_deg, "phase_deg": rng.uniform(0, 360), "hub_phase_deg": rng.uniform(0, 360)}
         for rotor in fields["rotors"]
     ]
-    body = [part | {"level_db": part["level_db"] - lowered_db} for part in fields["body"]]
     tip_mps = max(2 * np.pi * abs(rotor["rotation_hz"]) * rotor["blade_length_m"] for rotor in rotors)
     tip_mps *= np.cos(np.radians(beta_deg))
     carrier_hz = rng.choice(CARRIERS_HZ)
     prf_hz = 4 * max(tip_mps / rng.uniform(*FOLDS), LEAST_SPAN_MPS) * carrier_hz / SPEED_OF_LIGHT_MPS
     scene = {
         "radar": {"carrier_hz": carrier_hz, "prf_hz": prf_hz, "pulses": int(min(DWELL_S * prf_hz, MOST_PULSES))},
-        "uav": [fields | {"name": "uav", "velocity_mps": velocity_mps, "rotors": rotors, "body": body}],
+        "uav": [
+            fields | {"name": "uav", "velocity_mps": velocity_mps, "rotors": rotors, "gain_db": -float(lowered_db)}
+        ],
     }
     if rng.random() < 0.4:
         scene["clutter"] = [{"name": "ground", "kind": "ground", "level_db": rng.uniform(10, 40)}]

@@ -166,15 +166,15 @@ def test_drawing_more_than_a_record_owns_is_an_error():
 
 @pytest.mark.parametrize("wrong", [{"count": -1}, {"seed": -1}, {"start": -1}])
 def test_a_stream_of_less_than_nothing_is_refused(wrong):
-    with pytest.raises(ValueError, match=f"{next(iter(wrong))} is -1: it must not be negative"):
+    with pytest.raises(ValueError, match=f"{next(iter(wrong))} is -1: it must be a whole number of at least 0"):
         next(stream(**({"seed": 1, "purpose": "train", "count": 1} | wrong)))
-    with pytest.raises(ValueError, match="group is -1: it must not be negative"):
+    with pytest.raises(ValueError, match="group is -1: it must be a whole number of at least 0"):
         draw_radar(1, "train", -1)
 
 
 @pytest.mark.parametrize("seed", [1.5, True, "1", None])
 def test_a_seed_that_is_no_whole_number_is_refused(seed):
-    with pytest.raises(ValueError, match=f"seed is {seed!r}: it must be a whole number from 0 on"):
+    with pytest.raises(ValueError, match=f"seed is {seed!r}: it must be a whole number of at least 0"):
         draw_records(Radar(9.85e9, 25e3, 256), 1, seed)
 
 

@@ -154,6 +154,26 @@ def test_every_airframe_has_a_source_and_flies(name):
         assert 20 < 2 * np.pi * abs(rotor.rotation_hz) * rotor.blade_length_m < 250  # tips, m/s
 
 
+@pytest.mark.parametrize("name", ["quadcopter_12cm", "helicopter_41cm", "type4"])
+def test_a_gain_raises_all_levels_of_an_airframe(name):
+    fields = AIRFRAMES[name].fields
+    by_hand = {
+        "body": [point | {"level_db": point["level_db"] - 12.0} for point in fields["body"]],
+        "rotors": [rotor | {"flash_db": rotor["flash_db"] - 12.0} for rotor in fields["rotors"]],
+    }
+    drone = {"name": "x", "airframe": name, "range_m": 60.0, "vibration_rad": 0.1, "acceleration_mps2": 1.0}
+    built = [Scene.build({"radar": RADAR, "uav": [drone | more]}) for more in ({"gain_db": -12.0}, by_hand, {})]
+    noise = built[0].without("x").render(1).iq
+    echo, by_hand_echo, louder = (one.render(1, full=True).iq - noise for one in built)
+    np.testing.assert_allclose(echo, by_hand_echo, atol=1e-4)
+    np.testing.assert_allclose(echo, 10**-0.6 * louder, atol=1e-4)
+    weaker, written, plain = built
+    for rendered in (weaker.render(1), written.render(1)):
+        assert rendered.truth[0]["flash_db"] == pytest.approx([r["flash_db"] - 12 for r in fields["rotors"]])
+        assert rendered.truth[0]["body_db"] == pytest.approx([p["level_db"] - 12 for p in fields["body"]])
+    assert weaker.plan().explain() == written.plan().explain() != plain.plan().explain()
+
+
 def test_the_wingbeats_of_the_catalogue_are_those_computed_from_pennycuick():
     computed_hz = {
         "mute_swan": 3.3, "herring_gull": 4.0, "greylag_goose": 4.4, "cormorant": 5.1, "jackdaw": 6.3, "teal": 7.9,
@@ -322,7 +342,7 @@ def test_drawing_records_needs_no_pydantic_and_scenes_are_fetched_when_asked_for
 
 
 def test_a_seed_that_is_no_whole_number_is_refused_and_scenes_are_offered_by_name():
-    for wrong, said in ((1.5, "seed is 1.5: it must be a whole number"), ("1", "seed is '1'"), (-1, "not be negative")):
+    for wrong, said in ((1.5, "seed is 1.5: it must be a whole number"), ("1", "seed is '1'"), (-1, "at least 0")):
         for work in (empty().plan, empty().render, lambda seed: empty().render(seed, full=True)):
             with pytest.raises(ValueError, match=said):
                 work(wrong)
