@@ -206,6 +206,8 @@ def _choose(arrays: Mapping[str, NDArray[np.generic]], variable: str | None, pat
         if variable not in arrays:
             raise BadInput(f"{path}: no variable {variable!r}: it holds {_listed(arrays)}")
         return arrays[variable]
+    if len(arrays) == 1:  # what ails it, if it is not complex, is told as that of a .npy file is
+        return next(iter(arrays.values()))
     candidates = [name for name, array in arrays.items() if array.dtype.kind == "c"]
     if len(candidates) == 1:
         return arrays[candidates[0]]

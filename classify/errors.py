@@ -20,7 +20,9 @@ def unreadable(path: object, error: OSError, cure: str = "name a file that can b
 
 
 def unwritable(path: object, error: OSError, cure: str) -> BadInput:
-    """What the system says of a file or a folder that it did not write."""
+    """What the system says of a file or a folder that it did not write; one whose folder is missing has that cure."""
+    if isinstance(error, FileNotFoundError):
+        cure = "make its folder first"
     return BadInput(f"{path}: cannot be written: {error.strerror or error}: {cure}")
 
 

@@ -293,12 +293,8 @@ def _one_range_cell(samples: NDArray[np.generic], name: str) -> NDArray[np.compl
     """Check the samples, and let go of axes of length 1 (MATLAB has no other vectors)."""
     if samples.size == 0:
         raise BadInput(f"{name}: no samples (shape {samples.shape}): a recording needs at least one pulse")
-    if samples.dtype.kind in "fiu" and samples.ndim == 2 and 2 in samples.shape:
-        parts = ("x[:, 0]", "x[:, 1]") if samples.shape[1] == 2 else ("x[0]", "x[1]")
-        raise BadInput(
-            f"{name}: real samples of shape {samples.shape}: I and Q must be one complex number: "
-            f"store {parts[0]} + 1j * {parts[1]}"
-        )
+    if samples.dtype.kind in "fiu":
+        complex_samples(samples, name)  # how I and Q are joined comes before what their shape is then
     if samples.ndim == 0 or samples.size != max(samples.shape):
         raise BadInput(
             f"{name}: samples of shape {samples.shape}: a recording is one range cell, shape (pulses,): "

@@ -42,10 +42,16 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
         )
     if given.dtype.kind == "O":
         raise BadInput(f"{name}: an array of Python objects: store complex samples (complex64)")
+    if given.dtype.kind in "fiu" and given.ndim > 1 and 2 in (given.shape[0], given.shape[-1]):
+        parts = ("x[..., 0]", "x[..., 1]") if given.shape[-1] == 2 else ("x[0]", "x[1]")
+        raise BadInput(
+            f"{name}: real samples of shape {given.shape}: I and Q must be one complex number: "
+            f"store {parts[0]} + 1j * {parts[1]}"
+        )
     if given.dtype.kind in "fiub":
         raise BadInput(
-            f"{name}: real samples ({given.dtype}): IQ must be complex, I + jQ (complex64): of I and Q by turns "
-            "x[0::2] + 1j * x[1::2] makes it, of one channel scipy.signal.hilbert(x)"
+            f"{name}: real samples ({given.dtype}): IQ must be complex, I + jQ (complex64), neither magnitude nor dB: "
+            "of I and Q by turns x[0::2] + 1j * x[1::2] makes it, of one channel scipy.signal.hilbert(x)"
         )
     if given.dtype.kind != "c":
         raise BadInput(f"{name}: samples of type {given.dtype}: IQ must be complex, I + jQ (complex64)")

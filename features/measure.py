@@ -77,7 +77,8 @@ def measure(
     if blades is not None and not (math.isfinite(blades) and 1 <= blades == int(blades) <= MOST_BLADES_GIVEN):
         raise ValueError(f"blades is {blades!r}: it must be a whole number of 1 to {MOST_BLADES_GIVEN}")
     if beta_rad is not None and not 0 <= beta_rad < np.pi / 2:
-        raise ValueError(f"beta_rad is {beta_rad!r}: it must be at least 0 and below pi/2 [rad]")
+        cure = f": {beta_rad:g} degrees are np.radians({beta_rad:g})" if 0 < beta_rad < 90 else ""
+        raise ValueError(f"beta_rad is {beta_rad!r}: it must be at least 0 and below pi/2 [rad]{cure}")
     blades = None if blades is None else int(blades)
     samples = made_analytic(without_lost(finite_complex(iq, least=2)))
     shape = samples.shape[:-1]

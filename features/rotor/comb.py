@@ -265,7 +265,9 @@ def _too_short(data: Periodogram) -> str:
     """Why no comb is sought at all."""
     _, highest = spacing_limits(data.pulses, data.prf_hz)
     if CHOPPING_RANGE_HZ[0] * SEARCHED_RATIO >= highest * data.prf_hz:
-        return f"PRF too low: chopping frequencies from {CHOPPING_RANGE_HZ[0]:.0f} Hz up do not fit into it"
+        needed_hz = CHOPPING_RANGE_HZ[0] * SEARCHED_RATIO / highest
+        rule = f"chopping frequencies from {CHOPPING_RANGE_HZ[0]:.0f} Hz up do not fit into {data.prf_hz:g} Hz"
+        return span_too_slow(data) or f"PRF too low: {rule}: raise it to {needed_hz:.0f} Hz at least"
     least_s = MIN_SPACING_BINS * SEARCHED_RATIO / highest / data.prf_hz
     return f"dwell too short: no chopping frequency can be told in less than {1e3 * least_s:.1f} ms at this PRF"
 

@@ -98,8 +98,8 @@ def test_one_of_several_is_named(put, suffix, write):
         (".npz", npz(iq=np.array([1j], dtype=object)), None, "iq.npy: an array of Python objects, which is never"),
         (".npz", npz(iq=IQ, o=np.array([1j], dtype=object)), "o", "o.npy: an array of Python objects"),
         (".npz", npz(), None, "no complex array, it holds no array of numbers"),
-        (".npz", npz(x=REAL), None, r"no complex array, it holds x float64 \(5,\): IQ must be complex"),
-        (".mat", mat(x=REAL), None, r"no complex array, it holds x float64 \(1, 5\)"),
+        (".npz", npz(x=REAL, y=REAL), None, r"no complex array, it holds x float64 \(5,\), y float64 \(5,\): IQ"),
+        (".mat", mat(x=REAL, y=REAL), None, r"no complex array, it holds x float64 \(1, 5\)"),
         (".mat", mat(I=REAL, Q=REAL, prf=2e4), None, r"I \+ jQ \(complex64\): store I \+ 1j \* Q"),
         (".npz", npz(imag=REAL, real=REAL), None, r"store real \+ 1j \* imag$"),
         (".npz", npz(time=REAL, voltage=REAL), None, r"I \+ jQ \(complex64\)$"),
@@ -116,6 +116,13 @@ def test_bad_files_are_refused_in_one_line(put, suffix, content, variable, said)
     assert re.search(said, message), message
     assert f"rec{suffix}" in message
     assert "\n" not in message
+
+
+@pytest.mark.parametrize(("suffix", "write"), [(".npz", npz), (".mat", mat)])
+def test_an_only_array_of_i_and_q_in_pairs_is_told_how_to_join_them(put, suffix, write):
+    path = put(suffix, write(iq=np.ones((100, 2), np.int16)))
+    with pytest.raises(BadInput, match=r"shape \(100, 2\): I and Q must be one complex number: store x\[..., 0\]"):
+        load_recording(path, carrier_hz=10e9, prf_hz=20e3)
 
 
 class Trap:

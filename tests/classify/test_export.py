@@ -220,7 +220,7 @@ def test_a_model_of_an_stft_is_refused(make_model, tmp_path):
 def test_a_folder_that_is_missing_is_bad_input(tmp_path, capsys):
     given = ["--carrier-hz", "10e9", "--prf-hz", "20e3", "--pulses", "200", "--model", "spectrum-cnn-fast"]
     assert main(["export", str(tmp_path / "none" / "raw.onnx"), *given]) == 2
-    assert "cannot be written" in capsys.readouterr().err
+    assert "cannot be written: No such file or directory: make its folder first" in capsys.readouterr().err
 
 
 def test_what_is_no_graph_is_not_written_over(tmp_path):

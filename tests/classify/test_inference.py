@@ -209,8 +209,9 @@ def test_a_record_of_zeros_is_unknown_and_leaves_the_others_alone(always_uav):
 @pytest.mark.parametrize(
     ("iq", "said"),
     [
-        (np.ones(200), r"iq: real samples \(float64\): IQ must be complex"),
+        (np.ones(200), r"iq: real samples \(float64\): IQ must be complex, .*, neither magnitude nor dB: of I"),
         ([1, 2, 3], r"iq: real samples \(int64\)"),
+        (np.ones((200, 2), np.int16), r"real samples of shape \(200, 2\).*: store x\[..., 0\] \+ 1j \* x\[..., 1\]"),
         ([[1j], [1j, 2j]], "iq: rows of unequal length: every record must have as many pulses"),
         (np.r_[noise(99), np.nan], r"iq: sample 99 is .*nan.*must be finite"),
         (np.stack([noise(70), np.r_[noise(69), np.inf]]), r"iq: sample \(1, 69\) is .*inf"),

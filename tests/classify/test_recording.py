@@ -97,7 +97,12 @@ def test_carrier_and_prf_must_be_known(npy, options, said):
 
 
 @pytest.mark.parametrize(
-    ("shape", "cure"), [((100, 2), r"x\[:, 0\] \+ 1j \* x\[:, 1\]"), ((2, 100), r"x\[0\] \+ 1j \* x\[1\]")]
+    ("shape", "cure"),
+    [
+        ((100, 2), r"x\[..., 0\] \+ 1j \* x\[..., 1\]"),
+        ((100, 9, 2), r"x\[..., 0\] \+ 1j \* x\[..., 1\]"),
+        ((2, 100), r"x\[0\] \+ 1j \* x\[1\]"),
+    ],
 )
 def test_parts_along_an_axis_of_two_are_told_how_to_join(npy, shape, cure):
     with pytest.raises(BadInput, match=f"I and Q must be one complex number: store {cure}"):

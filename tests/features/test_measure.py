@@ -263,6 +263,8 @@ def test_bad_arguments_are_refused():
     for wrong in ({"blades": 0}, {"blades": 1.5}, {"beta_rad": np.pi / 2}, {"beta_rad": -0.1}):
         with pytest.raises(ValueError, match="must be"):
             measure(iq, **RADAR, **wrong)
+    with pytest.raises(ValueError, match=r"below pi/2 \[rad\]: 30 degrees are np\.radians\(30\)$"):
+        measure(iq, **RADAR, beta_rad=30)
     for radar in ({"carrier_hz": 9.85}, {"prf_hz": 0.5}, {"carrier_hz": np.nan}):  # in GHz; in MHz; none
         with pytest.raises(ValueError, match=r"is .*: it must be .* Hz: give 9\.85 GHz as 9\.85e9"):
             measure(iq, **RADAR | radar)

@@ -140,6 +140,14 @@ def test_lines_that_come_back_are_fitted_as_they_stand():
     assert np.mean(np.abs(rest) ** 2) < 2 * np.mean(np.abs(white(rng, pulses)) ** 2)
 
 
+@pytest.mark.parametrize(("carrier_hz", "needed"), [(77e9, "12.3 kHz"), (0.1e9, "135 Hz")])
+def test_a_prf_given_in_khz_is_told_what_is_needed(carrier_hz, needed):
+    iq = white(np.random.default_rng(1), 200)
+    reason = str(measure(iq, carrier_hz=carrier_hz, prf_hz=20.0).reason)
+    assert reason.startswith("PRF too low")
+    assert reason.endswith(f"raise it to {needed} at least")
+
+
 @pytest.mark.parametrize(("prf_hz", "is_too_low"), [(4e3, True), (40e3, False)])
 def test_lines_that_fill_a_span_slower_than_rotors_are_none_of_something_slow(prf_hz, is_too_low):
     """At 77 GHz and 4 kHz velocities are told to 3.9 m/s: a rotor's lines were said to reach no further than that."""
