@@ -52,8 +52,8 @@ def export_raw_iq(
         The file to write, its name ending in ".onnx". Its graph reads "iq", float32 of shape (batch, pulses, 2), batch
         1 or more, I and Q at any gain, and gives "probabilities", float32 (batch, 3) in the order uav, bird, clutter,
         and "label", int64 (batch,): the place in (uav, bird, clutter, unknown). A record without signal, or with a
-        sample that is not finite, is unknown with probabilities of 1/3. Lost pulses, exactly 0, are not filled in: they
-        may pass for a UAV's flashes, where `Classifier.predict` fills them in.
+        sample that is not finite or three and more lost pulses (exactly 0, which `Classifier.predict` fills in), is
+        unknown with probabilities of 1/3.
     carrier_hz, prf_hz
         Carrier and pulse repetition frequency [Hz] that it is made for.
     pulses

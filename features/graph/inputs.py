@@ -6,6 +6,7 @@ import numpy as np
 
 from ..axis import pooling
 from ..change import PARTS, frame_starts, part_length
+from ..dropouts import LEAST_LOST
 from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
 from ..spectrum import _LEAST, LEAST_FLOOR, LEAST_PART, Spectrum, doppler_spectrum
 from ..vector import _BANDS, _SIGNIFICANT, radar_columns
@@ -38,6 +39,10 @@ IN_GRAPH = ("features", "levels", "spectrum", "cadence", "combs")
 IQ = "iq"
 
 
+#: How unlike samples of a converter's least step may be: others are as alike by chance alone.
+_OF_A_STEP = 1e-3
+
+
 def input_graph(
     graph: Graph, *, carrier_hz: float, prf_hz: float, pulses: int, names: Collection[str]
 ) -> tuple[dict[str, Value], Value]:
@@ -59,7 +64,7 @@ def input_graph(
     inputs : dict of str to Value
         As `inputs.model_inputs` gives them, shape (records, *INPUT_SHAPES[name]).
     live : Value
-        Whether a record holds a signal and only finite samples, shape (records, 1).
+        Whether a record holds a signal, only finite samples and no lost pulses, shape (records, 1).
 
     Raises
     ------
@@ -77,7 +82,9 @@ def input_graph(
     scaled = flat * unit_scale(largest)
     # no sum of what is not finite is within any limit; such a record spoils no other, and its answer is replaced
     live = (largest >= LEAST_PART) & (scaled.sum().apply("Abs") <= 8.0 * pulses)
-    packed = scaled.reshape(-1, pulses, 2).transpose(0, 2, 1)
+    of_pulses = scaled.reshape(-1, pulses, 2)
+    live = live & _none_lost(graph, of_pulses.apply("Abs").max(keep=False), pulses)
+    packed = of_pulses.transpose(0, 2, 1)
 
     transform = centred_transform(packed, pulses, radar.bins)
     power = power_of(transform, radar.bins)
@@ -111,6 +118,21 @@ def input_graph(
             mean = levels.slice(0, 1, axis=-2).reshape(-1, AXIS_BINS)
             out["features"] = _feature_vector(radar, relative_power, level_db, body, kept, mean, parts_db, change)
     return {name: out[name] for name in INPUT_SHAPES if name in names}, live
+
+
+def _none_lost(graph: Graph, size: Value, pulses: int) -> Value:
+    """Whether no pulses were lost, much as `dropouts.lost_pulses` tells them, shape (records, 1).
+
+    Fewer than three zeros are never enough, and those within a run do not count, so that one silence is none. A
+    converter that gives so many has as many samples of its least step: there are eight such places for one that is 0.
+    Of what hardly reaches that step this does not hold, and such a record counts as one of lost pulses.
+    """
+    is_there = size > 0.0
+    there = is_there.to(np.float32)
+    beside = graph.op("MaxPool", there.reshape(-1, 1, pulses), kernel_shape=[3], pads=[1, 1]).reshape(-1, pulses)
+    zeros = (beside - there).sum()
+    of_a_step = size <= -graph.where(is_there, -size, -1.0).max() * (1 + _OF_A_STEP)
+    return (zeros < float(LEAST_LOST)) | (zeros < of_a_step.count() - (1.0 - there).sum())
 
 
 def _feature_vector(

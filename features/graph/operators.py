@@ -77,6 +77,9 @@ class Value:
     def __and__(self, other: Operand) -> "Value":
         return self.graph.op("And", self, other)
 
+    def __or__(self, other: Operand) -> "Value":
+        return self.graph.op("Or", self, other)
+
     def apply(self, operator: str) -> "Value":
         """One of the operators of one operand: "Abs", "Log", "Sqrt", "Round" (half to even), "Floor"."""
         return self.graph.op(operator, self)

@@ -163,6 +163,23 @@ def test_records_that_cannot_be_judged_are_unknown_and_spoil_no_other(small):
     np.testing.assert_allclose(probabilities[[0, 4]], alone[0][[0, 4]], atol=1e-6)
 
 
+def test_lost_pulses_are_unknown_and_what_a_converter_rounds_to_zero_is_none(small):
+    _, radar, session = small
+    rng = np.random.default_rng(4)
+    noise = rng.standard_normal((40, radar["pulses"], 2)).astype(np.float32).view(np.complex64)[..., 0]
+    noise[20:] += 100 * np.exp(0.3j * np.arange(radar["pulses"]))  # nothing of a strong body is near 0
+    lost = noise.copy()
+    lost[:, [20, 90, 150]] = 0
+    probabilities, label = run(session, lost)
+    np.testing.assert_array_equal(label, 3)
+    np.testing.assert_allclose(probabilities, 1 / 3, rtol=1e-6)
+    for step in (0.02, 0.3, 1.0):  # of sigma
+        rounded = np.round(noise[:20].view(np.float32) / step).view(np.complex64)
+        judged = rounded.any(axis=1)
+        probabilities, _ = run(session, rounded)
+        assert (np.abs(probabilities - 1 / 3).max(axis=1) > 0.01)[judged].mean() > 0.95
+
+
 def test_the_file_says_what_it_is_for_and_shows_any_change(small):
     out, radar, _ = small
     content = out.read_bytes()
