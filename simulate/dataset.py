@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from .bird import draw_bird
 from .clutter import draw_clutter, draw_ground
 from .discretes import DISCRETES, draw_discrete
-from .laws import LAWS, WIDTH, Draws
+from .laws import LAWS, WIDTH, Draws, from_zero
 from .radar import SPEED_OF_LIGHT_MPS, Radar
 from .receiver import NormalsOf, Receiver
-from .reception import from_zero
 from .target import Target, mean_power
 from .uav import ROTORS, draw_uav
 

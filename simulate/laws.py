@@ -226,3 +226,18 @@ class Draws:
         """Draw standard normal numbers by Box and Muller: shape (records,), or (records, columns)."""
         radius, turn = self.uniform(columns), self.uniform(columns)
         return np.sqrt(-2 * np.log1p(-radius)) * np.cos(2 * np.pi * turn)
+
+
+def from_zero(value: object, name: str = "seed") -> int:
+    """Check a whole number from 0 on, as the root of all randomness is.
+
+    Raises
+    ------
+    ValueError
+        It is none.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise ValueError(f"{name} is {value!r}: it must be a whole number from 0 on")
+    if value < 0:
+        raise ValueError(f"{name} is {value}: it must not be negative")
+    return int(value)

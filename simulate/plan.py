@@ -16,9 +16,10 @@ import numpy as np
 
 from .bounds import UavBounds, bird_bound
 from .bounds_receiver import ReceiverBounds
+from .laws import from_zero
 from .parts import UavPart
 from .radar import Radar
-from .reception import from_zero, pulse_times_s
+from .reception import pulse_times_s
 from .render_bird import BIRD_EFFECTS
 from .render_uav import UAV_EFFECTS, Fidelity, full_fidelity
 from .setting import Setting

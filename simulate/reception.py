@@ -18,21 +18,6 @@ from .setting import Setting
 from .target import mean_power
 
 
-def from_zero(value: object, name: str = "seed") -> int:
-    """Check a whole number from 0 on, as the root of all randomness is.
-
-    Raises
-    ------
-    ValueError
-        It is none.
-    """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise ValueError(f"{name} is {value!r}: it must be a whole number from 0 on")
-    if value < 0:
-        raise ValueError(f"{name} is {value}: it must not be negative")
-    return int(value)
-
-
 def stream(seed: int, name: str) -> Generator:
     """The generator of one part: it depends on the seed and the part's name alone."""
     return Generator(Philox(SeedSequence(seed, spawn_key=(zlib.crc32(name.encode()),))))

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .laws import from_zero
 from .plan import Plan
 from .radar import Radar
-from .reception import Reception, clutter_echo, from_zero, pulse_times_s
+from .reception import Reception, clutter_echo, pulse_times_s
 from .render_bird import BIRD_EFFECTS, bird_echo, bird_truth
 from .render_uav import Fidelity, full_fidelity, uav_echo, uav_truth
 from .setting import Setting
