@@ -32,6 +32,11 @@ BESIDE_BINS, LEAST_OVER_BESIDE_DB = 6, 10.0
 #: lines to pass for a second rotor. (In front of ground up to half a bin that is not there is so in one of a hundred.)
 SURE_DEVIATIONS = 5.0
 
+#: Ground that sways in the wind bends its own line, by up to ten bins, and for so sure in three to eight of a hundred
+#: dwells where it is the strongest. So a line about velocity zero must stand so high over what lies beside it [dB]: a
+#: hovering body 15 dB over ground does.
+LEAST_OVER_BESIDE_AT_REST_DB = 22.0
+
 #: A line that is smeared over more bins than these rises by so much when the smear is taken out [dB]; what does not is
 #: no line. (Over three bins a line alone loses 2.4 dB.)
 SHOWN_STEPS, LEAST_RISE_DB = 3.2, 2.0
@@ -60,8 +65,8 @@ def body_acceleration(
     Returns
     -------
     acceleration_mps2, std_mps2 : ndarray of float64, shape (...)
-        Positive when the radial velocity grows; NaN where no line stands out. The deviation is the bound of a chirp's
-        rate, 90 / (SNR pulses^5) rad^2 (Peleg and Porat 1991).
+        Positive when the radial velocity grows; NaN where no line stands out, or it may be ground that sways. The
+        deviation is the bound of a chirp's rate, 90 / (SNR pulses^5) rad^2 (Peleg and Porat 1991).
     smeared : ndarray of bool, shape (...)
         Whether the line is smeared for sure, so that `without_acceleration` is of use.
 
@@ -118,6 +123,10 @@ def body_acceleration(
         snr = height / beside / pulses
         std[index] = np.sqrt(90 / (snr * float(pulses) ** 5)) * prf_hz**2 * wavelength_m / (2 * np.pi)
         smeared[index] = abs(value[index]) > SURE_DEVIATIONS * std[index]
+        bins = abs(np.fft.fftfreq(size)[int(sharp.argmax())]) * pulses
+        sways = bins < abs(at) / 2 + 1 and height < beside * 10 ** (LEAST_OVER_BESIDE_AT_REST_DB / 10)
+        if smeared[index] and sways:
+            value[index], std[index], smeared[index] = np.nan, np.nan, False
     lead = samples.shape[:-1]
     return value.reshape(lead), std.reshape(lead), smeared.reshape(lead)
 

@@ -136,6 +136,7 @@ def _line(problem: dict[str, Any]) -> str:
 _RULES = {
     "string_pattern_mismatch": "must begin with a letter, and hold letters, digits, _ and - alone",
     "tuple_type": "must be a list: write [...] about it",
+    "int_type": "must be a whole number, without point or exponent",
     "dict_type": "must be a table: write { name = number }",
 }
 

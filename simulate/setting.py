@@ -14,6 +14,9 @@ _SOUND_MPS = 340.0
 #: A PRF below this may have been given in kHz [Hz].
 _LEAST_PRF_HZ = 100.0
 
+#: A bird heavier than this, which no wings carry, may have been given in grams [kg].
+_HEAVIEST_KG = 25.0
+
 #: From this rms jitter on, of the time between pulses, one in 400 comes after the next.
 _MOST_JITTER = 0.25
 
@@ -113,16 +116,21 @@ class Setting(BaseModel):
             )
         for part in self.uavs:
             beyond: dict[str, float] = {}
+            along: list[str] = []
             for number, rotor in enumerate(part.rotors):
                 where = f"{part.name}: rotors[{number}]"
                 tip = rotor.tip_mps(radar.dwell_s)
                 fastest = part.fastest_tip_mps(rotor, radar.dwell_s)
                 if tip > _SOUND_MPS:
-                    said.append(f"{where}: its tips move at {tip:.1f} m/s, faster than sound")
+                    units = "blade_length_m is in metres, rotation_hz in turns a second, so that 3500 rpm are 58.3"
+                    said.append(f"{where}: its tips move at {tip:.1f} m/s, faster than sound: {units}")
                 if math.cos(part.beta_rad(rotor)) < 1e-9:
-                    said.append(f"{where}: seen along its axis (90 degrees) it shows no micro-Doppler")
+                    along.append(f"rotors[{number}]")
                 elif fastest > radar.unambiguous_mps:
                     beyond[f"rotors[{number}]"] = fastest
+            if along:
+                seen = "seen along its axis (90 degrees) each shows no micro-Doppler"
+                said.append(f"{part.name}: {', '.join(along)}: {seen}")
             if beyond:
                 fastest = max(beyond.values())
                 enough_hz = math.ceil(4 * fastest / radar.wavelength_m)
@@ -131,6 +139,11 @@ class Setting(BaseModel):
                     f"{part.name}: {', '.join(beyond)}: {tips} {fastest:.1f} m/s, beyond the unambiguous "
                     f"{radar.unambiguous_mps:.1f} m/s (wavelength x PRF / 4): they alias; a PRF of {enough_hz} Hz "
                     "would not"
+                )
+        for bird in self.birds:
+            if bird.mass_kg > _HEAVIEST_KG:
+                said.append(
+                    f"{bird.name}: mass_kg is {bird.mass_kg:g}, heavier than any bird that flies: 350 g are 0.35"
                 )
         for target in (*self.uavs, *self.birds):
             fastest = target.fastest_mps(radar.dwell_s)

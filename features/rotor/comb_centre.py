@@ -302,13 +302,15 @@ def _even_orders(data: Periodogram, found: Candidate, least: float) -> tuple[dic
     """
     size, furthest = len(data.power), int(0.49 / found.spacing)
     order = np.arange(-furthest, furthest + 1)
-    borders = np.rint((found.centre + found.spacing * (np.append(order, furthest + 1) - 0.5)) * size).astype(np.intp)
+    places = found.centre + found.spacing * order
+    borders = np.rint((np.append(places, places[-1] + found.spacing) - found.spacing / 2) * size).astype(np.intp)
     bins = np.arange(borders[0], borders[-1]) % size
     starts = borders[:-1] - borders[0]
     power = data.power * data.level
     seen = data.seen & _stands_out(data, np.arange(size) / size, power)
     highest = np.maximum.reduceat((power * seen)[bins], starts)
-    hidden = ~np.logical_or.reduceat(data.seen[bins], starts)
+    # the strongest line may have been taken out alone, and what is left about it be seen
+    hidden = ~(np.logical_or.reduceat(data.seen[bins], starts) & data.seen[data.bins_of(places)])
     shows = np.flatnonzero((highest > least) | hidden)
     hidden |= ~np.logical_or.reduceat(seen[bins], starts)
     # from what speaks for the comb outwards: another family may follow

@@ -29,6 +29,10 @@ ASTRAY_SHARE, ASTRAY_SURE = 0.6, 0.02
 #: them lifts the level that the outer ones are read against.
 SEVERAL_LEAK = 0.005
 
+#: Rotors whose chopping frequencies differ by more than this have blades of another number or length, and their lines
+#: end at another order: the band is that of those which reach further.
+LIKE_SHARE = 0.75
+
 #: Of the sums of all about an order: variance over the square, beyond what the fit finds by itself, where the rotors'
 #: lines lie in one another, and what an edge is off by at least [lines].
 AROUND_SCATTER, AROUND_LINES = 0.2, 0.035
@@ -92,7 +96,7 @@ def edge_of_lines(
     rest: NDArray[np.complex128],
     per_turn: int,
     blades: int | None,
-    tail: float | None = None,
+    tail: NDArray[np.float64] | float | None = None,
 ) -> tuple[float, float]:
     """Edge of the line family by the fitted lines, both sides together.
 
@@ -111,7 +115,7 @@ def edge_of_lines(
         Strong lines are this many spacings of a fit apart.
     blades : int, optional
         Of a rotor.
-    tail : float, optional
+    tail : float or ndarray, optional
         Spacing of another comb about the same centre [cycles a sample], whose outer lines may not have been fitted.
 
     Returns
@@ -122,6 +126,11 @@ def edge_of_lines(
     """
     spacings = np.array([fit.spacing * per_turn for fit in fits])
     fastest = float(spacings.max())
+    like = spacings > LIKE_SHARE * fastest
+    if not like.all():
+        alike, others = ([fit for fit, own in zip(fits, group, strict=True) if own] for group in (like, ~like))
+        of_alike = edge_of_lines(data, alike, rest, per_turn, blades, spacings[~like])
+        return max(of_alike, edge_of_lines(data, others, rest, per_turn, blades, spacings[like]))
     span = span_of(data, fits)
     order = _orders(fastest, span)
     sides = np.array([[-1], [1]]) * order

@@ -116,6 +116,24 @@ def test_blades_and_a_background_beside_the_line_show_in_its_deviation(airframe,
     assert np.all(np.abs(found[smeared]) < step_mps2)
 
 
+@pytest.mark.parametrize("wind_mph", [10.0, 30.0])
+def test_ground_that_sways_is_no_body_that_accelerates(wind_mph):
+    # its own line bent by up to ten bins, so that one steady rotor before it counted as three or more
+    radar = {"carrier_hz": CARRIER_HZ, "prf_hz": 25e3, "pulses": 4000}
+    ground = {"name": "ground", "kind": "ground", "level_db": 40.0, "values": {"wind_mph": wind_mph}}
+    iq = np.stack([Scene.build({"radar": radar, "clutter": [ground]}).render(seed).iq for seed in range(80)])
+    assert not body_acceleration(iq, carrier_hz=CARRIER_HZ, prf_hz=25e3)[2].any()
+
+
+def test_a_hovering_body_that_accelerates_before_weaker_ground_is_steadied():
+    radar = {"carrier_hz": CARRIER_HZ, "prf_hz": 25e3, "pulses": 2000}
+    ground = {"name": "ground", "kind": "ground", "level_db": 10.0}
+    uav = {"name": "uav", "airframe": "quadcopter_12cm", "velocity_mps": -0.32, "acceleration_mps2": 8.0}
+    scene = Scene.build({"radar": radar, "uav": [uav], "clutter": [ground]})
+    iq = np.stack([scene.render(seed).iq for seed in range(20)])
+    assert body_acceleration(iq, carrier_hz=CARRIER_HZ, prf_hz=25e3)[2].mean() > 0.8
+
+
 @pytest.mark.parametrize("pulses", [8, 500])
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])
 def test_what_is_not_finite_and_no_radar_are_refused(pulses, wrong):

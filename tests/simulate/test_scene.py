@@ -43,7 +43,7 @@ def power_spectrum(iq: np.ndarray) -> np.ndarray:
     ("values", "said"),
     [
         ({"radar": {**RADAR, "pulses": 0}}, r"radar\.pulses is 0: it should be greater than or equal to 1"),
-        ({"radar": {**RADAR, "pulses": 2.5}}, r"radar\.pulses is 2\.5: it should be a valid integer"),
+        ({"radar": {**RADAR, "pulses": 2.5}}, r"radar\.pulses is 2\.5: it must be a whole number, without point"),
         ({"radar": {**RADAR, "prf_hz": -1.0}}, r"radar\.prf_hz is -1\.0: it should be greater than 0"),
         ({"radar": {**RADAR, "carrier_hz": 9.85}}, r"radar\.carrier_hz: 9\.85 Hz is no radar's: .*: 10 GHz is 10e9"),
         ({"radar": {"carrier_hz": 1e9, "prf_hz": 1e3}}, r"radar\.pulses is missing"),
@@ -243,6 +243,19 @@ def test_no_bird_of_a_flock_comes_to_the_radar(bird):
 def test_a_prf_in_khz_is_warned_of():
     said = Scene.build({"radar": {**RADAR, "prf_hz": 25.0}}).warnings()
     assert said == ["radar.prf_hz is 25: in Hz, so that 25 kHz is 25e3"]
+
+
+def test_rpm_and_grams_are_warned_of():
+    rotor = {"blade_length_m": 0.15, "rotation_hz": 3500.0, "flash_db": 15.0, "beta_deg": 90.0}
+    bird = {"name": "b", "mass_kg": 350.0, "wing_db": 10.0, "body_db": 20.0}
+    said = Scene.build({"radar": RADAR, "uav": [{"name": "x", "rotors": [rotor] * 2}], "bird": [bird]}).warnings()
+    assert [line.split("faster than sound: ")[1] for line in said[:2]] == [
+        "blade_length_m is in metres, rotation_hz in turns a second, so that 3500 rpm are 58.3"
+    ] * 2
+    assert said[2:] == [
+        "x: rotors[0], rotors[1]: seen along its axis (90 degrees) each shows no micro-Doppler",
+        "b: mass_kg is 350, heavier than any bird that flies: 350 g are 0.35",
+    ]
 
 
 def test_a_jitter_that_pulses_change_places_by_is_warned_of():

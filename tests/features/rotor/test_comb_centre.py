@@ -205,3 +205,21 @@ def test_one_sided_lines_do_not_outvote_a_line_that_stands_out(other, body_db, a
         unsure += bool(found.body_velocity_mps_std > 1.0)
     assert wrong == 0
     assert unsure <= most_unsure
+
+
+@pytest.mark.parametrize("beta_deg", [60.0, 70.0])
+def test_blades_stronger_than_the_body_hide_no_order_of_a_lone_rotor_of_three_blades(beta_deg):
+    # short blades seen steeply have few lines; the strongest, taken out, passed for one that is not there, and 21 of
+    # 137 bodies were an order off, and sure of it
+    rng = np.random.default_rng(int(beta_deg))
+    radar = {"carrier_hz": 9.85e9, "prf_hz": 25e3}
+    for seed in range(8):
+        length_m, velocity_mps = rng.uniform(0.06, 0.1), rng.uniform(-25, 25)
+        rotor = {"blade_length_m": length_m, "root_m": 0.15 * length_m, "blades": 3, "flash_db": 38.0}
+        rotor |= {"rotation_hz": rng.uniform(60, 130) / (2 * np.pi * length_m), "phase_deg": rng.uniform(0, 360)}
+        uav = {"name": "drone", "velocity_mps": velocity_mps, "beta_deg": beta_deg}
+        uav |= {"body": [{"level_db": rng.uniform(5, 35)}], "rotors": [rotor]}
+        iq = Scene.build({"radar": radar | {"pulses": 2000}, "uav": [uav]}).render(seed).iq
+        found = measure(iq, **radar, blades=3, beta_rad=np.radians(beta_deg))
+        assert found.body_velocity_mps == pytest.approx(velocity_mps, abs=0.02)
+        assert found.body_velocity_mps_std < 0.02
