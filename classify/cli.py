@@ -65,6 +65,14 @@ ModelName = Annotated[
         show_default=DEFAULT_MODEL,
     ),
 ]
+MaxFalseAlarm = Annotated[
+    float | None,
+    typer.Option(
+        metavar="P",
+        help="Largest share of birds and clutter to be named uav, 0.001 say; sets the threshold on uav.",
+        show_default=False,
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object a line: one a dwell, a closing one a recording.")]
 
 
@@ -97,14 +105,7 @@ def predict(
             show_default=False,
         ),
     ] = None,
-    max_false_alarm: Annotated[
-        float | None,
-        typer.Option(
-            metavar="P",
-            help="Largest share of birds and clutter to be named uav, 0.001 say; sets the threshold on uav.",
-            show_default=False,
-        ),
-    ] = None,
+    max_false_alarm: MaxFalseAlarm = None,
     coverage: Annotated[
         float | None,
         typer.Option(
@@ -257,13 +258,19 @@ def export(
             show_default=DEFAULT_MODEL,
         ),
     ] = None,
+    max_false_alarm: MaxFalseAlarm = None,
 ) -> None:
     """Write one self-contained ONNX graph for a radar: raw IQ in, probabilities and label out, onnxruntime alone."""
     from .export import export_raw_iq
     from .model_file import chosen_name
+    from .samples import positive
 
+    if max_false_alarm is not None:
+        positive(max_false_alarm, "--max-false-alarm")
     name = chosen_name(model, single=True)
-    worst = export_raw_iq(out, carrier_hz=carrier_hz, prf_hz=prf_hz, pulses=pulses, model=name)
+    worst = export_raw_iq(
+        out, carrier_hz=carrier_hz, prf_hz=prf_hz, pulses=pulses, model=name, max_false_alarm=max_false_alarm
+    )
     graph = f"iq (batch, {pulses}, 2) to probabilities and label"
     print(f"Wrote {out}: {graph}, within {worst:.0e} of predict --model {name}", flush=True)
 

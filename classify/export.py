@@ -43,6 +43,7 @@ def export_raw_iq(
     prf_hz: float,
     pulses: int,
     model: str | os.PathLike[str] | None = None,
+    max_false_alarm: float | None = None,
 ) -> float:
     """Write a model as a graph that reads raw IQ.
 
@@ -60,6 +61,8 @@ def export_raw_iq(
         Pulses of a record.
     model
         As for `Classifier.load`; one that reads `IN_GRAPH` only.
+    max_false_alarm
+        As for `Classifier`: largest share of birds and clutter whose label may be UAV.
 
     Returns
     -------
@@ -82,7 +85,7 @@ def export_raw_iq(
             f"{CASCADE}: two models, of which each is asked about other records: give one of them as --model"
         )
     content, source = read_model(name)
-    classifier = Classifier(content, source=source)
+    classifier = Classifier(content, source=source, max_false_alarm=max_false_alarm)
     carrier_hz, prf_hz = positive(carrier_hz, "carrier_hz"), positive(prf_hz, "prf_hz")
     outside = classifier.envelope.reason(carrier_hz, prf_hz, pulses)
     if outside is not None:
@@ -166,6 +169,7 @@ def _sealed(
     metadata = {key: value for key, value in classifier.metadata.items() if key not in (SEAL_KEY, "inputs")}
     metadata |= {
         "product": EXPORTED,
+        "accept": json.dumps(classifier.accept),
         "labels": json.dumps([*CLASSES, UNKNOWN]),
         "carrier_hz": repr(carrier_hz),
         "prf_hz": repr(prf_hz),

@@ -131,6 +131,25 @@ def small(tmp_path_factory):
     return out, radar, opened(out)
 
 
+def test_labels_keep_to_a_false_alarm_rate(small, tmp_path):
+    _, radar, session = small
+    out, rule = tmp_path / "strict.onnx", {"model": "spectrum-cnn-fast", "max_false_alarm": 0.001}
+    export_raw_iq(out, **radar, **rule)
+    strict = Classifier.load("spectrum-cnn-fast", max_false_alarm=0.001)
+    iq = records(300, **radar)
+    expected = strict.predict(iq, carrier_hz=radar["carrier_hz"], prf_hz=radar["prf_hz"])
+    _, label = run(opened(out), iq)
+    clear = np.abs(expected.probabilities[:, 0] - strict.accept[0]) > TOLERANCE
+    np.testing.assert_array_equal(label[clear] == 0, expected.labels[clear] == "uav")
+    assert 0 < (label == 0).sum() < (run(session, iq)[1] == 0).sum()
+    said = {entry.key: entry.value for entry in onnx.load_model_from_string(out.read_bytes()).metadata_props}
+    assert json.loads(said["accept"]) == list(strict.accept)
+    assert (
+        main(["export", str(out), *(f"--{name.replace('_', '-')}={value}" for name, value in (radar | rule).items())])
+        == 0
+    )
+
+
 def test_a_batch_answers_like_its_records_alone(small):
     _, radar, session = small
     iq = records(8, **radar)
