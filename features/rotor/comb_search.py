@@ -286,17 +286,17 @@ def even_scores(
     reach : ndarray of int, shape (candidates,)
         Outermost order.
     """
-    best = np.full((len(spacings), len(evidence.rows)), -np.inf, np.float32)
+    best = np.full((len(spacings), MOST_SNRS), -np.inf, np.float32)
     reach = np.ones(best.shape, np.intp)
     first = 1
     for sums in _sums_of_sides(evidence, spacings, centres, furthest):
-        both = (sums[:, 0] + sums[:, 1])[..., : len(evidence.rows)]
-        far = both.argmax(axis=0)
+        both = sums[:, 0] + sums[:, 1]
         highest = both.max(axis=0)
         held, ends = best[: len(highest)], reach[: len(highest)]
         better = highest > held
-        held[better], ends[better] = highest[better], far[better] + first
+        held[better], ends[better] = highest[better], both[:, better].argmax(axis=0) + first
         first += len(both)
+    best = best[:, : len(evidence.rows)]
     row = best.argmax(axis=1)[:, None]
     scores = np.maximum(np.take_along_axis(best, row, axis=1)[:, 0], 0)
     return scores.astype(np.float64), np.take_along_axis(reach, row, axis=1)[:, 0]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..evidence import MOST_SNRS, Evidence
 
 #: Lines summed at once: they must stay in the cache. And orders at least and at most.
-LINES_AT_ONCE, ORDERS_AT_ONCE = 8000, (4, 64)
+LINES_AT_ONCE, ORDERS_AT_ONCE = 16000, (6, 64)
 
 
 def running_sums(

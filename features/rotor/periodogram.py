@@ -273,7 +273,7 @@ def local_level(power: NDArray[np.floating], keep: NDArray[np.bool_], floor: flo
 def _level_at_bins(
     power: NDArray[np.floating], keep: NDArray[np.bool_], floor: float, block: int, *, evened: bool = False
 ) -> Callable[[NDArray], NDArray[np.float64]]:
-    """`local_level` as a function of the bin; evened as in `Periodogram.level_of`."""
+    """`local_level` as a function of the bin, from 0 to below their number; evened as in `Periodogram.level_of`."""
     size = len(power)
     count = max(4, size // block)
     length = size // count
@@ -293,7 +293,10 @@ def _level_at_bins(
         away = logs - logs.mean()
         logs = logs - BLOCK_BIAS - BLOCK_SCATTER / max(float(away.var()), BLOCK_SCATTER) * away
     middles = (starts + length / 2)[known]
-    return lambda bins: np.exp(np.interp(bins, middles, logs, period=size))
+    # the blocks at the ends once more around the circle: `interp` would turn every bin by its period
+    middles = np.concatenate([middles[-1:] - size, middles, middles[:1] + size])
+    logs = np.concatenate([logs[-1:], logs, logs[:1]])
+    return lambda bins: np.exp(np.interp(bins, middles, logs))
 
 
 def prepare(iq: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float) -> Periodogram | None:

@@ -14,7 +14,7 @@ from ..lines import squared
 from .comb import MOST_BLADES, UNEQUAL_FACTOR, Comb, strong_multiple
 from .comb_fit import CombFit, fit_combs
 from .comb_search import even_scores
-from .flashes import flash_nats
+from .flashes import LEAST_LINES, flash_nats
 from .periodogram import Level, Periodogram
 
 #: Rotors looked for at most.
@@ -264,12 +264,11 @@ class Separation:
 
     def _loudest_in(self, data: Periodogram, rates: NDArray[np.float64], *, is_apart: bool) -> Sought:
         """The same in a record, by the powers of the lines and their flashes."""
-        powers, reach = even_scores(data.contrast, rates, np.full(len(rates), self.centre), self.furthest)
-        order = np.arange(1, reach.max() + 1)
-        frequency = self.centre + np.array([-1, 1])[:, None, None] * rates[:, None] * order
-        seen = data.usable(frequency) & (order <= reach[:, None])
-        flashes = flash_nats(np.where(seen, data.amplitude[data.bins_of(frequency)], 0)).sum(axis=0)
-        sums = powers + flashes
+        sums, reach = even_scores(data.contrast, rates, np.full(len(rates), self.centre), self.furthest)
+        order, far = np.arange(1, reach.max() + 1), np.flatnonzero(reach >= LEAST_LINES)  # fewer lines tell no flash
+        frequency = self.centre + np.array([-1, 1])[:, None, None] * rates[far, None] * order
+        seen = data.usable(frequency) & (order <= reach[far, None])
+        sums[far] += flash_nats(np.where(seen, data.amplitude[data.bins_of(frequency)], 0)).sum(axis=0)
         best = int(sums.argmax())
         return Sought(float(rates[best]), int(reach[best]), float(sums[best]), is_apart)
 
