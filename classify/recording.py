@@ -1,5 +1,6 @@
 """Recordings: one range cell's IQ with the carrier and the PRF it was taken at."""
 
+import math
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -43,7 +44,8 @@ class Recording:
     Raises
     ------
     BadInput
-        The samples are no complex numbers, not finite, none or of several cells, or a frequency is not above 0.
+        The samples are no complex numbers, not finite, none or of several cells, a frequency is not above 0, or the
+        start is no time.
     """
 
     name: str
@@ -60,6 +62,8 @@ class Recording:
         object.__setattr__(self, "iq", iq)
         for name in ("carrier_hz", "prf_hz"):
             object.__setattr__(self, name, positive(getattr(self, name), f"{self.name}: {name}"))
+        if not math.isfinite(self.start_s):
+            raise BadInput(f"{self.name}: start_s is {self.start_s}: it must be a finite time [s]")
 
     def dwells(self, dwell_s: float, least: int = 1) -> NDArray[np.complex64]:
         """Cut the recording into dwells that follow one another; a rest shorter than a dwell is left out.

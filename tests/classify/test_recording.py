@@ -167,6 +167,7 @@ def test_all_names_of_a_sigmf_recording_stand_for_one(sigmf_pair):
         (noise(50).real, {}, "walk: real samples"),
         (noise(50), {"prf_hz": -1.0}, "walk: prf_hz is -1"),
         (noise(50), {"carrier_hz": "x"}, "walk: carrier_hz is 'x'"),
+        (noise(50), {"start_s": float("nan")}, "walk: start_s is nan: it must be a finite time"),
     ],
 )
 def test_a_recording_of_ones_own_is_looked_at_as_a_files_is(iq, frequencies, said):
