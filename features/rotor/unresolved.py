@@ -26,17 +26,18 @@ SECOND_FLASH_SHARE, LEAST_FLASH_LINES = 0.3, 6
 STRONG_FLASH_SHARE = 0.1
 
 #: Of each comb's lines at least this share is like another's, of few orders more: 0.7 and more of eight rotors told
-#: apart at 9.85 GHz, 0.8 of four at 3.3 to 24 GHz in 99 of 100; less in 4 of 5 sets of which fewer were told. Few lines
-#: fit changing rates better: 0.92 and more of four that change, up to 0.83 of fewer than there are.
+#: apart at 9.85 GHz, 0.77 of nearly all sets counted right at 3.3 to 24 GHz and 0 to 20 dB; in two of three of those in
+#: which fewer were told it is below 0.75. Few lines fit changing rates better: four that change have 0.92 and more at
+#: 10 and 20 dB, two that four steady ones passed for 0.76 to 0.83.
 LEAST_LIKE, LEAST_LIKE_FEW, LEAST_LIKE_CHANGING = 0.65, 0.75, 0.88
 
 #: Two rotors whose rates the dwell does not tell apart flash together by chance, the more often the fewer orders show
-#: it. With fewer than this to each side unlike powers, or an odd number of combs, are the only signs of them: without
-#: these signs 19 of 138 sets that pass for told at 3.3 and 5.8 GHz were of fewer than the four there were.
+#: it. With fewer than this to each side unlike powers, or an odd number of combs, are the only signs of them: where
+#: an odd number was let pass, 29 of 201 sets told at 3.3 and 5.8 GHz were not of the four there were, else 9 of 181.
 FEW_ORDERS = 16
 
-#: Of more orders an odd number and unlike powers are: three like rotors told apart at 9.85 GHz and 0 dB are within this
-#: in 14 of 17, where three passed for four at 0 dB and 9.85 or 24 GHz they were not in three of three.
+#: Of more orders an odd number and unlike powers are: of three like rotors told at 9.85 GHz and 0 dB the powers are
+#: within this in 14 of 17, where four passed for three at 0 dB and 9.85 or 24 GHz they were not in three.
 ODD_POWER = 1.45
 
 #: Blades that reflect at their tips are taken for this many, at most.
