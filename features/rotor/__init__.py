@@ -9,7 +9,7 @@ comb_search, comb_sums, flashes, octaves, folding, common_fraction, flash_rate, 
     one side of that; or why there is no comb.
 comb_fit, weak_lines, turning, drift, changing, changing_fit
     Combs fitted below the bin: steady ones, of blades not quite alike, of rates that change within the dwell.
-gain, rotors, unresolved, points, left_flashes, flash_count, helicopter
+gain, rotors, unresolved, points, left_flashes, like_lines, flash_count, helicopter
     A gain that all lines share; single rotors told apart, whether these are all, or blades are rows of a few points,
     whether one's comb is that of a turn; a main and a tail rotor.
 line_shapes, line_likelihood, rotor_band, family_edge

@@ -166,11 +166,11 @@ def _line_powers(fits: Sequence[CombFit]) -> list[NDArray[np.floating]]:
     return [squared(fit.amplitudes[np.abs(fit.orders) <= common]) for fit in fits]
 
 
-def may_hold(fits: Sequence[CombFit]) -> NDArray[np.float64]:
-    """How many rotors each comb may be, by its power over that of the weakest one: 1, or more, no whole number."""
+def may_hold(fits: Sequence[CombFit], least: float = TWO_POWER) -> NDArray[np.float64]:
+    """How many rotors each comb may be, by its power over that of the weakest one: 1, or `least` and more."""
     powers = np.array([powers.mean() for powers in _line_powers(fits)])
     times = np.minimum(powers / powers.min(), MAX_ROTORS)
-    return np.where(times > TWO_POWER, times, 1.0)
+    return np.where(times > least, times, 1.0)
 
 
 def hidden_shift(fits: Sequence[CombFit]) -> float:
