@@ -11,6 +11,7 @@ from .bandwidth import threshold_band_hz
 from .body_velocity import body_velocity, folded
 from .chopping import Chopping
 from .dropouts import filled
+from .free_side import with_free_side
 from .measurements import BODY, EACH_ROTOR, Measurements
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .rotor.even_pulses import even_pulses
@@ -77,6 +78,7 @@ def measure_record(
     out |= {"rotors_resolved": False, "gear_reason": "no comb", "band_reason": ""}
     if 0 < largest_part(iq) < LEAST_PART:
         return out | {"reason": "no digits left in samples this small: raise the gain"}
+    spectrum = with_free_side(spectrum)
     data = prepared(iq, spectrum)
     if data is None:
         return out | {"reason": "no signal"}
@@ -125,7 +127,8 @@ def _found(
         spoilt = np.zeros(len(iq), bool)
         spoilt[places] = True
         iq = filled(iq, spoilt)
-        pulsed, spectrum = spectrum, doppler_spectrum(iq, carrier_hz=spectrum.carrier_hz, prf_hz=spectrum.prf_hz)
+        again = doppler_spectrum(iq, carrier_hz=spectrum.carrier_hz, prf_hz=spectrum.prf_hz)
+        pulsed, spectrum = spectrum, with_free_side(again)
         rate_hz = spectrum.prf_hz * (len(places) - 1) / (places[-1] - places[0])
         no_rotor = f"no rotor: single pulses {rate_hz:.1f} times a second, as of another radar"
         without = prepared(iq, spectrum)
