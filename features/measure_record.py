@@ -11,6 +11,7 @@ from .bandwidth import threshold_band_hz
 from .body_velocity import body_velocity, folded
 from .chopping import Chopping
 from .dropouts import filled
+from .free_side import with_free_side
 from .measurements import BODY, EACH_ROTOR, Measurements
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .rotor.even_pulses import even_pulses
@@ -25,6 +26,7 @@ from .rotor.family import (
 )
 from .rotor.family_edge import SPAN, edge_around, edge_of_lines, span_of, surer_edge
 from .rotor.folding import FASTEST_TIP_MPS, fastest_tip
+from .rotor.past_edge import PastEdge, past_edge_of
 from .rotor.periodogram import Periodogram, prepared
 from .rotor.rotors import MAX_ROTORS, hidden_shift
 from .rotor.sidebands import sideband_spacing
@@ -77,10 +79,11 @@ def measure_record(
     out |= {"rotors_resolved": False, "gear_reason": "no comb", "band_reason": ""}
     if 0 < largest_part(iq) < LEAST_PART:
         return out | {"reason": "no digits left in samples this small: raise the gain"}
+    spectrum = with_free_side(spectrum)
     data = prepared(iq, spectrum)
     if data is None:
         return out | {"reason": "no signal"}
-    data, spectrum, family, why = _found(iq, data, spectrum, blades)
+    iq, data, spectrum, family, why = _found(iq, data, spectrum, blades)
     body = body_line(spectrum)
     mask = notch_mask(spectrum, body)
     low, high = threshold_band_hz(spectrum, PAPER_THRESHOLD_DB)
@@ -89,7 +92,7 @@ def measure_record(
     if family is not None:
         family = by_turns(family, blades)
         edge = _edge(family, blades)
-        why = slower_than_rotors(family.data, *edge) or too_few_flashes(family) or _of_supply(family)
+        why = slower_than_rotors(family.data, family.comb.fit, *edge) or too_few_flashes(family) or _of_supply(family)
     if family is None or why:
         return out | {"reason": why} | _named(BODY, body_velocity(data, spectrum, None))
     if data.one_channel:  # about a body whose sides lie in one another nothing is even: its own line tells
@@ -106,17 +109,17 @@ def measure_record(
         return out
     family = told_from_multiples(family)
     out |= _turning(family) | _geared(family)
-    out |= _band(family, edge, beta_rad)
+    out |= _band(family, edge, beta_rad, _past(family, iq, edge))
     out |= _blade(family, out, blades)
     return out | {"smearing_index": _index(family, spectrum, body, mask, out["chopping_hz"])}
 
 
 def _found(
     iq: NDArray[np.complex64], data: Periodogram, spectrum: Spectrum, blades: int | None
-) -> tuple[Periodogram, Spectrum, Family | None, str]:
+) -> tuple[NDArray[np.complex64], Periodogram, Spectrum, Family | None, str]:
     """The line family of a record, or why there is none; where it is of another radar's pulses, without these.
 
-    The record made ready and its spectrum are those that it was found in.
+    The samples, the record made ready and its spectrum are those that it was found in.
     """
     family, why = find_family(data, spectrum, blades)
     for _ in range(MOST_RADARS):
@@ -125,16 +128,17 @@ def _found(
         spoilt = np.zeros(len(iq), bool)
         spoilt[places] = True
         iq = filled(iq, spoilt)
-        pulsed, spectrum = spectrum, doppler_spectrum(iq, carrier_hz=spectrum.carrier_hz, prf_hz=spectrum.prf_hz)
+        again = doppler_spectrum(iq, carrier_hz=spectrum.carrier_hz, prf_hz=spectrum.prf_hz)
+        pulsed, spectrum = spectrum, with_free_side(again)
         rate_hz = spectrum.prf_hz * (len(places) - 1) / (places[-1] - places[0])
         no_rotor = f"no rotor: single pulses {rate_hz:.1f} times a second, as of another radar"
         without = prepared(iq, spectrum)
         if without is None:  # they were all there is
-            return data, pulsed, None, no_rotor
+            return iq, data, pulsed, None, no_rotor
         data = without
         family, _ = find_family(data, spectrum, blades)
         why = no_rotor
-    return data, spectrum, family, why
+    return iq, data, spectrum, family, why
 
 
 def _of_supply(family: Family) -> str:
@@ -207,7 +211,14 @@ def _geared(family: Family) -> dict[str, Any]:
     }
 
 
-def _band(family: Family, edge: tuple[float, float], beta_rad: float | None) -> dict[str, Any]:
+def _past(family: Family, iq: NDArray[np.complex64], edge: tuple[float, float]) -> PastEdge:
+    """What lies past the edge of all rotors' lines, of the samples that these were found in."""
+    rotors = family.rotors
+    rates = [*map(float, rotors.rates), family.comb.chopping]
+    return past_edge_of(family.data, iq, rotors.fits[0].centre, rates, rotors.spread, edge)
+
+
+def _band(family: Family, edge: tuple[float, float], beta_rad: float | None, past: PastEdge) -> dict[str, Any]:
     """Doppler bandwidth and tip speed, or why there is none.
 
     Parameters
@@ -218,14 +229,18 @@ def _band(family: Family, edge: tuple[float, float], beta_rad: float | None) -> 
         From `_edge`.
     beta_rad
         As in `measure`.
+    past : PastEdge
+        What lies past that edge.
     """
     data, (away, std), span = family.data, edge, span_of(family.data, family.rotors.fits)
     mps = data.span_mps
     furthest, why = FURTHEST_EDGE * span / SPAN, ""
     not_told = family.comb.fit.is_folded and not family.is_told_apart
+    # of rotors not told apart lines that come back may pass for all there are; what lies past these must show
+    no_end = past.flashes or not (past.seen or family.is_told_apart)
     if data.one_channel:
         why = ONE_CHANNEL
-    elif family.fills_span or not_told or not away + EDGE_DEVIATIONS * std < furthest:
+    elif family.fills_span or not_told or no_end or not away + EDGE_DEVIATIONS * std < furthest:
         why = (
             f"no band: lines may fill the unambiguous span, tips of {furthest * mps:.1f} m/s and more: raise the PRF"
             if span < fastest_tip(data)

@@ -32,7 +32,7 @@ _LEAST = np.array(1e-36, np.float32)  # under any power that is not 0: divides i
 _SAFE_ENERGY = np.array(1e-14, np.float32), np.array(1e30, np.float32)
 _FLOOR_QUANTILE = 0.25
 _FLOOR_BLOCKS = 64  # a side of the spectrum
-_EMPTY_RATIO = np.array(4, np.float32)  # a side this much below the other holds no noise of its own
+EMPTY_RATIO = np.array(4, np.float32)  # a side this much below the other holds no noise of its own
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,9 +310,29 @@ def noise_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
     ndarray of float32, shape (...)
         Mean noise power of a bin.
     """
-    half = power.shape[-1] // 2
-    if half < 2:
+    if power.shape[-1] < 4:
         return power.mean(axis=-1)
+    sums_of, size = side_sums(power)
+    blocks = sums_of.shape[-1]
+    rank = quartile_rank(blocks)
+    sums_of.partition(rank, axis=-1)
+    one, other = sums_of[..., 0, rank], sums_of[..., 1, rank]
+    least, most = np.minimum(one, other), np.maximum(one, other)
+    level = np.where(most > EMPTY_RATIO * least, most, (least + most) * _HALF)
+    return np.divide(level, quartile_of_noise(power.shape[-1], size, blocks))
+
+
+def side_sums(power: NDArray[np.float32]) -> tuple[NDArray[np.float32], int]:
+    """Sums over blocks of so many neighbouring bins of both sides of centred power spectra of at least 4 bins.
+
+    Returns
+    -------
+    sums : ndarray of float32, shape (..., 2, blocks)
+        From the lowest frequency up.
+    size : int
+        Bins of a block.
+    """
+    half = power.shape[-1] // 2
     size = max(1, half // _FLOOR_BLOCKS)
     blocks = half // size
     # two sides alike, each in its blocks, without the bin at half the PRF, which has no mirror
@@ -320,13 +340,7 @@ def noise_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
     sides = windows(power, (2, blocks, size), (power.shape[-1] - lower - blocks * size, size, 1), lower)
     # rows of so few numbers are read in whole registers, and what lies behind the last, if no number, raises a flag
     with np.errstate(invalid="ignore"):
-        means = np.matmul(sides, ones(size))
-    rank = quartile_rank(blocks)
-    means.partition(rank, axis=-1)
-    one, other = means[..., 0, rank], means[..., 1, rank]
-    least, most = np.minimum(one, other), np.maximum(one, other)
-    level = np.where(most > _EMPTY_RATIO * least, most, (least + most) * _HALF)
-    return np.divide(level, quartile_of_noise(power.shape[-1], size, blocks))
+        return np.matmul(sides, ones(size)), size
 
 
 @lru_cache(maxsize=64)

@@ -97,7 +97,7 @@ def noise_floor(power: Value, bins: int) -> Value:
     levels = sides.reshape(-1, 2, blocks, size).sum(keep=False).ranked(definition.quartile_rank(blocks)).squeeze()
     one, other = levels.slice(0, 1), levels.slice(1, 2)
     least, most = one.at_most(other), one.at_least(other)
-    level = power.graph.where(most > definition._EMPTY_RATIO * least, most, (least + most) / 2)
+    level = power.graph.where(most > definition.EMPTY_RATIO * least, most, (least + most) / 2)
     return level / float(definition.quartile_of_noise(bins, size, blocks))
 
 

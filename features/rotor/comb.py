@@ -23,6 +23,7 @@ from .comb_search import (
 from .common_fraction import of_one_rotor
 from .flash_rate import of_flashes
 from .folding import may_come_back
+from .past_edge import told_no_further
 from .periodogram import Periodogram
 
 #: Score that chance alone exceeds in under 1 % of the records: of white noise; where a line was taken out; where the
@@ -311,10 +312,11 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
         return None, f"no comb: fewer than {LEAST_LINES} lines"
     fit = fitted[0][0]
-    reach_mps = max(start.high, -start.low) * fit.spacing * data.span_mps
+    reach = max(start.high, -start.low) * fit.spacing
+    reach_mps = reach * data.span_mps
     if reach_mps < LEAST_REACH_MPS:
         reason = f"no rotor: lines reach {reach_mps:.1f} m/s, rotors {LEAST_REACH_MPS:.0f} m/s and more"
-        return None, span_too_slow(data) or reason
+        return None, span_too_slow(data) or told_no_further(data, fit, reach) or reason
     finer = finer_spacing(data, fit)
     if finer is not None:
         least_s = MIN_SPACING_BINS / finer / data.prf_hz

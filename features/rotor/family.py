@@ -18,6 +18,7 @@ from .flash_count import flashes_in_period
 from .flash_rate import may_be_fraction
 from .gain import Evened
 from .helicopter import Gear, find_gear
+from .past_edge import told_no_further
 from .periodogram import Level, Periodogram, prepared_again
 from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
 from .turning import DEGREES, bend, is_sure
@@ -107,13 +108,13 @@ class Family:
         return np.array([[bend(own, self.data.pulses) for own in values] for values in self.ahead])
 
 
-def slower_than_rotors(data: Periodogram, edge: float, edge_std: float) -> str:
-    """Why a line family of this edge [cycles a sample] is no rotor's; empty where it may be one's."""
+def slower_than_rotors(data: Periodogram, fit: CombFit, edge: float, edge_std: float) -> str:
+    """Why a line family of this comb and edge [cycles a sample] is no rotor's; empty where it may be one's."""
     edge_mps, edge_std_mps = (value * data.span_mps for value in (edge, edge_std))
-    if edge_mps + edge_std_mps < LEAST_REACH_MPS:
-        reason = f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
-        return span_too_slow(data) or reason
-    return ""
+    if not edge_mps + edge_std_mps < LEAST_REACH_MPS:
+        return ""
+    reason = f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
+    return span_too_slow(data) or told_no_further(data, fit, edge, edge_std) or reason
 
 
 def as_wheels(data: Periodogram, edge: float, velocity_mps: float) -> str:
@@ -355,7 +356,7 @@ def _as_it_is(
     if comb is None:
         return None, why
     edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades)
-    if slow := slower_than_rotors(data, edge, std):
+    if slow := slower_than_rotors(data, comb.fit, edge, std):
         return None, slow
     fills_span = bool(np.isinf(edge))
     furthest = min(edge, span_of(data, [comb.fit]))
