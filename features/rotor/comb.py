@@ -25,6 +25,7 @@ from .flash_rate import of_flashes
 from .folding import may_come_back
 from .past_edge import told_no_further
 from .periodogram import Periodogram
+from .wide_line import beside_line
 
 #: Score that chance alone exceeds in under 1 % of the records: of white noise; where a line was taken out; where the
 #: static background was, with its skirt, or in one channel, whose combs are sought about two places [nats]. Checked by
@@ -307,7 +308,8 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
         return None, _too_short(data)
     if start.score < threshold(data):
         return None, f"no comb: evidence {start.score:.1f} nats, {threshold(data):.0f} are needed"
-    start, open_orders, has_line = centred(data, of_flashes(data, of_one_rotor(data, start)))
+    start = of_flashes(data, of_one_rotor(data, beside_line(data, start)))
+    start, open_orders, has_line = centred(data, start)
     fitted = fit_combs(data, start.centre, [start.spacing], [(start.low, start.high)])
     if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
         return None, f"no comb: fewer than {LEAST_LINES} lines"

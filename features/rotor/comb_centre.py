@@ -11,6 +11,7 @@ from .comb_search import FINE_STEPS, Candidate, even_scores, factors_about
 from .folding import outermost_orders
 from .one_sided import Sides
 from .periodogram import Periodogram
+from .wide_line import is_beside
 
 #: What speaks for the comb's centre where a line stands so far over all others of it [nats, dB], and more for each dB
 #: beyond. Blades may be the stronger: then their outermost lines are, and say nothing of the body.
@@ -196,7 +197,7 @@ def _scores_about(
 def _is_own(data: Periodogram, found: Candidate, line: float) -> bool:
     """False for another target's line, about which the comb has no lines: it says nothing of the body's."""
     nearest = found.centre + found.spacing * round((line - found.centre) / found.spacing)
-    if abs(line - nearest) * data.pulses < ON_COMB_BINS:
+    if abs(line - nearest) * data.pulses < ON_COMB_BINS or is_beside(data, found, line):
         return True
     there, own = _scores_about(data, found, np.array([line, nearest]))[1].max(axis=0)
     return bool(there > OWN_SHARE * own)
@@ -247,12 +248,14 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
             nats += REST
         else:
             nats = min(nats, REST + max(HOVERS - moving, 0.0))
-        orders = (centre - found.centre) / found.spacing
+        # a wide line's top is not its mean, which the comb was sought about
+        place = found.centre if is_beside(data, found, centre) else centre
+        orders = (place - found.centre) / found.spacing
         # several rotors' spacings differ: the further off, the less one comb for them all tells where a line must be
         from_middle = abs(orders - (found.low + found.high) / 2)
         off = (orders - round(orders)) * found.spacing * data.pulses / (1 + 0.2 * from_middle)
         if abs(off) < 1.5 and level_db > LINE_DB:
-            out.append((centre, nats - 16 * off**2))
+            out.append((place, nats - 16 * off**2))
     even: dict[int, float] = {}
     if not found.is_folded:  # on both sides of any line there are those of the other end
         if max(nats for _, nats in out) < TELLS:
