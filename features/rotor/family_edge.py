@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..lines import LineSpace
 from .comb import Comb
@@ -96,7 +96,7 @@ def edge_of_lines(
     rest: NDArray[np.complex128],
     per_turn: int,
     blades: int | None,
-    tail: NDArray[np.float64] | float | None = None,
+    others: ArrayLike = (),
 ) -> tuple[float, float]:
     """Edge of the line family by the fitted lines, both sides together.
 
@@ -115,8 +115,8 @@ def edge_of_lines(
         Strong lines are this many spacings of a fit apart.
     blades : int, optional
         Of a rotor.
-    tail : float or ndarray, optional
-        Spacing of another comb about the same centre [cycles a sample], whose outer lines may not have been fitted.
+    others : array_like, optional
+        Spacings of other combs about the same centre [cycles a sample], whose outer lines may not have been fitted.
 
     Returns
     -------
@@ -128,9 +128,18 @@ def edge_of_lines(
     fastest = float(spacings.max())
     like = spacings > LIKE_SHARE * fastest
     if not like.all():
-        alike, others = ([fit for fit, own in zip(fits, group, strict=True) if own] for group in (like, ~like))
-        of_alike = edge_of_lines(data, alike, rest, per_turn, blades, spacings[~like])
-        return max(of_alike, edge_of_lines(data, others, rest, per_turn, blades, spacings[like]))
+        edges = (
+            edge_of_lines(
+                data,
+                [fit for fit, own in zip(fits, group, strict=True) if own],
+                rest,
+                per_turn,
+                blades,
+                np.append(others, spacings[~group]),
+            )
+            for group in (like, ~like)
+        )
+        return max(edges)
     span = span_of(data, fits)
     order = _orders(fastest, span)
     sides = np.array([[-1], [1]]) * order
@@ -138,8 +147,7 @@ def edge_of_lines(
     frequency = np.asarray(centres[:, None, None] + spacings[:, None, None] * sides, np.float64)
     fitted = np.stack([_amplitudes_at(fit, per_turn * sides) for fit in fits])
     left = LineSpace(rest).at(frequency.ravel())[0].reshape(frequency.shape)
-    every = spacings if tail is None else np.append(spacings, tail)
-    usable = data.usable(frequency) & ~_covered(every, order, data.pulses)[: len(fits), None]
+    usable = data.usable(frequency) & ~_covered(np.append(spacings, others), order, data.pulses)[: len(fits), None]
     power = np.abs(left + fitted) ** 2 * data.pulses
     usable &= ~_foreign(np.where(usable, power, 0.0).sum(axis=0), usable.sum(axis=0))
     total = np.where(usable, power, 0.0).sum(axis=(0, 1))
