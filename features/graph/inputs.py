@@ -131,8 +131,9 @@ def _none_lost(graph: Graph, size: Value, pulses: int) -> Value:
     there = is_there.to(np.float32)
     beside = graph.op("MaxPool", there.reshape(-1, 1, pulses), kernel_shape=[3], pads=[1, 1]).reshape(-1, pulses)
     zeros = (beside - there).sum()
-    of_a_step = size <= -graph.where(is_there, -size, -1.0).max() * (1 + _OF_A_STEP)
-    return (zeros < float(LEAST_LOST)) | (zeros < of_a_step.count() - (1.0 - there).sum())
+    others = graph.where(is_there, size, float(np.finfo(np.float32).max))
+    of_a_step = others <= others.min() * (1 + _OF_A_STEP)
+    return (zeros < float(LEAST_LOST)) | (zeros < of_a_step.count())
 
 
 def _feature_vector(

@@ -112,6 +112,10 @@ class Value:
         """Largest along an axis, which stays with length 1."""
         return self._reduce("ReduceMax", axis, keep)
 
+    def min(self) -> "Value":
+        """Smallest along the last axis, which stays with length 1."""
+        return self._reduce("ReduceMin", -1, True)
+
     def count(self) -> "Value":
         """Number of true values along the last axis, as float32, exact up to 2**24."""
         return self.to(np.float32).sum()
