@@ -12,13 +12,15 @@ if TYPE_CHECKING:
     from .inference import Classifier
     from .predict import answer
     from .recording import Recording, load_recording
+    from .track import fuse
 
-__all__ = ["BadInput", "Classifier", "Recording", "answer", "load_recording"]
+__all__ = ["BadInput", "Classifier", "Recording", "answer", "fuse", "load_recording"]
 
 _WHERE = {
     "Classifier": ".inference",
     "Recording": ".recording",
     "answer": ".predict",
+    "fuse": ".track",
     "load_recording": ".recording",
 }
 

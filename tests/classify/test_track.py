@@ -1,5 +1,6 @@
 from functools import partial
 
+import bladewing.classify
 import numpy as np
 import pytest
 from bladewing.classify.fusion import CORRELATION, LOOKS, ODDS
@@ -363,3 +364,17 @@ def test_a_flapping_bird_shows_its_wingbeat_in_the_track_and_a_short_one_none():
         assert beat_hz == pytest.approx(truth_hz, abs=0.3)
     short = Recording("x", records.iq[clear[0]][:8000], radar.carrier_hz, radar.prf_hz)
     assert "wings" not in answer(short, Classifier.load()).shown
+
+
+def test_frames_with_gaps_between_them_make_a_track():
+    """As an FMCW radar sends chirps: 13 ms of them every 50 ms."""
+    uav = AIRFRAMES["type1"].fields | {"name": "drone", "velocity_mps": 12.0}
+    radar = {"carrier_hz": 9.85e9, "prf_hz": 20e3, "pulses": 20_000}
+    drone, nothing = (Scene.build({"radar": radar, **parts}).render(3).iq for parts in ({"uav": [uav]}, {}))
+    clf = Classifier.load()
+    for iq, label in ((drone, "uav"), (nothing, "clutter")):
+        frames = iq.reshape(-1, 1000)[:, :256]
+        p = clf.predict(frames, carrier_hz=9.85e9, prf_hz=20e3)
+        track = bladewing.classify.fuse(p.probabilities, p.labels, rule=clf.decide, dwell_s=frames.shape[1] / 20e3)
+        assert (track.label, track.declared, track.used) == (label, label, len(frames))
+        assert track.probabilities.max() > p.probabilities.mean(axis=0).max()
