@@ -8,9 +8,8 @@ import numpy as np
 from bladewing.models.calibration import expected_calibration_error
 from bladewing.simulate import Radar, draw_records
 
-from .cascade import Cascade
 from .gather import Gathered
-from .inference import Classifier
+from .inference import Cascade, Classifier
 from .ladder import CASCADE, COST_KEY, PULSES, RECORDS, STAGES_KEY, by_place
 from .training_account import figures
 
