@@ -40,7 +40,8 @@ def axis_plan(bins: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
 
 @lru_cache(maxsize=64)
-def _radar_values(carrier_hz: float, prf_hz: float, pulses: int) -> dict[str, float]:
+def radar_columns(carrier_hz: float, prf_hz: float, pulses: int) -> dict[str, float]:
+    """What the radar allows to be seen, as logarithms."""
     wavelength_m, dwell_s = SPEED_OF_LIGHT_MPS / carrier_hz, pulses / prf_hz
     return {
         "velocity_step_log": math.log10(wavelength_m / (2 * dwell_s)),
@@ -48,11 +49,6 @@ def _radar_values(carrier_hz: float, prf_hz: float, pulses: int) -> dict[str, fl
         "dwell_log": math.log10(dwell_s),
         "pulses_log": math.log10(pulses),
     }
-
-
-def radar_columns(spectrum: Spectrum) -> dict[str, float]:
-    """What the radar allows to be seen, as logarithms."""
-    return _radar_values(spectrum.carrier_hz, spectrum.prf_hz, spectrum.pulses)
 
 
 def lay_out(columns: Mapping[str, ArrayLike], table: FeatureTable, shape: tuple[int, ...]) -> NDArray[np.float32]:
@@ -141,7 +137,7 @@ def feature_vector(
     speed_mps = np.abs(body.velocity_mps)  # refined from the bin at half the PRF it may lie beyond: folded back
 
     columns: dict[str, ArrayLike] = {
-        **radar_columns(spectrum),
+        **radar_columns(spectrum.carrier_hz, spectrum.prf_hz, spectrum.pulses),
         "body_level_db": body.level_db,
         "body_speed_mps": np.minimum(speed_mps, np.float32(spectrum.prf_hz * spectrum.wavelength_m / 2) - speed_mps),
         "rest_level_db": np.maximum.reduce(spectrum.level_db[..., half - 1 : half + 2], axis=-1),

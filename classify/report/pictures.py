@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from bladewing.features import doppler_spectrum
@@ -181,14 +181,8 @@ def _squares(lines: NDArray[np.complex64]) -> NDArray[np.float32]:
 
 def radar_numbers(radar: Radar, count: int) -> NDArray[np.float32]:
     """What the radar allows to be seen, the same for each of so many records, shape (count, 4)."""
-    return np.tile(_radar_row(radar), (count, 1))
-
-
-@lru_cache(maxsize=64)
-def _radar_row(radar: Radar) -> NDArray[np.float32]:
-    blank = np.ones((1, radar.pulses), np.complex64)
-    spectrum = doppler_spectrum(blank, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
-    return np.array(list(radar_columns(spectrum).values()), np.float32)
+    columns = radar_columns(radar.carrier_hz, radar.prf_hz, radar.pulses)
+    return np.tile(np.array(list(columns.values()), np.float32), (count, 1))
 
 
 def in_blocks(make: Maker, iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:

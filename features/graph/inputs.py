@@ -163,7 +163,7 @@ def _feature_vector(
     speed_mps = body.velocity_mps.apply("Abs")
 
     columns: dict[str, Value | float] = {
-        **radar_columns(radar),
+        **radar_columns(radar.carrier_hz, radar.prf_hz, radar.pulses),
         "body_level_db": body.level_db,
         "body_speed_mps": speed_mps.at_most(radar.prf_hz * radar.wavelength_m / 2 - speed_mps),
         "rest_level_db": level_db.slice(half - 1, half + 2).max(),
