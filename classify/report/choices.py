@@ -87,7 +87,7 @@ def draw_sets(
     *,
     seed: int,
     on_done: OnDone,
-    ask: Callable[[str, NDArray[np.complex64], Radar], None] | None = None,
+    ask: Callable[[str, NDArray[np.complex64], Radar], None],
 ) -> dict[str, FrontSet]:
     """Draw records of every dwell and keep the named inputs of them.
 
@@ -101,7 +101,7 @@ def draw_sets(
     seed : int
     on_done : callable
         Called with the share done.
-    ask : callable, optional
+    ask : callable
         Shown every block of samples (purpose, samples, radar) before they are dropped, in order.
 
     Returns
@@ -133,8 +133,7 @@ def draw_sets(
                 kept["radar"].append(radar_numbers(radar, some))
                 labels.append(records.label_indices)
                 snr_db.append(np.asarray(records.truth["snr_db"], np.float64))
-                if ask is not None:
-                    ask(purpose, records.iq, radar)
+                ask(purpose, records.iq, radar)
                 done += some * dwell_s
                 on_done(done / total)
         sets[purpose] = FrontSet(

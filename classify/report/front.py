@@ -329,7 +329,7 @@ def _accuracy(point: Mapping[str, Any], by: str = "balanced_accuracy") -> float:
 
 
 def _mark(rows: Sequence[Mapping[str, Any]]) -> None:
-    """Say of every cost which points nothing beats: ``front`` in each entry of ``cost``, ``front_stored``."""
+    """Say of every cost which points nothing beats: ``front`` in each entry of ``cost``."""
     points = [(row, point) for row in rows for point in row["dwells"]]
     accuracy = [_accuracy(point) for _, point in points]
     for place in range(len(BATCHES)):
