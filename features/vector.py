@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .axis import axis_velocities_mps
 from .bandwidth import energy_band_mps, noise_threshold_db, threshold_band_hz
-from .change import busy_db, centroid_mps, change_db, swing
+from .change import busy_db, centroid_mps, swing
 from .chopping import cepstral_chopping
 from .notch import Body, notch_residual_db, residual, weights
 from .schema import FEATURES, FeatureTable
@@ -84,7 +84,7 @@ def feature_vector(
     mask: NDArray[np.bool_],
     axis_db: NDArray[np.float32],
     parts: NDArray[np.float32],
-    change: NDArray[np.float32] | None = None,
+    change: NDArray[np.float32],
 ) -> NDArray[np.float32]:
     """Every number of the schema's `FEATURES`, in its order.
 
@@ -100,8 +100,8 @@ def feature_vector(
         Their mean level on the shared axis.
     parts : ndarray of float32, shape (..., PARTS, axis bins)
         Levels of the dwells' parts, from `parts_db`.
-    change : ndarray of float32, shape (..., axis bins), optional
-        `change_db(parts)` if it is at hand.
+    change : ndarray of float32, shape (..., axis bins)
+        Their change, from `change_db`.
 
     Returns
     -------
@@ -122,7 +122,6 @@ def feature_vector(
     low, high, occupancy = energy_band_mps(spectrum, energy)
 
     axis_mps, change_shares = axis_plan(axis_db.shape[-1])
-    change = change_db(parts) if change is None else change
     changes = (change_shares @ change[..., None])[..., 0]
     centroid = centroid_mps(parts, axis_mps)
     half, side = spectrum.bins // 2, (spectrum.bins - 1) // 2  # without the bin at half the PRF, which has no mirror

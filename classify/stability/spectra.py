@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 from bladewing.features import measure
-from bladewing.features.bandwidth import energy_band_mps, threshold_band_hz
+from bladewing.features.bandwidth import energy_band_mps, noise_threshold_db, threshold_band_hz
 from bladewing.features.cadence import CLIP, LEAST_MEAN, cadence_db, cadence_plan
 from bladewing.features.chopping import CLIP_DB, cepstrum, noise_shape
 from bladewing.features.comb_levels import comb_heights, comb_plan
@@ -202,7 +202,8 @@ def _band_error(iq: NDArray[np.complex64]) -> float:
     spectrum, mask = _notched(iq)
     for one in (spectrum, _long(spectrum)):
         excess = residual(one, mask)
-        edges.append(np.array([*energy_band_mps(one, excess)[:2], *threshold_band_hz(one, mask=mask)], np.float64))
+        threshold = threshold_band_hz(one, noise_threshold_db(one.bins), mask)
+        edges.append(np.array([*energy_band_mps(one, excess)[:2], *threshold], np.float64))
     step_hz = _PRF_HZ / spectrum.bins
     steps = np.array([step_hz * _WAVELENGTH_M / 2] * 2 + [step_hz] * 2)
     return float(np.abs((edges[0] - edges[1]) / steps).max())

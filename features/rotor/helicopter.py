@@ -185,7 +185,7 @@ def _left_over(data: Periodogram, comb: Comb) -> tuple[Periodogram, NDArray[np.b
     rest = data.left(comb.rest)
     hidden = _hidden(rest, comb.fit)
     power = rest.power * rest.level
-    level = np.maximum(local_level(power, ~hidden, 1.0, rest.block), LEAST_LEVEL)
+    level = np.maximum(local_level(power, ~hidden, rest.block), LEAST_LEVEL)
     return replace(rest, power=(power / level).astype(np.float32), level=level), hidden
 
 
