@@ -17,14 +17,11 @@ from .shape import band_levels_db, entropy, ripple_db, symmetry
 from .smearing import smearing_index
 from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, sums
 
-#: Energy counts where the level is this far over the floor [dB]: noise passes it in 2 % of the bins.
-SIGNIFICANT_DB = 6.0
-
-_SIGNIFICANT = np.float32(10 ** (SIGNIFICANT_DB / 10) - 1)
-
+#: Energy over the floor counts from here on, where the level is 6 dB: noise passes it in 2 % of the bins.
+SIGNIFICANT = np.float32(10 ** (6.0 / 10) - 1)
 
 #: Names of the bands' levels on the stronger and on the weaker side.
-_BANDS = tuple([f.name for f in FEATURES if f.name.startswith(stem)] for stem in ("strong_", "weak_"))
+BANDS = tuple([f.name for f in FEATURES if f.name.startswith(stem)] for stem in ("strong_", "weak_"))
 
 #: Speeds that part the change over the dwell into slow, middle and fast [m/s].
 _CHANGE_MPS = (3.0, 20.0)
@@ -112,7 +109,7 @@ def feature_vector(
     above = residual(spectrum)
     total = sums(above)
     excess = np.multiply(above, kept, out=above)
-    energy = excess * weights(excess > _SIGNIFICANT)  # a choice bin by bin would cost ten times as much
+    energy = excess * weights(excess > SIGNIFICANT)  # a choice bin by bin would cost ten times as much
     root = np.sqrt(energy)
     chopping = cepstral_chopping(spectrum, kept)
     residual_db = notch_residual_db(spectrum, kept)
@@ -168,6 +165,6 @@ def feature_vector(
         "busy_swing_db": swing(busy_db(parts)),
         "empty_side_db": np.abs(np.log10(np.maximum(left, emptiest) / np.maximum(right, emptiest))) * np.float32(10),
     }
-    for names, levels in zip(_BANDS, band_levels_db(axis_db), strict=True):
+    for names, levels in zip(BANDS, band_levels_db(axis_db), strict=True):
         columns.update(zip(names, levels.reshape(-1, len(names)).T, strict=True))
     return lay_out(columns, FEATURES, spectrum.floor.shape)
