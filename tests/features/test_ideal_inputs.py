@@ -11,7 +11,6 @@ from bladewing.simulate.scene import Scene
 from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, WAVELENGTH_M, rotors, tone, white
 
 NAMES = [f.name for f in FEATURES]
-RADAR_NAMES = ("velocity_step_log", "unambiguous_log", "dwell_log", "pulses_log")
 STEP_HZ = 240.0  # of the comb, off the bin
 
 
