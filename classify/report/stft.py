@@ -11,7 +11,7 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from .timing import Work, quote, ratio, time_in_turns
+from ..timing import Work, quote, ratio, time_in_turns
 
 # The paper's claim: how many times faster one FFT is than the STFT, by number of samples.
 PAPER_RATIOS = {2000: (19.0, 46.0), 10_000: (22.0, 77.0)}
