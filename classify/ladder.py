@@ -25,7 +25,7 @@ PLACES = ("fast", "balanced", "best")
 #: A time measured again is longer by a twentieth at most.
 _SCATTER = 1.05
 
-#: Name of the two models that are asked one after the other (see `cascade`), in train.json and where one is loaded.
+#: Name of the two models that are asked one after the other (see `Cascade`), in train.json and where one is loaded.
 CASCADE = "cascade"
 
 #: Key of the cascade's account in train.json: the names of its two models.

@@ -11,6 +11,7 @@ import numpy as np
 
 from .errors import BadInput, unwritable
 from .files import read_bounded, settle, write_together
+from .limits import MOST_TEXT_BYTES
 
 if TYPE_CHECKING:
     from bladewing.simulate.render import Rendering
@@ -18,9 +19,6 @@ if TYPE_CHECKING:
 
 #: Under this name the writer of a recording stands in its metadata.
 RECORDER = "bladewing simulate"
-
-#: More metadata than this no rendering has [bytes].
-MOST_META_BYTES = 16 << 20
 
 #: Version of the fields under "bladewing:".
 EXTENSION_VERSION = "1.0.0"
@@ -77,7 +75,7 @@ def _foreign(meta: Path, data: Path) -> Path | None:
     if not meta.exists():
         return data if data.exists() else None
     try:
-        recorder = json.loads(read_bounded(meta, MOST_META_BYTES))["global"]["core:recorder"]
+        recorder = json.loads(read_bounded(meta, MOST_TEXT_BYTES))["global"]["core:recorder"]
     except (OSError, ValueError, LookupError, TypeError):
         return meta
     return None if recorder == RECORDER else meta

@@ -226,7 +226,7 @@ def train_one(
         expected_calibration_error,
         fit_vector_scaling,
     )
-    from bladewing.models.export import TABULAR_TOLERANCE, attach_metadata, check_export
+    from bladewing.models.export import NETWORK_TOLERANCE, TABULAR_TOLERANCE, attach_metadata, check_export
     from bladewing.models.operating import least_named, operating_curve
     from bladewing.models.seal import seal
 
@@ -244,9 +244,8 @@ def train_one(
     limits = np.array([conformal_thresholds(calibrated, sets.calibrate.labels, coverage) for coverage in COVERAGES])
     onnx_bytes = export(calibration)
     probabilities = calibration.probabilities(scores_of(sets.test))
-    difference = check_export(
-        onnx_bytes, probabilities, sets.test.inputs, **({} if network else {"tolerance": TABULAR_TOLERANCE})
-    )
+    tolerance = NETWORK_TOLERANCE if network else TABULAR_TOLERANCE
+    difference = check_export(onnx_bytes, probabilities, sets.test.inputs, tolerance)
     labels = sets.test.labels
     account = {
         "inputs": list(LADDER[name].inputs),

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 from bladewing.models.calibration import expected_calibration_error
 from bladewing.simulate import Radar, draw_records
+from scipy import fft
 
-from .cascade import Cascade
 from .gather import Gathered
-from .inference import Classifier
+from .inference import Cascade, Classifier
 from .ladder import CASCADE, COST_KEY, PULSES, RECORDS, STAGES_KEY, by_place
+from .timing import quote, time_in_turns
 from .training_account import figures
 
 _RADAR = Radar(10e9, 25e3, PULSES)
@@ -80,10 +81,6 @@ def costs_ffts(classifiers: Mapping[str, Classifier]) -> dict[str, float]:
     classifiers
         By name.
     """
-    from scipy import fft
-
-    from .report.timing import quote, time_in_turns
-
     iq = draw_records(_RADAR, RECORDS, 0, purpose="bench").iq
     works: dict[str, Callable[[], object]] = {"FFT": lambda: fft.fft(iq)}
     works |= {

@@ -27,7 +27,7 @@ def noise_threshold_db(bins: int) -> float:
 
 
 def threshold_band_hz(
-    spectrum: Spectrum, threshold_db: float | None = None, mask: NDArray[np.bool_] | None = None
+    spectrum: Spectrum, threshold_db: float, mask: NDArray[np.bool_] | None = None
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Lowest and highest frequency over a threshold: the paper's bandwidth rule.
 
@@ -35,9 +35,9 @@ def threshold_band_hz(
     ----------
     spectrum : Spectrum
         Spectra, shape (..., bins).
-    threshold_db : float, optional
+    threshold_db : float
         Threshold over the noise floor [dB]; the paper takes 30 (simulated) and 20 (measured) over the mean amplitude at
-        8-10 kHz. By default the level that noise alone exceeds in 1 % of the spectra.
+        8-10 kHz; `noise_threshold_db` is what noise alone seldom exceeds.
     mask : ndarray of bool, shape (..., bins), optional
         True where the spectrum counts, as from `notch_mask`; by default everywhere.
 
@@ -46,8 +46,6 @@ def threshold_band_hz(
     low_hz, high_hz : ndarray of float32, shape (...)
         [Hz]; both 0 where nothing exceeds the threshold. The bandwidth is their difference.
     """
-    if threshold_db is None:
-        threshold_db = noise_threshold_db(spectrum.bins)
     over = spectrum.relative_power > np.float32(10 ** (threshold_db / 10))
     if mask is not None:
         over &= mask

@@ -32,9 +32,8 @@ _LEAST = np.float32(1e-30)  # divides in the stead of 0
 _BLOCK = 32
 _BEFORE = np.triu(np.ones((_BLOCK, _BLOCK), np.float32), 1)
 
-_NEIGHBOURS = np.array([[-1], [0], [1]])
-_DIVISORS = np.array([[2], [3], [4]])
-_MULTIPLES = np.array([[2], [3]])
+#: A peak and those beside it; fractions of a peak's period that may be the period; multiples at which a comb repeats.
+NEIGHBOURS, DIVISORS, MULTIPLES = (np.array(numbers)[:, None] for numbers in ((-1, 0, 1), (2, 3, 4), (2, 3)))
 
 
 @dataclass(frozen=True)
@@ -194,17 +193,17 @@ def cepstral_chopping(spectrum: Spectrum, mask: Mask) -> Chopping:
     best = _evidence(flat, first, last).argmax(axis=-1)
     best += first
     least = np.maximum(every[begin + best] * np.float32(FUNDAMENTAL_SHARE), rms * np.float32(FUNDAMENTAL_STRENGTH))
-    near = np.rint(best / _DIVISORS).astype(np.intp)
-    around = every[begin + near + _NEIGHBOURS[:, None]]  # (neighbours, divisors, records)
+    near = np.rint(best / DIVISORS).astype(np.intp)
+    around = every[begin + near + NEIGHBOURS[:, None]]  # (neighbours, divisors, records)
     ok = (near >= first) & (np.maximum.reduce(around, axis=0) >= least)
     if ok.any():
         found = near - 1 + around.argmax(axis=0)
-        for number in range(len(_DIVISORS)):  # the smallest strong one wins, so later divisors overrule
+        for number in range(len(DIVISORS)):  # the smallest strong one wins, so later divisors overrule
             best = np.where(ok[number], found[number], best)
     np.minimum(best, count - 2, out=best)
-    left, middle, right = every[begin + best + _NEIGHBOURS]
+    left, middle, right = every[begin + best + NEIGHBOURS]
     period = best + parabola_offset(left, middle, right)
-    again = np.minimum(np.rint(_MULTIPLES * period).astype(np.intp), count - 1)
+    again = np.minimum(np.rint(MULTIPLES * period).astype(np.intp), count - 1)
     repeats = np.add.reduce(every[begin + again], axis=0) * np.float32(0.5) / np.maximum(middle, _LEAST)
     strength = middle / np.maximum(rms, _LEAST)
     frequency = (spectrum.prf_hz / period).astype(np.float32)

@@ -34,7 +34,7 @@ SMOOTH_S = 0.025
 LEAST_DB, LEAST_SHARE, MULTIPLES = 20.0, 0.5, 3
 
 #: Least amplitude of the path [m]. Engines and rotors shake an airframe by tenths of a millimetre (the law of
-#: `vibration_rad`), wings lift a bird by some thousandths of its span, and a torso sways by a centimetre or two
+#: `vibration_m`), wings lift a bird by some thousandths of its span, and a torso sways by a centimetre or two
 #: (Inman, Human Walking, 1981).
 LEAST_M = 0.5e-3
 

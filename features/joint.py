@@ -73,7 +73,7 @@ def joint_vector(image: NDArray[np.float32], spectrum: Spectrum) -> NDArray[np.f
     flash_hz, flash_strength, kurtosis = _flashes(fast, spectrum)
 
     columns: dict[str, NDArray | float] = {
-        **radar_columns(spectrum),
+        **radar_columns(spectrum.carrier_hz, spectrum.prf_hz, spectrum.pulses),
         "joint_bandwidth_mps": width.mean(axis=-1),
         "joint_bandwidth_swing_mps": width.std(axis=-1),
         "joint_centroid_swing_mps": centroid.std(axis=-1),

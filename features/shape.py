@@ -31,14 +31,14 @@ def band_levels_db(
     stronger, weaker : ndarray of float32, shape (..., bands)
         [dB over the floor]; a band wholly outside the unambiguous span holds the axis's own mark for "unseen".
     """
-    both = (_band_shares(axis_db.shape[-1]) @ axis_db[..., None])[..., 0]
+    both = (band_shares(axis_db.shape[-1]) @ axis_db[..., None])[..., 0]
     count = len(SPEED_BANDS_MPS) - 1
     one, other = both[..., :count], both[..., count:]
     return np.maximum(one, other), np.minimum(one, other)
 
 
 @lru_cache(maxsize=4)
-def _band_shares(bins: int) -> NDArray[np.float32]:
+def band_shares(bins: int) -> NDArray[np.float32]:
     """Share of each bin of the shared axis in the mean of each speed band, first of one side and then of the other."""
     edges = np.searchsorted(axis_velocities_mps(bins), SPEED_BANDS_MPS)
     position = np.arange(bins)

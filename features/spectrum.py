@@ -27,12 +27,15 @@ LEAST_FLOOR = np.float32(1e-9)
 _HALF, _ONE, _NO_LIMIT = (np.array(value, np.float32) for value in (0.5, 1, np.inf))
 _DB_A_NEPER = np.array(10 / math.log(10), np.float32)  # of power
 
-_LEAST = np.array(1e-36, np.float32)  # under any power that is not 0: divides in its stead
+#: Under any power that is not 0: divides in its stead.
+LEAST_POWER = np.array(1e-36, np.float32)
+
 # Energies of a record: neither its lines, at most that strong, nor its floor leave float32.
 _SAFE_ENERGY = np.array(1e-14, np.float32), np.array(1e30, np.float32)
 _FLOOR_QUANTILE = 0.25
-_FLOOR_BLOCKS = 64  # a side of the spectrum
-EMPTY_RATIO = np.array(4, np.float32)  # a side this much below the other holds no noise of its own
+
+#: Blocks of a side of the spectrum whose quartile is the floor; a side so many times below the other holds no noise.
+FLOOR_BLOCKS, EMPTY_RATIO = 64, np.array(4, np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,7 +281,7 @@ def unit_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
 
 def per_floor(floor: NDArray[np.float32]) -> NDArray[np.float32]:
     """What a power is multiplied by to be in units of its floor; finite where there is none, and no power either."""
-    return np.reciprocal(np.maximum(floor, _LEAST))
+    return np.reciprocal(np.maximum(floor, LEAST_POWER))
 
 
 def safe_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
@@ -333,7 +336,7 @@ def side_sums(power: NDArray[np.float32]) -> tuple[NDArray[np.float32], int]:
         Bins of a block.
     """
     half = power.shape[-1] // 2
-    size = max(1, half // _FLOOR_BLOCKS)
+    size = max(1, half // FLOOR_BLOCKS)
     blocks = half // size
     # two sides alike, each in its blocks, without the bin at half the PRF, which has no mirror
     lower = (power.shape[-1] + 1) % 2

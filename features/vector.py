@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .axis import axis_velocities_mps
 from .bandwidth import energy_band_mps, noise_threshold_db, threshold_band_hz
-from .change import busy_db, centroid_mps, change_db, swing
+from .change import busy_db, centroid_mps, swing
 from .chopping import cepstral_chopping
 from .notch import Body, notch_residual_db, residual, weights
 from .schema import FEATURES, FeatureTable
@@ -17,14 +17,11 @@ from .shape import band_levels_db, entropy, ripple_db, symmetry
 from .smearing import smearing_index
 from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, sums
 
-#: Energy counts where the level is this far over the floor [dB]: noise passes it in 2 % of the bins.
-SIGNIFICANT_DB = 6.0
-
-_SIGNIFICANT = np.float32(10 ** (SIGNIFICANT_DB / 10) - 1)
-
+#: Energy over the floor counts from here on, where the level is 6 dB: noise passes it in 2 % of the bins.
+SIGNIFICANT = np.float32(10 ** (6.0 / 10) - 1)
 
 #: Names of the bands' levels on the stronger and on the weaker side.
-_BANDS = tuple([f.name for f in FEATURES if f.name.startswith(stem)] for stem in ("strong_", "weak_"))
+BANDS = tuple([f.name for f in FEATURES if f.name.startswith(stem)] for stem in ("strong_", "weak_"))
 
 #: Speeds that part the change over the dwell into slow, middle and fast [m/s].
 _CHANGE_MPS = (3.0, 20.0)
@@ -40,7 +37,8 @@ def axis_plan(bins: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
 
 @lru_cache(maxsize=64)
-def _radar_values(carrier_hz: float, prf_hz: float, pulses: int) -> dict[str, float]:
+def radar_columns(carrier_hz: float, prf_hz: float, pulses: int) -> dict[str, float]:
+    """What the radar allows to be seen, as logarithms."""
     wavelength_m, dwell_s = SPEED_OF_LIGHT_MPS / carrier_hz, pulses / prf_hz
     return {
         "velocity_step_log": math.log10(wavelength_m / (2 * dwell_s)),
@@ -48,11 +46,6 @@ def _radar_values(carrier_hz: float, prf_hz: float, pulses: int) -> dict[str, fl
         "dwell_log": math.log10(dwell_s),
         "pulses_log": math.log10(pulses),
     }
-
-
-def radar_columns(spectrum: Spectrum) -> dict[str, float]:
-    """What the radar allows to be seen, as logarithms."""
-    return _radar_values(spectrum.carrier_hz, spectrum.prf_hz, spectrum.pulses)
 
 
 def lay_out(columns: Mapping[str, ArrayLike], table: FeatureTable, shape: tuple[int, ...]) -> NDArray[np.float32]:
@@ -88,7 +81,7 @@ def feature_vector(
     mask: NDArray[np.bool_],
     axis_db: NDArray[np.float32],
     parts: NDArray[np.float32],
-    change: NDArray[np.float32] | None = None,
+    change: NDArray[np.float32],
 ) -> NDArray[np.float32]:
     """Every number of the schema's `FEATURES`, in its order.
 
@@ -104,8 +97,8 @@ def feature_vector(
         Their mean level on the shared axis.
     parts : ndarray of float32, shape (..., PARTS, axis bins)
         Levels of the dwells' parts, from `parts_db`.
-    change : ndarray of float32, shape (..., axis bins), optional
-        `change_db(parts)` if it is at hand.
+    change : ndarray of float32, shape (..., axis bins)
+        Their change, from `change_db`.
 
     Returns
     -------
@@ -116,7 +109,7 @@ def feature_vector(
     above = residual(spectrum)
     total = sums(above)
     excess = np.multiply(above, kept, out=above)
-    energy = excess * weights(excess > _SIGNIFICANT)  # a choice bin by bin would cost ten times as much
+    energy = excess * weights(excess > SIGNIFICANT)  # a choice bin by bin would cost ten times as much
     root = np.sqrt(energy)
     chopping = cepstral_chopping(spectrum, kept)
     residual_db = notch_residual_db(spectrum, kept)
@@ -126,7 +119,6 @@ def feature_vector(
     low, high, occupancy = energy_band_mps(spectrum, energy)
 
     axis_mps, change_shares = axis_plan(axis_db.shape[-1])
-    change = change_db(parts) if change is None else change
     changes = (change_shares @ change[..., None])[..., 0]
     centroid = centroid_mps(parts, axis_mps)
     half, side = spectrum.bins // 2, (spectrum.bins - 1) // 2  # without the bin at half the PRF, which has no mirror
@@ -141,7 +133,7 @@ def feature_vector(
     speed_mps = np.abs(body.velocity_mps)  # refined from the bin at half the PRF it may lie beyond: folded back
 
     columns: dict[str, ArrayLike] = {
-        **radar_columns(spectrum),
+        **radar_columns(spectrum.carrier_hz, spectrum.prf_hz, spectrum.pulses),
         "body_level_db": body.level_db,
         "body_speed_mps": np.minimum(speed_mps, np.float32(spectrum.prf_hz * spectrum.wavelength_m / 2) - speed_mps),
         "rest_level_db": np.maximum.reduce(spectrum.level_db[..., half - 1 : half + 2], axis=-1),
@@ -173,6 +165,6 @@ def feature_vector(
         "busy_swing_db": swing(busy_db(parts)),
         "empty_side_db": np.abs(np.log10(np.maximum(left, emptiest) / np.maximum(right, emptiest))) * np.float32(10),
     }
-    for names, levels in zip(_BANDS, band_levels_db(axis_db), strict=True):
+    for names, levels in zip(BANDS, band_levels_db(axis_db), strict=True):
         columns.update(zip(names, levels.reshape(-1, len(names)).T, strict=True))
     return lay_out(columns, FEATURES, spectrum.floor.shape)

@@ -32,15 +32,13 @@ def require_finite(values: NDArray[np.floating], name: str) -> None:
         )
 
 
-def require_vectors(x: NDArray[np.floating], name: str) -> None:
+def require_vectors(x: NDArray[np.floating]) -> None:
     """Refuse everything but finite float32 vectors.
 
     Parameters
     ----------
     x
         Array that should have the shape (n, F) with n and F at least 1.
-    name
-        What the array is called in the message.
 
     Raises
     ------
@@ -48,12 +46,10 @@ def require_vectors(x: NDArray[np.floating], name: str) -> None:
         Where the shape, the type or a value is wrong.
     """
     if x.ndim != 2 or 0 in x.shape:
-        raise ValueError(f"{name} has shape {x.shape}; it must be (records, features), neither of them 0")
+        raise ValueError(f"x has shape {x.shape}; it must be (records, features), neither of them 0")
     if x.dtype != np.float32:
-        raise ValueError(
-            f"{name} is {x.dtype}; it must be float32, as in the exported model: use astype(numpy.float32)"
-        )
-    require_finite(x, name)
+        raise ValueError(f"x is {x.dtype}; it must be float32, as in the exported model: use astype(numpy.float32)")
+    require_finite(x, "x")
 
 
 def require_labels(y: NDArray[np.integer], count: int, name: str) -> None:

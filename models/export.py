@@ -222,7 +222,7 @@ def check_export(
     onnx_bytes: bytes,
     reference_probabilities: NDArray[np.floating],
     inputs: Mapping[str, NDArray[np.floating]],
-    tolerance: float = NETWORK_TOLERANCE,
+    tolerance: float,
 ) -> float:
     """Run an exported model and compare it with the one it came from.
 

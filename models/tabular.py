@@ -143,7 +143,7 @@ def tabular_scores(model: "Pipeline | HistGradientBoostingClassifier", x: NDArra
     ValueError
         Where `x` has the wrong shape, type or values.
     """
-    require_vectors(x, "x")
+    require_vectors(x)
     return np.asarray(model.decision_function(x), dtype=np.float64)
 
 
@@ -160,6 +160,6 @@ def _round_thresholds(model: "HistGradientBoostingClassifier") -> None:
 
 
 def _require_training_set(x: NDArray[np.float32], y: NDArray[np.integer]) -> None:
-    require_vectors(x, "x")
+    require_vectors(x)
     require_labels(y, len(x), "y")
     require_every_class(y, "y")

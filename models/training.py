@@ -56,7 +56,7 @@ class Lessons:
         Kind of each record, shape (n,), a place in the network's `kinds`, of the class that its label says. Where
         given, the network is to tell these as well: half of the loss is theirs.
     teacher
-        Probabilities that another network gives each kind of the records, shape (n, kinds), as from `network_shares`;
+        Probabilities that another network gives each kind of the records, shape (n, kinds);
         the targets take the share `TAUGHT` of them. A label is one draw from what a record leaves open and its
         teacher's answer near the mean of them, so that a step errs less (Hinton, Vinyals and Dean, arXiv:1503.02531),
         also where the teacher is as small as its pupil (Furlanello and others, arXiv:1805.04770).

@@ -54,11 +54,6 @@ class Tile:
         records, blocks, pulses = self.shape
         return records, blocks * pulses
 
-    @property
-    def width(self) -> int:
-        """Pulses in the tile."""
-        return self.pulses.stop - self.pulses.start
-
 
 class Sine(NamedTuple):
     """amplitude sin(2 pi rate t + phase); each field of shape (parts, records).

@@ -7,9 +7,10 @@ import math
 from difflib import get_close_matches
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from .bird import wing_size
+from .catalogue import AIRFRAMES, BIRDS, Entry
 from .laws import LAWS
 from .receiver import FAULT_CHANCE
 
@@ -51,6 +52,42 @@ Level = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-200, le=200
 Aspect = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=90)]
 Share = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=60)]
+
+
+def bounds_of(name: str) -> tuple[float, float]:
+    """Least and largest value that a scene may fix a parameter to, in its law's unit."""
+    law = LAWS[name]
+    return BOUNDS.get(name, LEVEL_BOUNDS_DB if law.unit == "dB" else (-math.inf, math.inf))
+
+
+def _known_laws(values: dict[str, float]) -> dict[str, float]:
+    """Refuse a parameter that no law knows, or a value that its law's meaning forbids."""
+    for name, value in values.items():
+        if name not in LAWS:
+            near = ", ".join(get_close_matches(name, LAWS, n=5, cutoff=0.3)) or "none"
+            raise ValueError(
+                f"{name!r} is unknown: of the {len(LAWS)} parameters (simulate/laws.py) near it are {near}"
+            )
+        law = LAWS[name]
+        if law.kind == "log" and value <= 0:
+            raise ValueError(f"{name} is {value}: it must be above 0 [{law.unit}]")
+        low, high = bounds_of(name)
+        if not low <= value <= high:
+            raise ValueError(f"{name} is {value}: it must be {low:g} to {high:g} [{law.unit}]")
+    return values
+
+
+LawValues = Annotated[dict[str, Number], AfterValidator(_known_laws)]
+
+
+def _of_catalogue(values: Any, field: str, entries: dict[str, Entry]) -> Any:
+    """Fields of a part with those of the catalogue's entry that it names, if any, beneath them."""
+    name = values.get(field) if isinstance(values, dict) else None
+    if not isinstance(name, str):  # what is no name is told by the field's own type
+        return values
+    if name not in entries:
+        raise ValueError(f"{field} is {name!r}: it must be one of {', '.join(entries)}")
+    return {**entries[name].fields, **values}
 
 
 class Part(BaseModel):
@@ -174,14 +211,7 @@ class UavPart(TargetPart):
     @model_validator(mode="before")
     @classmethod
     def _from_catalogue(cls, values: Any) -> Any:
-        from .catalogue import AIRFRAMES
-
-        name = values.get("airframe") if isinstance(values, dict) else None
-        if not isinstance(name, str):  # what is no name is told by the field's own type
-            return values
-        if name not in AIRFRAMES:
-            raise ValueError(f"airframe is {name!r}: it must be one of {', '.join(AIRFRAMES)}")
-        return {**AIRFRAMES[name].fields, **values}
+        return _of_catalogue(values, "airframe", AIRFRAMES)
 
     @model_validator(mode="after")
     def _consistent(self) -> "UavPart":
@@ -244,14 +274,7 @@ class BirdPart(TargetPart):
     @model_validator(mode="before")
     @classmethod
     def _from_catalogue(cls, values: Any) -> Any:
-        from .catalogue import BIRDS
-
-        name = values.get("species") if isinstance(values, dict) else None
-        if not isinstance(name, str):
-            return values
-        if name not in BIRDS:
-            raise ValueError(f"species is {name!r}: it must be one of {', '.join(BIRDS)}")
-        return {**BIRDS[name].fields, **values}
+        return _of_catalogue(values, "species", BIRDS)
 
 
 class ClutterPart(Part):
@@ -264,12 +287,7 @@ class ClutterPart(Part):
     on: bool = True
     kind: Literal["ground", "rain", "sea", "person", "vehicle", "wind_turbine", "insects"]
     level_db: Level
-    values: dict[str, Number] = {}
-
-    @field_validator("values")
-    @classmethod
-    def _known(cls, values: dict[str, float]) -> dict[str, float]:
-        return _known_laws(values)
+    values: LawValues = {}
 
 
 class ReceiverPart(Part):
@@ -280,7 +298,7 @@ class ReceiverPart(Part):
 
     noise: bool = True
     effects: tuple[str, ...] = ()
-    values: dict[str, Number] = {}
+    values: LawValues = {}
     mains_hz: Positive | None = None
     jitter_s: NotNegative = 0.0
     dc_db: Level | None = None
@@ -292,31 +310,3 @@ class ReceiverPart(Part):
             if effect not in FAULT_CHANCE:
                 raise ValueError(f"{effect!r} is unknown: the effects are {', '.join(FAULT_CHANCE)}")
         return effects
-
-    @field_validator("values")
-    @classmethod
-    def _known(cls, values: dict[str, float]) -> dict[str, float]:
-        return _known_laws(values)
-
-
-def bounds_of(name: str) -> tuple[float, float]:
-    """Least and largest value that a scene may fix a parameter to, in its law's unit."""
-    law = LAWS[name]
-    return BOUNDS.get(name, LEVEL_BOUNDS_DB if law.unit == "dB" else (-math.inf, math.inf))
-
-
-def _known_laws(values: dict[str, float]) -> dict[str, float]:
-    """Refuse a parameter that no law knows, or a value that its law's meaning forbids."""
-    for name, value in values.items():
-        if name not in LAWS:
-            near = ", ".join(get_close_matches(name, LAWS, n=5, cutoff=0.3)) or "none"
-            raise ValueError(
-                f"{name!r} is unknown: of the {len(LAWS)} parameters (simulate/laws.py) near it are {near}"
-            )
-        law = LAWS[name]
-        if law.kind == "log" and value <= 0:
-            raise ValueError(f"{name} is {value}: it must be above 0 [{law.unit}]")
-        low, high = bounds_of(name)
-        if not low <= value <= high:
-            raise ValueError(f"{name} is {value}: it must be {low:g} to {high:g} [{law.unit}]")
-    return values

@@ -18,8 +18,7 @@ from bladewing.models.session import quiet_session
 from bladewing.simulate import Radar, draw_records
 from numpy.typing import NDArray
 
-from ..cascade import Cascade
-from ..inference import Classifier
+from ..inference import Cascade, Classifier
 from .pictures import PICTURES, Picture, in_blocks, quantised, radar_numbers, spectrum_picture
 from .settings import ReportConfig
 
@@ -88,7 +87,7 @@ def draw_sets(
     *,
     seed: int,
     on_done: OnDone,
-    ask: Callable[[str, NDArray[np.complex64], Radar], None] | None = None,
+    ask: Callable[[str, NDArray[np.complex64], Radar], None],
 ) -> dict[str, FrontSet]:
     """Draw records of every dwell and keep the named inputs of them.
 
@@ -102,7 +101,7 @@ def draw_sets(
     seed : int
     on_done : callable
         Called with the share done.
-    ask : callable, optional
+    ask : callable
         Shown every block of samples (purpose, samples, radar) before they are dropped, in order.
 
     Returns
@@ -134,8 +133,7 @@ def draw_sets(
                 kept["radar"].append(radar_numbers(radar, some))
                 labels.append(records.label_indices)
                 snr_db.append(np.asarray(records.truth["snr_db"], np.float64))
-                if ask is not None:
-                    ask(purpose, records.iq, radar)
+                ask(purpose, records.iq, radar)
                 done += some * dwell_s
                 on_done(done / total)
         sets[purpose] = FrontSet(

@@ -14,7 +14,7 @@ from bladewing.models.session import quiet_session
 from numpy.typing import NDArray
 
 from ..inference import Classifier
-from .timing import Work, quote, ratio, time_in_turns
+from ..timing import Work, quote, ratio, time_in_turns
 
 BATCHES = (1, 64)
 

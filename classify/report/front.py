@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..labels import CLASSES
 from ..ladder import non_dominated
 from ..parts import Parts
+from ..timing import Work, quote, ratio, time_in_turns
 from . import choices, metrics
 from .choices import DWELLS_S, FEATURES, STORED_BINS, STORED_BITS, FrontSet, OnDone
 from .cost import BATCHES, in_turn
@@ -29,7 +30,6 @@ from .pictures import PICTURES
 from .scores import FALSE_ALARM_RATE, snr_edges
 from .settings import ReportConfig
 from .storage import RECORDS_QUOTED
-from .timing import Work, quote, ratio, time_in_turns
 
 #: A record's time that a user may grant [us].
 BUDGETS_US = (50.0, 200.0, 1000.0)
@@ -329,7 +329,7 @@ def _accuracy(point: Mapping[str, Any], by: str = "balanced_accuracy") -> float:
 
 
 def _mark(rows: Sequence[Mapping[str, Any]]) -> None:
-    """Say of every cost which points nothing beats: ``front`` in each entry of ``cost``, ``front_stored``."""
+    """Say of every cost which points nothing beats: ``front`` in each entry of ``cost``."""
     points = [(row, point) for row in rows for point in row["dwells"]]
     accuracy = [_accuracy(point) for _, point in points]
     for place in range(len(BATCHES)):

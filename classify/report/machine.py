@@ -8,6 +8,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from ..gather import workers_at_hand
+
 # Those whose versions change scores or timings.
 PACKAGES = ("bladewing", "numpy", "scipy", "onnxruntime")
 
@@ -21,10 +23,9 @@ def describe_machine() -> dict[str, Any]:
         ``cpu`` (model name), ``cores`` (those this process may use), ``system``, ``python``, ``packages`` (name to
         version) and ``load`` (mean number of running processes over the last minute, None where unknown).
     """
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
         "cpu": _cpu_model(Path("/proc/cpuinfo")),
-        "cores": cores,
+        "cores": workers_at_hand(),
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
         "packages": {name: metadata.version(name) for name in PACKAGES},

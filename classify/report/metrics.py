@@ -1,4 +1,4 @@
-"""The report's arithmetic: rates with their intervals, detection at a false-alarm rate, calibration, the cost front.
+"""The report's arithmetic: rates with their intervals, detection at a false-alarm rate, calibration.
 
 Every function takes arrays and returns numbers; none knows of radars, models or files. A rate is the dictionary
 ``{"value", "low", "high", "right", "count"}``: a share of ``count`` records with its 95 % Wilson interval, all three

@@ -9,21 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from bladewing.features import doppler_spectrum
 from bladewing.features import stft as joint
 from bladewing.features.axis import pooling
+from bladewing.features.schema import AXIS_BINS, IMAGE_BINS, IMAGE_FRAMES
 from bladewing.features.vector import radar_columns
 from bladewing.simulate import Radar
 from numpy.typing import NDArray
 
 from .stft import STFT_BINS, frames, transformed
-
-#: Velocity bins of the spectrum; velocity bins and frames of a picture with time in it.
-SPECTRUM_BINS = 256
-IMAGE_BINS, IMAGE_FRAMES = 64, 32
 
 #: The four STFTs of the paper that are pictured and weighed: window [samples], overlap.
 STFT_SETTINGS = ((80, 0.9), (200, 0.9), (20, 0.9), (80, 0.5))
@@ -62,7 +59,7 @@ class Picture:
     has_velocity: bool = True
 
 
-def spectrum_picture(iq: NDArray[np.complex64], radar: Radar, *, bins: int = SPECTRUM_BINS) -> NDArray[np.float32]:
+def spectrum_picture(iq: NDArray[np.complex64], radar: Radar, *, bins: int = AXIS_BINS) -> NDArray[np.float32]:
     """One FFT over the whole dwell: mean and peak level of each velocity bin.
 
     Parameters
@@ -131,7 +128,7 @@ def _pooled_power(some: NDArray[np.complex64]) -> NDArray[np.float32]:
 def cadence_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
     """Cadence-velocity diagram: how fast each velocity's level swings, (n, 1, velocity bins, cadences) [dB]."""
     swings, _ = joint.cadence_velocity(_frames_of(iq, radar, CADENCE_WINDOW_S))
-    few = _grouped(swings**2, IMAGE_FRAMES)
+    few = _grouped(swings**2)
     level = np.median(few, axis=(1, 2), keepdims=True)
     few /= np.where(level > 0, level, np.float32(1))
     pool = pooling(few.shape[-1], radar.carrier_hz, radar.prf_hz, IMAGE_BINS)
@@ -141,7 +138,7 @@ def cadence_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float
 def cepstral_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
     """Cepstrogram: periods of the comb, evenly spaced in their logarithm, (n, 1, periods, frames) [dB]."""
     heights, _ = joint.cepstrogram(_frames_of(iq, radar, joint.HERM_WINDOW_S))
-    few = _grouped(heights, IMAGE_FRAMES)
+    few = _grouped(heights)
     edges = np.geomspace(1, few.shape[-1], IMAGE_BINS + 1)[:-1].astype(int)
     # a comb's peak is narrow: the highest of a group of periods speaks for it
     return np.swapaxes(np.maximum.reduceat(few, edges, axis=-1), -1, -2)[:, None]
@@ -150,7 +147,7 @@ def cepstral_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.floa
 def herm_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
     """HERM lines: what stays in each velocity bin from long frame to long frame, (n, 1, velocity bins) [dB]."""
     lines = 10 ** (joint.herm_lines_db(_frames_of(iq, radar, joint.HERM_WINDOW_S)) / 10)
-    pool = pooling(lines.shape[-1], radar.carrier_hz, radar.prf_hz, SPECTRUM_BINS)
+    pool = pooling(lines.shape[-1], radar.carrier_hz, radar.prf_hz, AXIS_BINS)
     return pool.mean_db(lines.astype(np.float32, copy=False))[:, None]
 
 
@@ -160,11 +157,11 @@ def _frames_of(iq: NDArray[np.complex64], radar: Radar, window_s: float) -> join
     return joint.stft(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz, window_s=window_s, overlap=0.9)
 
 
-def _grouped(rows: NDArray[np.float32], groups: int) -> NDArray[np.float32]:
-    """Mean of neighbouring rows (axis 1), so many in all; too few rows are shown several times."""
+def _grouped(rows: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Mean of neighbouring rows (axis 1), `IMAGE_FRAMES` in all; too few rows are shown several times."""
     count = rows.shape[1]
-    starts = np.arange(groups) * count // groups
-    if count < groups:
+    starts = np.arange(IMAGE_FRAMES) * count // IMAGE_FRAMES
+    if count < IMAGE_FRAMES:
         return rows[:, starts]
     sizes = np.diff(starts, append=count).astype(np.float32)
     means: NDArray[np.float32] = np.add.reduceat(rows, starts, axis=1) / sizes[:, None]
@@ -181,14 +178,8 @@ def _squares(lines: NDArray[np.complex64]) -> NDArray[np.float32]:
 
 def radar_numbers(radar: Radar, count: int) -> NDArray[np.float32]:
     """What the radar allows to be seen, the same for each of so many records, shape (count, 4)."""
-    return np.tile(_radar_row(radar), (count, 1))
-
-
-@lru_cache(maxsize=64)
-def _radar_row(radar: Radar) -> NDArray[np.float32]:
-    blank = np.ones((1, radar.pulses), np.complex64)
-    spectrum = doppler_spectrum(blank, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
-    return np.array(list(radar_columns(spectrum).values()), np.float32)
+    columns = radar_columns(radar.carrier_hz, radar.prf_hz, radar.pulses)
+    return np.tile(np.array(list(columns.values()), np.float32), (count, 1))
 
 
 def in_blocks(make: Maker, iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
@@ -228,8 +219,8 @@ def _stft_line(window: int, overlap: float) -> tuple[str, Picture]:
 
 #: Name to picture, the cheapest transform first.
 PICTURES: dict[str, Picture] = {
-    "spectrum": Picture("Doppler spectrum", (2, SPECTRUM_BINS), spectrum_picture),
-    "herm": Picture("HERM lines", (1, SPECTRUM_BINS), herm_picture),
+    "spectrum": Picture("Doppler spectrum", (2, AXIS_BINS), spectrum_picture),
+    "herm": Picture("HERM lines", (1, AXIS_BINS), herm_picture),
     **dict(_stft_line(*setting) for setting in STFT_SETTINGS),
     "cadence": Picture("cadence-velocity diagram", (1, IMAGE_BINS, IMAGE_FRAMES), cadence_picture),
     "cepstrogram": Picture("cepstrogram", (1, IMAGE_BINS, IMAGE_FRAMES), cepstral_picture, has_velocity=False),

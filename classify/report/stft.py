@@ -11,7 +11,7 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from .timing import Work, quote, ratio, time_in_turns
+from ..timing import Work, quote, ratio, time_in_turns
 
 # The paper's claim: how many times faster one FFT is than the STFT, by number of samples.
 PAPER_RATIOS = {2000: (19.0, 46.0), 10_000: (22.0, 77.0)}
@@ -54,7 +54,7 @@ def transformed(some: NDArray[np.complex64]) -> NDArray[np.complex64]:
 
 
 def time_fft_against_stft(
-    *, seed: int, seconds: float, least_rounds: int, on_share: Callable[[float], None] | None = None
+    *, seed: int, seconds: float, least_rounds: int, on_share: Callable[[float], None]
 ) -> list[dict[str, Any]]:
     """Time one FFT against the paper's STFTs at its two record lengths.
 
@@ -66,7 +66,7 @@ def time_fft_against_stft(
         Time to spend on each length [s].
     least_rounds : int
         Rounds to make however long they take.
-    on_share : callable, optional
+    on_share : callable
         Called with the share done, 0 to 1.
 
     Returns
@@ -85,8 +85,7 @@ def time_fft_against_stft(
             works[f"{window} {overlap}"] = partial(stft, iq, window=window, overlap=overlap)
 
         def share(done: float, place: int = place) -> None:
-            if on_share is not None:
-                on_share((place + done) / len(PAPER_RATIOS))
+            on_share((place + done) / len(PAPER_RATIOS))
 
         taken = time_in_turns(works, seconds=seconds, least_rounds=least_rounds, most_rounds=1000, on_share=share)
         bare = quote(taken["fft"])
@@ -106,7 +105,7 @@ def time_law(
     seed: int,
     seconds: float,
     least_rounds: int,
-    on_share: Callable[[float], None] | None = None,
+    on_share: Callable[[float], None],
 ) -> dict[str, Any]:
     """Hold the time of transforms against their number of operations, 5 N log2 N for one of length N.
 

@@ -67,14 +67,11 @@ class Panel:
     ----------
     title : str
         Shown above it.
-    alt : str
-        What it shows, in words.
     svg : str
-        The drawing, an ``<svg>`` element with the alternative text as its label.
+        The drawing, an ``<svg>`` element labelled with what it shows in words.
     """
 
     title: str
-    alt: str
     svg: str
 
 
@@ -123,7 +120,7 @@ def panel(figure: Figure, *, name: str, title: str, alt: str) -> Panel:
     for stand_in, css in _CSS.items():
         text = text.replace(stand_in, css)
     label = f'<svg role="img" aria-label="{escape(alt, quote=True)}" '
-    return Panel(title=title, alt=alt, svg=text.replace("<svg ", label, 1).rstrip())
+    return Panel(title=title, svg=text.replace("<svg ", label, 1).rstrip())
 
 
 def _own_ids(text: str, name: str) -> str:

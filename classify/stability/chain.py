@@ -66,9 +66,7 @@ def cells(quick: bool) -> Iterator[Cell]:
         "error of the sum of probabilities [1]",
         1e-5,
         _REASON,
-        lambda pulses: _unless_unknown(
-            classifier.predict(ODD["constant"](pulses, np.random.default_rng(0)), carrier_hz=10e9, prf_hz=20e3)
-        ),
+        lambda pulses: _unless_unknown(classifier.predict(ODD["constant"](pulses), carrier_hz=10e9, prf_hz=20e3)),
         "{:d}".format,
         silent=(1, 2, 63, 64, 65, 127, 65537),
     )
@@ -111,7 +109,7 @@ def _scene_answers(classifier: Classifier, range_m: float, seeds: range) -> NDAr
 
 
 def _sum_error(classifier: Classifier, name: str) -> Outcome:
-    iq = ODD[name](1000, np.random.default_rng(0))
+    iq = ODD[name](1000)
     return _unless_unknown(classifier.predict(iq, carrier_hz=10e9, prf_hz=20e3))
 
 

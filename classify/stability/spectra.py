@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 from bladewing.features import measure
-from bladewing.features.bandwidth import energy_band_mps, threshold_band_hz
+from bladewing.features.bandwidth import energy_band_mps, noise_threshold_db, threshold_band_hz
 from bladewing.features.cadence import CLIP, LEAST_MEAN, cadence_db, cadence_plan
 from bladewing.features.chopping import CLIP_DB, cepstrum, noise_shape
 from bladewing.features.comb_levels import comb_heights, comb_plan
@@ -32,10 +32,7 @@ _WAVELENGTH_M = 299_792_458.0 / _CARRIER_HZ
 _SCALE_GUARD = "scaled by a power of two to [0.5, 1) first: no digit changes, no square overflows or vanishes"
 _COUNTS = (2, 3, 16, 127, 1000, 1021, 8191, 65536)
 
-#: Records that no target makes: name to a function of (pulses, rng).
-ODD: dict[str, Callable[[int, np.random.Generator], NDArray[np.complex64]]] = {}
-
-# Those of them in which a rotor stands, and its chopping frequency.
+# Records of `ODD` in which a rotor stands, and its chopping frequency [Hz].
 _ODD_ROTORS, _ODD_CHOPPING_HZ = ("clipped to one bit", "I only"), 200.0
 
 
@@ -59,13 +56,33 @@ def rotor_record(
     return (signal + noise[0] + 1j * noise[1]).astype(np.complex64)
 
 
-def _exact_power(iq: NDArray[np.complex64], bins: int | None = None) -> NDArray[np.longdouble]:
+#: Records that no target makes: name to a function of the number of pulses.
+ODD: dict[str, Callable[[int], NDArray[np.complex64]]] = {
+    "all zero": lambda pulses: np.zeros(pulses, np.complex64),
+    "constant": lambda pulses: np.full(pulses, 0.3 - 0.7j, np.complex64),
+    "a single sample that is not zero": lambda pulses: (np.arange(pulses) == pulses // 3).astype(np.complex64),
+    "one huge spike": lambda pulses: np.where(np.arange(pulses) == pulses // 3, 1e37, rotor_record(pulses)),
+    "pure DC under noise 200 dB down": lambda pulses: _noise_on(1e10, pulses),
+    "clipped to one bit": lambda pulses: np.sign(rotor_record(pulses).view(np.float32)).view(np.complex64),
+    "I only": lambda pulses: rotor_record(pulses).real.astype(np.complex64),
+    "largest and smallest floats": lambda pulses: np.where(
+        np.arange(pulses) % 2, 3e38 * (1 + 1j), 1e-45 * (1 - 1j)
+    ).astype(np.complex64),
+}
+
+
+def _noise_on(level: float, pulses: int) -> NDArray[np.complex64]:
+    """A constant level and noise of power 2."""
+    rng = np.random.default_rng(0)
+    return (level + rng.normal(size=pulses) + 1j * rng.normal(size=pulses)).astype(np.complex64)
+
+
+def _exact_power(iq: NDArray[np.complex64]) -> NDArray[np.longdouble]:
     """`centred_power` in long double, of the same samples and window."""
     pulses = iq.shape[-1]
-    bins = fft.next_fast_len(pulses) if bins is None else bins
     window = np.kaiser(pulses, KAISER_BETA).astype(np.longdouble)
     window /= np.sqrt(np.sum(window**2))
-    lines = fft.fft(iq.astype(np.clongdouble) * window, n=bins)
+    lines = fft.fft(iq.astype(np.clongdouble) * window, n=fft.next_fast_len(pulses))
     return fft.fftshift(lines.real**2 + lines.imag**2)
 
 
@@ -135,6 +152,12 @@ def _long(spectrum: Spectrum) -> Spectrum:
     return replace(spectrum, relative_power=spectrum.relative_power.astype(np.longdouble))
 
 
+def _notched(iq: NDArray[np.complex64]) -> tuple[Spectrum, NDArray[np.bool_]]:
+    """A record's spectrum, and where it counts."""
+    spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
+    return spectrum, notch_mask(spectrum, body_line(spectrum))
+
+
 def _exact_cepstrum(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.longdouble]:
     """`cepstrum` in long double, of the same powers."""
     power = np.maximum(spectrum.relative_power.astype(np.longdouble), np.longdouble(1))
@@ -144,16 +167,14 @@ def _exact_cepstrum(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.l
 
 
 def _cepstrum_error(iq: NDArray[np.complex64]) -> float:
-    spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
-    mask = notch_mask(spectrum, body_line(spectrum))
+    spectrum, mask = _notched(iq)
     found, exact = cepstrum(spectrum, mask), _exact_cepstrum(spectrum, mask)
     return float(np.abs(found - exact).max() / max(float(exact.max()), 1e-30))
 
 
 def _cadence_error(iq: NDArray[np.complex64]) -> float:
     """`cadence_db` against the same steps in long double, as powers."""
-    spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
-    mask = notch_mask(spectrum, body_line(spectrum))
+    spectrum, mask = _notched(iq)
     plan = cadence_plan(spectrum.pulses, spectrum.prf_hz)
     power = np.abs(fft.ifft(spectrum.transform.astype(np.clongdouble) * mask))[plan.span] ** 2 * plan.per_taper
     power /= max(power.mean(), np.longdouble(LEAST_MEAN) * spectrum.transform_floor, np.longdouble(1e-36))
@@ -166,12 +187,11 @@ def _cadence_error(iq: NDArray[np.complex64]) -> float:
 
 def _comb_heights_error(iq: NDArray[np.complex64]) -> float:
     """`comb_heights` against long double, of the same powers; the deviation of noise is about a half."""
-    spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
+    spectrum, mask = _notched(iq)
     plan = comb_plan(spectrum.bins, spectrum.pulses, _CARRIER_HZ, _PRF_HZ)
     if plan is None:
         return 0.0
-    kept = notch_mask(spectrum, body_line(spectrum))[plan.band]
-    power = spectrum.relative_power[plan.band]
+    kept, power = mask[plan.band], spectrum.relative_power[plan.band]
     exact = comb_heights(power.astype(np.longdouble), kept.astype(np.longdouble), plan)
     return float(np.abs(comb_heights(power, kept.astype(np.float32), plan) - exact).max() / max(1.0, exact.max()))
 
@@ -179,11 +199,11 @@ def _comb_heights_error(iq: NDArray[np.complex64]) -> float:
 def _band_error(iq: NDArray[np.complex64]) -> float:
     """Edges of the energy band against long double, in bins."""
     edges = []
-    spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
-    mask = notch_mask(spectrum, body_line(spectrum))
+    spectrum, mask = _notched(iq)
     for one in (spectrum, _long(spectrum)):
         excess = residual(one, mask)
-        edges.append(np.array([*energy_band_mps(one, excess)[:2], *threshold_band_hz(one, mask=mask)], np.float64))
+        threshold = threshold_band_hz(one, noise_threshold_db(one.bins), mask)
+        edges.append(np.array([*energy_band_mps(one, excess)[:2], *threshold], np.float64))
     step_hz = _PRF_HZ / spectrum.bins
     steps = np.array([step_hz * _WAVELENGTH_M / 2] * 2 + [step_hz] * 2)
     return float(np.abs((edges[0] - edges[1]) / steps).max())
@@ -293,7 +313,7 @@ def _combs() -> Iterator[Cell]:
 
 
 def _odd_comb(name: str) -> Outcome:
-    found = measure(ODD[name](1000, np.random.default_rng(0)), carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
+    found = measure(ODD[name](1000), carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
     if np.isnan(found.chopping_hz):
         return np.nan, str(found.reason)
     whole = float(found.chopping_hz) / _ODD_CHOPPING_HZ
@@ -313,57 +333,6 @@ def _difference(one: dict[str, NDArray[np.float32]], other: dict[str, NDArray[np
 def _finite(inputs: dict[str, NDArray[np.float32]]) -> float:
     """0 where every input is finite."""
     return float(sum(np.count_nonzero(~np.isfinite(values)) for values in inputs.values()))
-
-
-def _odd(name: str) -> Callable[[Callable], Callable]:
-    def keep(make: Callable) -> Callable:
-        ODD[name] = make
-        return make
-
-    return keep
-
-
-@_odd("all zero")
-def _zero(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
-    return np.zeros(pulses, np.complex64)
-
-
-@_odd("constant")
-def _constant(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
-    return np.full(pulses, 0.3 - 0.7j, np.complex64)
-
-
-@_odd("a single sample that is not zero")
-def _single(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
-    return np.where(np.arange(pulses) == pulses // 3, 1, 0).astype(np.complex64)
-
-
-@_odd("one huge spike")
-def _spike(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
-    iq = rotor_record(pulses)
-    iq[pulses // 3] = 1e37
-    return iq
-
-
-@_odd("pure DC under noise 200 dB down")
-def _dc(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
-    return (1e10 + rng.normal(size=pulses) + 1j * rng.normal(size=pulses)).astype(np.complex64)
-
-
-@_odd("clipped to one bit")
-def _clipped(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
-    iq = rotor_record(pulses)
-    return (np.sign(iq.real) + 1j * np.sign(iq.imag)).astype(np.complex64)
-
-
-@_odd("I only")
-def _real(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
-    return rotor_record(pulses).real.astype(np.complex64)
-
-
-@_odd("largest and smallest floats")
-def _extremes(pulses: int, rng: np.random.Generator) -> NDArray[np.complex64]:
-    return np.where(np.arange(pulses) % 2, 3e38 * (1 + 1j), 1e-45 * (1 - 1j)).astype(np.complex64)
 
 
 def _features(quick: bool) -> Iterator[Cell]:
@@ -389,7 +358,7 @@ def _features(quick: bool) -> Iterator[Cell]:
     wrong = "inputs that are not finite [count]"
     yield from sweep(
         stage, "record", list(ODD), wrong, 0.0, "floor held 90 dB under the record; no value is 0 in its column",
-        lambda name: _finite(_inputs(ODD[name](1000, np.random.default_rng(0)))), str,
+        lambda name: _finite(_inputs(ODD[name](1000))), str,
     )  # fmt: skip
     yield from sweep(
         stage, "pulses", [2, 15, 16, 17, 127, 8191, *([] if quick else [1 << 20])], wrong, 0.0,

@@ -8,8 +8,8 @@ from ..axis import pooling
 from ..change import PARTS, frame_starts, part_length
 from ..dropouts import LEAST_LOST
 from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
-from ..spectrum import _LEAST, LEAST_FLOOR, LEAST_PART, Spectrum, doppler_spectrum
-from ..vector import _BANDS, _SIGNIFICANT, radar_columns
+from ..spectrum import LEAST_FLOOR, LEAST_PART, LEAST_POWER, Spectrum, doppler_spectrum
+from ..vector import BANDS, SIGNIFICANT, radar_columns
 from .cadence import cadence_db
 from .comb_levels import comb_levels_db
 from .measurements import (
@@ -88,7 +88,7 @@ def input_graph(
 
     transform = centred_transform(packed, pulses, radar.bins)
     power = power_of(transform, radar.bins)
-    floor = noise_floor(power, radar.bins).at_least(power.mean() * float(LEAST_FLOOR)).at_least(float(_LEAST))
+    floor = noise_floor(power, radar.bins).at_least(power.mean() * float(LEAST_FLOOR)).at_least(float(LEAST_POWER))
     relative_power = power / floor
     pool = pooling(radar.bins, radar.carrier_hz, radar.prf_hz, AXIS_BINS)
     levels = pooled(relative_power, radar.bins, pool)
@@ -150,7 +150,7 @@ def _feature_vector(
     graph, bins = relative_power.graph, radar.bins
     over = (relative_power - 1.0).at_least(0.0)
     excess = over * kept
-    energy = excess * (excess > float(_SIGNIFICANT)).to(np.float32)
+    energy = excess * (excess > float(SIGNIFICANT)).to(np.float32)
     residual_db = 10.0 * log10(((relative_power * kept).sum() / kept.sum().at_least(1.0)).at_least(1e-2))
     width_hz = threshold_width_hz(radar, relative_power, kept)
     low, high, occupancy = energy_band(radar, energy)
@@ -164,7 +164,7 @@ def _feature_vector(
     speed_mps = body.velocity_mps.apply("Abs")
 
     columns: dict[str, Value | float] = {
-        **radar_columns(radar),
+        **radar_columns(radar.carrier_hz, radar.prf_hz, radar.pulses),
         "body_level_db": body.level_db,
         "body_speed_mps": speed_mps.at_most(radar.prf_hz * radar.wavelength_m / 2 - speed_mps),
         "rest_level_db": level_db.slice(half - 1, half + 2).max(),
@@ -187,7 +187,7 @@ def _feature_vector(
         "busy_swing_db": parts_db.mean().squeeze().std(),
         "empty_side_db": (10.0 * log10(left.at_least(1e-2) / right.at_least(1e-2))).apply("Abs"),
     }
-    for names, levels in zip(_BANDS, (strong, weak), strict=True):
+    for names, levels in zip(BANDS, (strong, weak), strict=True):
         columns.update((name, levels.slice(i, i + 1)) for i, name in enumerate(names))
     comb = cepstral_chopping(radar, level_db, kept)
     if comb is not None:

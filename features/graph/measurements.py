@@ -128,7 +128,7 @@ def symmetry(radar: Spectrum, energy: Value, body: Body) -> Value:
 
 def band_levels_db(axis_db: Value, bins: int) -> tuple[Value, Value]:
     """As `shape.band_levels_db`, shape (n, bands) each."""
-    one, other = (_marked(axis_db.graph.matmul(axis_db, side.T)) for side in np.split(shape._band_shares(bins), 2))
+    one, other = (_marked(axis_db.graph.matmul(axis_db, side.T)) for side in np.split(shape.band_shares(bins), 2))
     return one.at_least(other), one.at_most(other)
 
 
@@ -181,9 +181,9 @@ def cepstral_chopping(radar: Spectrum, level_db: Value, kept: Value) -> Chopping
     peak, top = window.pick(highest), highest.to(np.float32) + float(first)
     least = (chopping.FUNDAMENTAL_SHARE * peak).at_least(chopping.FUNDAMENTAL_STRENGTH * rms)
     best = top
-    for divisor in chopping._DIVISORS.ravel():
+    for divisor in chopping.DIVISORS.ravel():
         near = (top / float(divisor)).apply("Round")
-        around = flat.pick(near + chopping._NEIGHBOURS.ravel().astype(np.float32))
+        around = flat.pick(near + chopping.NEIGHBOURS.ravel().astype(np.float32))
         ok = (near >= float(first)) & (around.max() >= least)
         best = where(ok, near - 1.0 + around.argmax().to(np.float32), best)
     best = best.at_least(1.0).at_most(float(periods - 2))
@@ -191,7 +191,7 @@ def cepstral_chopping(radar: Spectrum, level_db: Value, kept: Value) -> Chopping
     period = best + _vertex(left, middle_, right)
     twice, thrice = (
         flat.pick((float(multiple) * period).apply("Round").at_most(float(periods - 1)))
-        for multiple in chopping._MULTIPLES.ravel()
+        for multiple in chopping.MULTIPLES.ravel()
     )
     return Chopping(rms > 0.0, radar.prf_hz / period, ratio(middle_, rms), ratio((twice + thrice) / 2.0, middle_))
 

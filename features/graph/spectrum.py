@@ -91,7 +91,7 @@ def unit_scale(largest: Value) -> Value:
 def noise_floor(power: Value, bins: int) -> Value:
     """As `spectrum.noise_floor`, shape (n, 1)."""
     half, lower = bins // 2, (bins + 1) % 2
-    size = max(1, half // definition._FLOOR_BLOCKS)
+    size = max(1, half // definition.FLOOR_BLOCKS)
     blocks = half // size
     sides = power.graph.concat(power.slice(lower, lower + blocks * size), power.slice(bins - blocks * size, bins))
     levels = sides.reshape(-1, 2, blocks, size).sum(keep=False).ranked(definition.quartile_rank(blocks)).squeeze()

@@ -116,13 +116,6 @@ def ridges(snr: NDArray[np.float64], together: NDArray[np.intp]) -> NDArray[np.f
     return np.asarray(1 / (snr * let_go) + LEAST_RIDGE, np.float64)
 
 
-def _weighed(
-    amplitudes: NDArray[np.complex128], used: NDArray[np.bool_], level: NDArray[np.float64]
-) -> NDArray[np.complex128]:
-    """Amplitudes over the rms of the noise about them, 0 where a line does not count."""
-    return np.asarray(amplitudes * used / np.sqrt(level), np.complex128)
-
-
 def _factored(plain: NDArray[np.float64], ridge: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
     """Cholesky factor of symmetric products with a ridge, and whether that failed."""
     from scipy.linalg import lapack  # here, because predicting needs no such import
@@ -238,7 +231,7 @@ def fit_combs(
         slope = moment - 1j * products.time_with(amplitudes)[:, 0]
         # the score of each line's frequency, and the Fisher matrix of centre and spacings
         pull = np.where(used, (amplitudes.conj() * slope).imag / level * (4 * np.pi * pulses), 0.0)
-        fisher = _fisher(_weighed(amplitudes, used, level), design, factor, products, pulses)
+        fisher = _fisher(amplitudes * used / np.sqrt(level), design, factor, products, pulses)
         step = np.linalg.solve(fisher, design.T @ pull)
         step = np.clip(step, -limit, limit)
         values = values + step

@@ -192,7 +192,9 @@ def _foreign(power: NDArray[np.float64], number: NDArray[np.floating]) -> NDArra
     Parameters
     ----------
     power : ndarray, shape (2, orders)
-        Power of the lines on each side of the body, summed over so many as `number`.
+        Power of the lines on each side of the body, summed.
+    number : ndarray, same shape
+        Of the lines in each sum.
     """
     known = number > 0
     mean = np.where(known, power / np.maximum(number, 1e-9), np.inf)
@@ -218,7 +220,9 @@ def _fills_span(
     away : ndarray, shape (orders,)
         Distance of each order from the body, rising [cycles a sample].
     total, noise : ndarray, shape (orders,)
-        Power of its lines with their noise, and of that alone, summed over so many `bins`.
+        Power of its lines with their noise, and of that alone, summed.
+    bins : ndarray, shape (orders,)
+        In each sum.
     span : float
         From `span_of`.
     """

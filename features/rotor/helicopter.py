@@ -96,7 +96,7 @@ class Gear:
         return self.ratio * float(np.hypot(*(self.rates[:, 1] / self.rates[:, 0])))
 
 
-def find_gear(data: Periodogram, comb: Comb, edge: float, blades: int | None = None) -> tuple[Gear | None, Rotors, str]:
+def find_gear(data: Periodogram, comb: Comb, edge: float, blades: int | None) -> tuple[Gear | None, Rotors, str]:
     """Find a second comb a gear ratio from the first, and the single rotors of the first.
 
     Several rotors of nearly one rate leave so many lines that some of them pass for a second comb. Where such explain
@@ -111,8 +111,8 @@ def find_gear(data: Periodogram, comb: Comb, edge: float, blades: int | None = N
         The comb found in it; it may be the main rotor's or the tail's.
     edge : float
         Edge of its line family [cycles a sample from the body].
-    blades : int, optional
-        Of a rotor.
+    blades : int or None
+        Of a rotor, where that is known.
 
     Returns
     -------
@@ -185,7 +185,7 @@ def _left_over(data: Periodogram, comb: Comb) -> tuple[Periodogram, NDArray[np.b
     rest = data.left(comb.rest)
     hidden = _hidden(rest, comb.fit)
     power = rest.power * rest.level
-    level = np.maximum(local_level(power, ~hidden, 1.0, rest.block), LEAST_LEVEL)
+    level = np.maximum(local_level(power, ~hidden, rest.block), LEAST_LEVEL)
     return replace(rest, power=(power / level).astype(np.float32), level=level), hidden
 
 

@@ -196,7 +196,7 @@ class Periodogram:
         size = fft.next_fast_len(LEVEL_PADDING * self.pulses)
         power = squared(fft.fft(rest.astype(np.complex64), size)) * np.float32(1 / self.pulses)
         keep = _kept(size, self.blocked, THINNED_BINS / self.pulses)
-        level = _level_at_bins(power, keep, 1.0, _block(size, self.pulses), evened=evened)
+        level = _level_at_bins(power, keep, _block(size, self.pulses), evened=evened)
         return lambda frequency: np.maximum(level(np.rint(frequency * size) % size), LEAST_LEVEL)
 
     def left(self, samples: NDArray[np.complex128], own_level: Level | None = None) -> "Periodogram":
@@ -253,25 +253,24 @@ def _kept(size: int, blocked: tuple[tuple[float, float], ...], margin: float = 0
     return keep
 
 
-def local_level(power: NDArray[np.floating], keep: NDArray[np.bool_], floor: float, block: int) -> NDArray[np.float64]:
+def local_level(power: NDArray[np.floating], keep: NDArray[np.bool_], block: int) -> NDArray[np.float64]:
     """Smooth level of a spectrum in FFT order that lines do not lift: lower quartiles of blocks, joined by lines.
 
     Parameters
     ----------
     power : ndarray, shape (bins,)
-        Power spectrum.
+        Power spectrum over the noise floor: the level is never below a tenth of that, and is it where too little is
+        kept.
     keep : ndarray of bool, shape (bins,)
         False where it was notched.
-    floor : float
-        The level is never below a tenth of this; it is this where too little is kept.
     block : int
         Bins of a block.
     """
-    return _level_at_bins(power, keep, floor, block)(np.arange(len(power)))
+    return _level_at_bins(power, keep, block)(np.arange(len(power)))
 
 
 def _level_at_bins(
-    power: NDArray[np.floating], keep: NDArray[np.bool_], floor: float, block: int, *, evened: bool = False
+    power: NDArray[np.floating], keep: NDArray[np.bool_], block: int, *, evened: bool = False
 ) -> Callable[[NDArray], NDArray[np.float64]]:
     """`local_level` as a function of the bin, from 0 to below their number; evened as in `Periodogram.level_of`."""
     size = len(power)
@@ -287,8 +286,8 @@ def _level_at_bins(
     levels = held[np.arange(count), np.minimum(number // 4, length - 1)] / LEVEL_QUANTILE
     known = np.flatnonzero(number >= length / 3)
     if not len(known):
-        return lambda bins: np.full(np.shape(bins), floor)
-    logs = np.log(np.maximum(levels[known], 0.1 * floor))
+        return lambda bins: np.ones(np.shape(bins))
+    logs = np.log(np.maximum(levels[known], 0.1))
     if evened:  # by the share of their scatter that is chance
         away = logs - logs.mean()
         logs = logs - BLOCK_BIAS - BLOCK_SCATTER / max(float(away.var()), BLOCK_SCATTER) * away
@@ -331,7 +330,7 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
     for tapered in (False, True):
         amplitude = _spectrum(samples, size, tapered=tapered)
         power = squared(amplitude)
-        level = local_level(power, full, 1.0, block)
+        level = local_level(power, full, block)
         whitened = (power / level).astype(np.float32)
         if whitened[keep].max(initial=0) <= 10 ** (TAPER_FROM_DB / 10):
             break

@@ -28,7 +28,7 @@ IMAGE_FACTOR = 6.0
 MOST_SHARE = 0.3
 
 
-def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None) -> tuple[Periodogram, Comb]:
+def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None) -> tuple[Periodogram, Comb]:
     """Fit a comb again with the lines that unlike blades have between its own, and take these out of the record.
 
     Parameters
@@ -37,8 +37,8 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None = None)
         The record.
     comb : Comb
         The comb found in it.
-    blades : int, optional
-        Of a rotor: their number is else one of `blade_numbers`, if lines show it.
+    blades : int or None
+        Of a rotor, where that is known: their number is else one of `blade_numbers`, if lines show it.
 
     Returns
     -------

@@ -102,9 +102,7 @@ def vehicle(rng: np.random.Generator, radar: Radar) -> Scene:
     return Scene(level(body, 0), level(micro, rng.uniform(-30, -12)))
 
 
-def wind_turbine(
-    rng: np.random.Generator, radar: Radar, points: int = 150, tower_db: float | None = None, law: str | None = None
-) -> Scene:
+def wind_turbine(rng: np.random.Generator, radar: Radar, points: int = 150, law: str | None = None) -> Scene:
     """A tower and three blades of 25 to 60 m; a "cloud" of points over the chord, or a row of "points"."""
     law = law or str(rng.choice(["cloud", "points"]))
     length, tip_mps = rng.uniform(25, 60), rng.uniform(40, 85)
@@ -124,7 +122,7 @@ def wind_turbine(
             place = along[part, None, None] * direction + chord[part, None, None] * chordwise
             micro += echo(start + place, radar)
     tower = np.full(radar.pulses, np.exp(2j * np.pi * rng.uniform()), np.complex64)
-    return Scene(level(tower, rng.uniform(0, 25) if tower_db is None else tower_db), level(micro, 0))
+    return Scene(level(tower, rng.uniform(0, 25)), level(micro, 0))
 
 
 def noise(rng: np.random.Generator, radar: Radar) -> Scene:

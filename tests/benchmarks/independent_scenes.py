@@ -7,6 +7,7 @@ only knows the product's own drawings shows it here. Radar at the origin, x to t
 """
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -55,12 +56,10 @@ def rotor(
     return out
 
 
-def flight(
-    rng: np.random.Generator, radar: Radar, speed_mps: tuple[float, float], range_m: tuple[float, float] = (100, 1500)
-) -> tuple[np.ndarray, np.ndarray]:
+def flight(rng: np.random.Generator, radar: Radar, speed_mps: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
     """A straight track (pulses, 3) at an elevation of 2 to 25 degrees, and its heading."""
     elevation, heading = np.deg2rad(rng.uniform(2, 25)), rng.uniform(0, 2 * np.pi)
-    start = rng.uniform(*range_m) * np.array([np.cos(elevation), 0, np.sin(elevation)])
+    start = rng.uniform(100, 1500) * np.array([np.cos(elevation), 0, np.sin(elevation)])
     ahead = unit(np.array([np.cos(heading), np.sin(heading), rng.normal(0, 0.05)]))
     return start + radar.time_s[:, None] * ahead * rng.uniform(*speed_mps), ahead
 
@@ -77,59 +76,37 @@ def multicopter(
     rotors: int = 4,
     *,
     law: str | None = None,
-    blades_db: float | None = None,
     radius_m: tuple[float, float] = (0.10, 0.20),
     rate_hz: tuple[float, float] = (65, 120),
-    spread: tuple[float, float] = (0.01, 0.08),
-    speed_mps: tuple[float, float] | None = None,
-    tilt_deg: float = 20,
 ) -> Scene:
-    """Rotors on a ring, each at its own rate; `blades_db` is all blades' power over the body's (default -20 to -5)."""
+    """Rotors on a ring, each at its own rate; all blades' power is 5 to 20 dB under the body's."""
     law = law or str(rng.choice(BLADE_LAWS))
     hover = rng.uniform() < 0.3
-    track, _ = flight(rng, radar, speed_mps or ((0, 0.5) if hover else (2, 18)))
-    axis = tilted(rng, 5 if hover else tilt_deg)
+    track, _ = flight(rng, radar, (0, 0.5) if hover else (2, 18))
+    axis = tilted(rng, 5 if hover else 20)
     radius, rate = rng.uniform(*radius_m), rng.uniform(*rate_hz)
     first, second = across(axis)
     micro = np.zeros(radar.pulses, np.complex64)
     arm = 1.3 * radius / np.sin(np.pi / rotors)
-    turn, rates = rng.uniform(0, 2 * np.pi), rate * (1 + rng.uniform(*spread) * rng.uniform(-1, 1, rotors))
+    turn, rates = rng.uniform(0, 2 * np.pi), rate * (1 + rng.uniform(0.01, 0.08) * rng.uniform(-1, 1, rotors))
     for index in range(rotors):
         around = turn + 2 * np.pi * index / rotors
         hub = track + arm * (np.cos(around) * first + np.sin(around) * second)
         micro += rotor(rng, radar, hub, axis, blades=2, radius_m=radius, rate_hz=rates[index], law=law)
     places = track + rng.normal(0, 0.5 * arm, (5, 1, 3)) * [1, 1, 0.3]
     body = echo(places, radar, rng.rayleigh(1, (5, 1)))
-    return Scene(level(body, 0), level(micro, rng.uniform(-20, -5) if blades_db is None else blades_db))
-
-
-def quadcopter(rng: np.random.Generator, radar: Radar) -> Scene:
-    return multicopter(rng, radar)
+    return Scene(level(body, 0), level(micro, rng.uniform(-20, -5)))
 
 
 def quadcopter_over_ground(rng: np.random.Generator, radar: Radar) -> Scene:
-    """The same with ground in its cell, 0 to 25 dB over its body."""
+    """A quadcopter with ground in its cell, 0 to 25 dB over its body."""
     scene = multicopter(rng, radar)
     return Scene(scene.body + level(clutter.ground(rng, radar).micro, rng.uniform(0, 25)), scene.micro)
 
 
-def quadcopter_of_tips(rng: np.random.Generator, radar: Radar) -> Scene:
-    """Blades that reflect at their tips alone: no flash, and the power at the edges of the band."""
-    return multicopter(rng, radar, law="tip")
-
-
-def turbine_of_points(rng: np.random.Generator, radar: Radar) -> Scene:
-    """A wind turbine whose blades are 40 even points: for a while its lines are as even as a rotor's."""
-    return clutter.wind_turbine(rng, radar, 40, law="points")
-
-
-def hexacopter(rng: np.random.Generator, radar: Radar) -> Scene:
-    return multicopter(rng, radar, 6, radius_m=(0.15, 0.30), rate_hz=(40, 75))
-
-
-def helicopter(rng: np.random.Generator, radar: Radar, law: str | None = None, blades_db: float | None = None) -> Scene:
+def helicopter(rng: np.random.Generator, radar: Radar) -> Scene:
     """A model helicopter: main rotor of 0.35 to 0.8 m and a tail rotor 4 to 5.5 times as fast."""
-    law = law or str(rng.choice(BLADE_LAWS))
+    law = str(rng.choice(BLADE_LAWS))
     track, ahead = flight(rng, radar, (0, 20))
     rate, radius = rng.uniform(20, 40), rng.uniform(0.35, 0.8)
     main = rotor(rng, radar, track, tilted(rng, 10), blades=2, radius_m=radius, rate_hz=rate, law=law)
@@ -146,20 +123,14 @@ def helicopter(rng: np.random.Generator, radar: Radar, law: str | None = None, b
     )
     body = echo(track - np.linspace(0, 1.2 * radius, 6)[:, None, None] * ahead, radar, rng.rayleigh(1, (6, 1)))
     micro = level(main, 0) + level(tail, rng.uniform(-15, -5))
-    return Scene(level(body, 0), level(micro, rng.uniform(-18, -3) if blades_db is None else blades_db))
+    return Scene(level(body, 0), level(micro, rng.uniform(-18, -3)))
 
 
-def fixed_wing(
-    rng: np.random.Generator,
-    radar: Radar,
-    law: str | None = None,
-    blades_db: float | None = None,
-    off_nose_deg: tuple[float, float] = (20, 160),
-) -> Scene:
+def fixed_wing(rng: np.random.Generator, radar: Radar) -> Scene:
     """One two-bladed propeller whose axis is the line of flight, seen at 20 to 160 degrees off the nose."""
-    law = law or str(rng.choice(BLADE_LAWS))
+    law = str(rng.choice(BLADE_LAWS))
     track, _ = flight(rng, radar, (0, 0))
-    off = np.deg2rad(rng.uniform(*off_nose_deg)) * rng.choice([-1, 1])
+    off = np.deg2rad(rng.uniform(20, 160)) * rng.choice([-1, 1])
     ahead = unit(np.array([-np.cos(off), np.sin(off), rng.normal(0, 0.05)]))
     track = track + radar.time_s[:, None] * ahead * rng.uniform(12, 28)
     nose = track + 0.4 * ahead
@@ -168,7 +139,7 @@ def fixed_wing(
     wing = rng.uniform(-0.8, 0.8, (5, 1, 1)) * unit(np.cross(ahead, [0, 0, 1]))
     places = np.concatenate([track + wing, track - rng.uniform(0, 0.8, (3, 1, 1)) * ahead])
     body = echo(places, radar, rng.rayleigh(1, (8, 1)))
-    return Scene(level(body, 0), level(propeller, rng.uniform(-25, -8) if blades_db is None else blades_db))
+    return Scene(level(body, 0), level(propeller, rng.uniform(-25, -8)))
 
 
 # wingbeat [Hz] and span [m]: swan, gull, goose, crow, pigeon, swallow, starling, siskin
@@ -200,12 +171,10 @@ def bird(
     start_m: np.ndarray | None = None,
     ahead: np.ndarray | None = None,
     speed_mps: float | None = None,
-    stroke: float = 1.0,
-    parts: int = 4,
 ) -> Scene:
     """An ellipsoid with two wings of two segments (JEES 2021: inner 40 cos + 15 deg, outer 30 cos + 40 deg, swept).
 
-    The body heaves against the wings. Every segment is a row of spheroids.
+    The body heaves against the wings. Every segment is a row of four spheroids.
     """
     beat_hz, span = kind or BIRDS[rng.integers(len(BIRDS))]
     beat_hz, span = beat_hz * rng.uniform(0.85, 1.15), span * rng.uniform(0.85, 1.15)
@@ -219,8 +188,8 @@ def bird(
     place = start + radar.time_s[:, None] * ahead * speed + heave[:, None] * [0, 0, 1]
     side, up = unit(np.cross(ahead, [0, 0, 1])), np.array([0.0, 0.0, 1.0])
     body = echo(place[None], radar, spheroid(0.3 * span, 0.07 * span, ahead, sight))
-    inner = np.deg2rad(40 * stroke * np.cos(phase) + 15) if flapping else np.deg2rad(5 + 0 * phase)
-    bend = np.deg2rad(30 * stroke * np.cos(phase + 0.6) - 10) if flapping else 0 * phase
+    inner = np.deg2rad(40 * np.cos(phase) + 15) if flapping else np.deg2rad(5 + 0 * phase)
+    bend = np.deg2rad(30 * np.cos(phase + 0.6) - 10) if flapping else 0 * phase
     sweep = np.deg2rad(20 * np.sin(phase)) if flapping else 0 * phase
     micro = np.zeros(radar.pulses, np.complex64)
     for hand in (-1, 1):
@@ -231,19 +200,11 @@ def bird(
                 + (np.sin(lift) * np.cos(back))[:, None] * up
                 + np.sin(back)[:, None] * ahead
             )
-            amplitude = spheroid(length / parts, 0.02 * span, axis, sight)
-            middles = (np.arange(parts) + 0.5) / parts * length
+            amplitude = spheroid(length / 4, 0.02 * span, axis, sight)
+            middles = (np.arange(4) + 0.5) / 4 * length
             micro += echo(joint + middles[:, None, None] * axis, radar, amplitude)
             joint = joint + length * axis
     return Scene(body, micro) if flapping else Scene(body + micro, np.zeros_like(micro))
-
-
-def flapping_bird(rng: np.random.Generator, radar: Radar) -> Scene:
-    return bird(rng, radar)
-
-
-def gliding_bird(rng: np.random.Generator, radar: Radar) -> Scene:
-    return bird(rng, radar, flapping=False)
 
 
 def flock(rng: np.random.Generator, radar: Radar) -> Scene:
@@ -265,13 +226,13 @@ def flock(rng: np.random.Generator, radar: Radar) -> Scene:
 
 
 KINDS: dict[str, tuple[str, Callable[[np.random.Generator, Radar], Scene]]] = {
-    "quadcopter": ("uav", quadcopter),
+    "quadcopter": ("uav", multicopter),
     "quad_over_ground": ("uav", quadcopter_over_ground),
-    "hexacopter": ("uav", hexacopter),
+    "hexacopter": ("uav", partial(multicopter, rotors=6, radius_m=(0.15, 0.30), rate_hz=(40, 75))),
     "helicopter": ("uav", helicopter),
     "fixed_wing": ("uav", fixed_wing),
-    "flapping_bird": ("bird", flapping_bird),
-    "gliding_bird": ("bird", gliding_bird),
+    "flapping_bird": ("bird", bird),
+    "gliding_bird": ("bird", partial(bird, flapping=False)),
     "flock": ("bird", flock),
     "ground": ("clutter", clutter.ground),
     "rain": ("clutter", clutter.rain),
@@ -280,7 +241,9 @@ KINDS: dict[str, tuple[str, Callable[[np.random.Generator, Radar], Scene]]] = {
     "vehicle": ("clutter", clutter.vehicle),
     "wind_turbine": ("clutter", clutter.wind_turbine),
     "noise": ("clutter", clutter.noise),
-    "quad_of_tips": ("uav", quadcopter_of_tips),
-    "turbine_of_points": ("clutter", turbine_of_points),
+    # no flash, and the power at the edges of the band
+    "quad_of_tips": ("uav", partial(multicopter, law="tip")),
+    # for a while its lines are as even as a rotor's
+    "turbine_of_points": ("clutter", partial(clutter.wind_turbine, points=40, law="points")),
 }
 """What a kind should be called, and what makes one of it."""

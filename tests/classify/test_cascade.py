@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 from bladewing.classify import BadInput, Classifier, model_file
-from bladewing.classify.cascade import SURE, Cascade
+from bladewing.classify.inference import SURE, Cascade
 from bladewing.classify.ladder import CASCADE, STAGES_KEY, shipped_account
 from bladewing.classify.model_file import CURVE_KEY, model_names
 from bladewing.features import model_inputs
@@ -118,7 +118,7 @@ def test_what_a_cascade_cannot_do_is_told_in_one_line(tmp_path, monkeypatch):
         Classifier.load(CASCADE, coverage=0.9)
     with pytest.raises(BadInput, match=r"cascade: two models.*give one of them as --model"):
         export_raw_iq(tmp_path / "x.onnx", **RADAR, pulses=500, model=CASCADE)
-    monkeypatch.setattr("bladewing.classify.cascade.shipped_account", dict)
+    monkeypatch.setattr("bladewing.classify.inference.shipped_account", dict)
     with pytest.raises(BadInput, match="tells of no 'cascade'"):
         Classifier.load(CASCADE)
 

@@ -14,17 +14,10 @@ from bladewing.classify.recording import load_recording
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 from scipy.signal import hilbert
 
-CARRIER_HZ, PRF_HZ, PULSES = 9.85e9, 35e3, 3000
+from ..features.signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, white
+
 RADAR = ["--carrier-hz", "9.85e9", "--prf-hz", "35e3"]
 RATE_HZ, LENGTH_M, VELOCITY_MPS = 57.7, 0.15, -20.0
-
-
-WAVELENGTH_M = 299_792_458.0 / CARRIER_HZ
-
-
-def white(rng, pulses):
-    """Complex noise of unit power a sample."""
-    return (rng.standard_normal(pulses) + 1j * rng.standard_normal(pulses)) * np.sqrt(0.5)
 
 
 def spinning(rate_hz, pulses):

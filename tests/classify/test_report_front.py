@@ -13,8 +13,8 @@ from bladewing.classify.report import front, pictures, stft
 from bladewing.classify.report.detection_bound import detection_bound
 from bladewing.classify.report.memory import peak_bytes
 from bladewing.classify.report.operations import counted_transforms, network_operations
-from bladewing.classify.report.timing import Laps, quote, ratio
 from bladewing.classify.report.words import micros, millis, number, size
+from bladewing.classify.timing import Laps, quote, ratio
 from bladewing.simulate import Radar
 
 RADAR = Radar(carrier_hz=9.85e9, prf_hz=25e3, pulses=2000)

@@ -16,8 +16,8 @@ import pytest
 from bladewing.classify import BadInput, Classifier
 from bladewing.classify.report import cost, run, scores
 from bladewing.classify.report.page import draw_page
-from bladewing.classify.report.timing import Laps
 from bladewing.classify.stability.cell import Cell
+from bladewing.classify.timing import Laps
 from bladewing.features.schema import INPUT_SHAPES
 
 

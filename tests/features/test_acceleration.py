@@ -6,9 +6,7 @@ from bladewing.features.heave import heave
 from bladewing.features.steady_comb import steady_comb
 from bladewing.simulate import Scene
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
-
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, WAVELENGTH_M, rotors, tone, white
 
 
 def accelerated(iq, acceleration_mps2):

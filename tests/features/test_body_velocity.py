@@ -5,9 +5,8 @@ from bladewing.features.body_velocity import NOISE_BINS
 from bladewing.features.spectrum import KAISER_BETA
 from bladewing.simulate import RotorMotion, rotor_echo
 
-from .signals import CARRIER_HZ, PRF_HZ, WAVELENGTH_M, rotors_by_chance, white
+from .signals import CARRIER_HZ, PRF_HZ, RADAR, WAVELENGTH_M, rotors_by_chance, white
 
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 PULSES = 700
 BIN_MPS = PRF_HZ / PULSES * WAVELENGTH_M / 2
 

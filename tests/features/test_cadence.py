@@ -11,9 +11,8 @@ from bladewing.features.spectrum import taper
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, rotors, tone, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, rotors, tone, white
 
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 EDGES_HZ = cadence_edges_hz()
 
 

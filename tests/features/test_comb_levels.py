@@ -24,9 +24,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate, special
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, rotors, tone, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, rotors, tone, white
 
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 EDGES_HZ = comb_edges_hz()
 
 

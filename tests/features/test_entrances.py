@@ -10,7 +10,7 @@ from bladewing.features.steady_comb import steady_comb
 from bladewing.features.stft import stft
 from bladewing.features.wingbeat import wingbeat
 
-from .signals import CARRIER_HZ, PRF_HZ, rotors
+from .signals import PRF_HZ, RADAR, rotors
 
 ENTRANCES = {
     "body_acceleration": body_acceleration,
@@ -23,7 +23,6 @@ ENTRANCES = {
     "wingbeat": wingbeat,
     "without_acceleration": partial(without_acceleration, acceleration_mps2=np.zeros(())),
 }
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 
 
 @pytest.mark.parametrize("entrance", ENTRANCES.values(), ids=list(ENTRANCES))

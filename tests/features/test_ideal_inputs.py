@@ -8,11 +8,9 @@ from bladewing.features import FEATURES, INPUT_SHAPES, model_inputs
 from bladewing.features.chopping import _evidence
 from bladewing.simulate.scene import Scene
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, WAVELENGTH_M, rotors, tone, white
 
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 NAMES = [f.name for f in FEATURES]
-RADAR_NAMES = ("velocity_step_log", "unambiguous_log", "dwell_log", "pulses_log")
 STEP_HZ = 240.0  # of the comb, off the bin
 
 

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from scipy.signal import ShortTimeFFT
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, rotors, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, rotors, white
 
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 ALL = tuple(INPUT_SHAPES)
 
 

@@ -7,10 +7,8 @@ import pytest
 from bladewing.features import JOINT_FEATURES, model_inputs
 from bladewing.features.shape import SPEED_BANDS_MPS
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, tone, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, TIMES_S, WAVELENGTH_M, tone, white
 
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
-TIMES_S = np.arange(PULSES) / PRF_HZ
 #: Cadences of frames over a dwell stand so far apart [Hz].
 CADENCE_HZ = PRF_HZ / PULSES
 

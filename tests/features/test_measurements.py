@@ -11,9 +11,7 @@ from bladewing.features.spectrum import taper
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
-
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, WAVELENGTH_M, rotors, tone, white
 
 
 def measured(iq):

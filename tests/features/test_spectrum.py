@@ -6,9 +6,7 @@ from bladewing.features.spectrum import KAISER_BETA, NOISE_BANDWIDTH_BINS, centr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from .signals import CARRIER_HZ, PRF_HZ, WAVELENGTH_M, tone, white
-
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+from .signals import PRF_HZ, RADAR, WAVELENGTH_M, tone, white
 
 
 def test_side_lobes_lie_under_minus_90_db():

@@ -13,9 +13,8 @@ from bladewing.features.stft import (
 from scipy.signal import ShortTimeFFT
 from scipy.signal.windows import hann
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, WAVELENGTH_M, rotors, tone, white
 
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 RATE_HZ = 57.7
 
 

@@ -5,7 +5,6 @@ from bladewing.simulate import Scene
 
 from .signals import CARRIER_HZ, PRF_HZ, WAVELENGTH_M, tone, white
 
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 LONG = {"carrier_hz": CARRIER_HZ, "prf_hz": 4e3}
 SECONDS = 2.5
 

@@ -102,7 +102,7 @@ def _thread_clock() -> Callable[[], int]:
     return time.thread_time_ns if fine else time.perf_counter_ns
 
 
-def typical(laps: Sequence[float] | NDArray[np.floating], turns: int = 1) -> float:
+def typical(laps: Sequence[float] | NDArray[np.floating], turns: int) -> float:
     """Median of laps; of pieces that took turns, the mean of each one's median: some may cost twice what others do.
 
     Parameters
