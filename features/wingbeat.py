@@ -193,7 +193,7 @@ def _not_wings(found: Repetition, body_mps: float, motion: _Motion, far: LevelSp
     """Why a repetition is not a wingbeat; empty where it may be one."""
     rate, reach, speed = found.rate_hz, motion.reach_mps, abs(body_mps)
     if found.evidence < LEAST_EVIDENCE:
-        return f"nothing repeats: evidence {max(found.evidence, 0):.0f} nats, {LEAST_EVIDENCE:.0f} are needed"
+        return f"nothing repeats: {max(found.evidence, 0):.0f} deviations over chance, {LEAST_EVIDENCE:.0f} are needed"
     if found.moving_share < LEAST_MOVING_SHARE:
         return f"what repeats at {rate:.1f} Hz rises and falls at all velocities alike, as fading does"
     if far is not None and far.at(rate) > FAR_EVIDENCE:
