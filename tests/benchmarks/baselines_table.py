@@ -24,7 +24,7 @@ from scipy import fft
 from .baselines import BASELINES
 from .ratios import cpu_seconds
 
-OURS = ("features-boosted", "spectrum-cnn-fast", "spectrum-cnn")
+OURS = ("features-boosted", "spectrum-cnn-fast", "spectrum-cnn", "spectrum-cnn-wide")
 TIMED = Radar(9.85e9, 25e3, 2048)
 
 

@@ -48,7 +48,7 @@ def test_modules_load_what_they_need_when_they_need_it(module):
 
 def test_the_package_gives_what_it_names_and_nothing_else():
     assert {getattr(classify, name).__module__.rpartition(".")[2] for name in classify.__all__} == {
-        "errors", "inference", "predict", "recording",
+        "errors", "inference", "predict", "recording", "track",
     }  # fmt: skip
     with pytest.raises(AttributeError, match="has no attribute 'guess'"):
         _ = classify.guess
