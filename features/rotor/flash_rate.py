@@ -13,6 +13,7 @@ from ..lines import squared
 from .comb_search import FINE_STEPS, Candidate, factors_about, score, spacing_limits
 from .flashes import flash_evidence
 from .folding import comes_round, may_come_back, outermost_orders
+from .octaves import MULTIPLE_SHARE
 from .periodogram import PADDING, Periodogram
 
 #: The power over time speaks where the mean line of it is so many times its noise.
@@ -51,9 +52,10 @@ def of_flashes(data: Periodogram, found: Candidate) -> Candidate:
     scores, lows, highs = score(data.contrast, spacings, centres, outermost_orders(data, spacings))
     scores += flash_evidence(data, spacings, centres, lows, highs)
     best = int(scores.argmax())
-    if multiples[best // len(steps)] == 1:
+    # it must be the same lines: at 5.8 to 24 GHz 34 of 36 right ones had this share, 9 of 32 wrong ones had not
+    if multiples[best // len(steps)] == 1 or scores[best] < MULTIPLE_SHARE * found.score:
         return found
-    most = max(float(scores[best]), found.score)  # it is the same lines
+    most = max(float(scores[best]), found.score)
     return Candidate(float(spacings[best]), found.centre, int(lows[best]), int(highs[best]), most)
 
 

@@ -8,6 +8,7 @@ from bladewing.features import measure
 from bladewing.features.rotor.comb_search import Candidate
 from bladewing.features.rotor.flash_rate import of_flashes
 from bladewing.features.rotor.periodogram import prepare
+from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 
 from ..signals import CARRIER_HZ, PRF_HZ, WAVELENGTH_M, rotors, rotors_by_chance, white
 
@@ -58,3 +59,19 @@ def test_a_comb_that_ends_within_the_span_or_does_not_come_round_is_left_as_it_i
     for spacing, order in ((1 / 150, 40), (1 / 150.5, 70)):
         found = Candidate(spacing, 0.0, -order, order, 100.0)
         assert of_flashes(data, found) is found
+
+
+@pytest.mark.parametrize("seed", [10, 58, 103, 170, 188])
+def test_flashes_of_several_rotors_take_no_comb_that_lacks_the_lines(seed):
+    # flashes of four rotors at times of chance passed for those of three to five times their chopping frequency
+    rng = np.random.default_rng(seed)
+    carrier_hz, prf_hz, wavelength_m = 5.8e9, 5e3, SPEED_OF_LIGHT_MPS / 5.8e9
+    around = rng.integers(20, 70) + rng.uniform(-0.05, 0.05)  # spacings in the span
+    rates_hz = prf_hz / around / 2 * (1 + rng.uniform(-0.004, 0.004, 4))
+    tip_mps = rng.uniform(0.9, 1.1) * wavelength_m * prf_hz / 4
+    times_s = np.arange(512) / prf_hz
+    length_m = tip_mps / (2 * np.pi * rates_hz.max())
+    echo = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=wavelength_m, length_m=length_m) + 2
+    iq = echo * np.exp(-4j * np.pi * rng.uniform(-20, 20) * times_s / wavelength_m) + 0.3 * white(rng, 512)
+    found = measure(iq.astype(np.complex64), carrier_hz=carrier_hz, prf_hz=prf_hz)
+    assert found.chopping_hz == pytest.approx(2 * rates_hz.mean(), rel=0.01)
