@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from .comb_search import FINE_STEPS, FLASH_SHARE, Candidate, factors_about, loudest_of_each, spacing_limits
 from .flashes import flash_evidence
 from .folding import may_come_back
-from .octaves import MULTIPLE_SHARE
 from .periodogram import Periodogram
 
 #: A comb may be such a fraction where fewer of its lines are there than the one share: then a multiple is the rotor's
@@ -28,11 +27,6 @@ LEAST_MEAN_NATS = 2.5
 #: And where so large a share of what speaks for the comb found speaks for it: one that holds two rotors' lines among
 #: others is hardly twice as loud as the louder one, some outer lines by chance are a far smaller share.
 WHOLE_SHARE = 0.65
-
-#: Over twice the spacing this large a share is asked: half of a second rotor's lines lie in the first one's there, and
-#: of a lone one's lines near the noise every second one may be there by chance. At 3.3 to 35 GHz, and in long dwells of
-#: 4 to 8 rotors, 11 of 13 that were right to take had it, and none of 10 combs that were a rotor's own.
-TWICE_SHARE = MULTIPLE_SHARE
 
 #: Multiples tried.
 MULTIPLES = range(2, 10)
@@ -68,8 +62,7 @@ def of_one_rotor(data: Periodogram, found: Candidate) -> Candidate:
     each = zip(*(values.tolist() for values in (spacings, about, lows, highs, scores)), strict=True)
     whole = [one for one in starmap(Candidate, each) if _is_whole(data, one)]
     best = max((_with_its_flashes(data, one) for one in whole), key=lambda one: one.score, default=found)
-    share = TWICE_SHARE if round(best.spacing / found.spacing) == 2 else WHOLE_SHARE
-    return best if best.score > share * found.score else found
+    return best if best.score > WHOLE_SHARE * found.score else found
 
 
 def _lines_there(data: Periodogram, comb: Candidate) -> tuple[float, float]:
