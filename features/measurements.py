@@ -26,7 +26,8 @@ class Measurements:
     chopping_hz, chopping_hz_std : ndarray
         Chopping frequency, blades x rotation rate [Hz]; of several rotors, that of their mean rate, which a rotor so
         strong that it may be two moves by its deviation. Where the rate changes within the dwell, that of the even
-        turn that comes nearest.
+        turn that comes nearest. Of a helicopter it is the main rotor's, or the tail's where the dwell holds too few
+        flashes of the main one.
     chopping_drift_hz_per_s, chopping_drift_hz_per_s_std : ndarray
         Its even change within the dwell [Hz/s]; of several rotors that of their mean, NaN where they are not resolved.
         Neither velocity nor an even acceleration of the body passes for it.
