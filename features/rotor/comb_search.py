@@ -107,8 +107,9 @@ class _Grid:
 
 
 @lru_cache(maxsize=16)
-def _grid(pulses: int, shortest: float, longest: float) -> _Grid:
-    """Periods in geometric steps of half a bin at the edge of the span."""
+def _grid(pulses: int, low: float, high: float) -> _Grid:
+    """Periods of spacings between two [cycles a sample], in geometric steps of half a bin at the edge of the span."""
+    shortest, longest = 1 / high, 1 / low
     count = int(np.ceil(np.log(longest / shortest) * 2 * pulses / MAX_PERIODS * 2)) + 1
     periods = np.geomspace(shortest, longest, count)
     summed = np.clip((0.9 * pulses / periods).astype(np.intp), 1, MAX_PERIODS)
@@ -134,7 +135,7 @@ def spacing_limits(pulses: int, prf_hz: float) -> tuple[float, float]:
 def coarse_spacings(data: Periodogram, evidence: Evidence, centre: float) -> NDArray[np.float64]:
     """Spacings worth a closer look [cycles a sample], best of every band first, with their octaves."""
     low, high = spacing_limits(data.pulses, data.prf_hz)
-    grid = _grid(data.pulses, 1 / high, 1 / low)
+    grid = _grid(data.pulses, low, high)
     size = len(data.power)
     offset = np.arange(size) / size - centre
     distance = np.abs(offset - np.rint(offset))
@@ -165,7 +166,7 @@ def free_spacings(data: Periodogram, evidence: Evidence) -> list[tuple[float, fl
     The phase of the autocorrelation at multiples of the period tells the centre, up to whole spacings.
     """
     low, high = spacing_limits(data.pulses, data.prf_hz)
-    grid = _grid(data.pulses, 1 / high, 1 / low)
+    grid = _grid(data.pulses, low, high)
     size = len(data.power)
     offset = np.arange(size) / size
     distance = np.abs(offset - np.rint(offset))

@@ -282,7 +282,7 @@ def _turned(data: Periodogram, spectrum: Spectrum, family: Family, blades: int |
     comb = by_rotation(family.comb)
     even, other = evened(comb)
     if even is None:
-        return _changing(data, spectrum, family, edge)
+        return _changing(data, family, edge)
     if _is_one(other) and other.comb.blades > comb.blades:  # narrow, its lines show weak ones that pulled at its rate
         comb = by_rotation(replace(family.comb, blades=other.comb.blades))
         finer = evened(comb)
@@ -292,7 +292,7 @@ def _turned(data: Periodogram, spectrum: Spectrum, family: Family, blades: int |
     slower = other is not None and other.gear is not None and other.comb.chopping < (1 - FAR_OFF) * comb.chopping
     if _is_one(other) and not slower:
         return other
-    apart = _changing(data, spectrum, family, edge)
+    apart = _changing(data, family, edge)
     # and several that are so but for a change that they share are believed where nothing better is found
     if family.is_told_apart or apart.is_told_apart or other is None or not other.is_told_apart:
         return apart
@@ -304,7 +304,7 @@ def _is_one(family: Family | None) -> TypeGuard[Family]:
     return family is not None and family.is_told_apart and len(family.rotors.rates) == 1
 
 
-def _changing(data: Periodogram, spectrum: Spectrum, family: Family, edge: float) -> Family:
+def _changing(data: Periodogram, family: Family, edge: float) -> Family:
     """A family of several rotors whose rates change; the one given where none do, or that does not tell them apart.
 
     Rotors that were told apart as steady ones, and are not, must be told apart as such that change. Where one side of
