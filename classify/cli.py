@@ -124,9 +124,9 @@ def predict(
     from . import predict as work
     from .inference import Classifier
     from .recording import of_each
-    from .samples import positive
+    from .samples import dwell_length, positive
 
-    dwell_s = positive(dwell, "--dwell [s]")
+    dwell_s = dwell_length(dwell)
     rule = {"--budget-us": budget_us, "--max-false-alarm": max_false_alarm, "--coverage": coverage}
     for option, value in rule.items():
         if value is not None:

@@ -19,7 +19,7 @@ from .envelope import Envelope, exchanged
 from .errors import BadInput
 from .progress import Progress
 from .recording import Recording
-from .samples import positive
+from .samples import dwell_length
 from .terminal import counted
 
 #: What a dwell's JSON object holds beside its times and the reason, in this order.
@@ -100,13 +100,13 @@ class Settings:
         Raises
         ------
         BadInput
-            The dwell is not above 0, there is no such number of blades, or beta is not in 0 to below 90 degrees.
+            The dwell is not within 0 to 5 s, there is no such number of blades, or beta not in 0 to below 90 degrees.
         """
         if blades is not None and not 1 <= blades <= MOST_BLADES_GIVEN:
             raise BadInput(f"--blades is {blades}: it must be a whole number of 1 to {MOST_BLADES_GIVEN}")
         if beta_deg is not None and not 0 <= beta_deg < 90:
             raise BadInput(f"--beta-deg is {beta_deg:g}: it must be at least 0 and below 90 [deg]")
-        return cls(positive(dwell_s, "--dwell [s]"), blades, None if beta_deg is None else math.radians(beta_deg))
+        return cls(dwell_length(dwell_s), blades, None if beta_deg is None else math.radians(beta_deg))
 
 
 @dataclass(frozen=True, eq=False)

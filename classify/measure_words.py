@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
     from .measure import Measured
 
-#: Where the middle half of so many combs and more reaches over this ratio, they are not the same in all dwells.
+#: Where the middle half of so many combs and more reaches over this ratio, they are not the same in all dwells, and no
+#: rotor is named: a wind turbine's blades, hundreds of echoes each, show another comb in every second dwell.
 LEAST_COMBS, UNSTEADY = 4, 1.25
 
 #: Bodies whose velocity differs by more from dwell to dwell have no single one [m/s].
@@ -68,6 +69,12 @@ def _sentence(found: "Measured") -> str:
     body = _body(all_together)
     if not all_together["with_comb"]:
         return f"no rotor in {counted(all_together['dwells'])}{body}"
+    where = f"comb in {all_together['with_comb']} of {counted(all_together['dwells'])}"
+    if all_together["with_comb"] <= CHANCE * all_together["dwells"]:
+        where += ", perhaps by chance"
+    gear = _gear(found)
+    if not gear and (unsteady := _unsteady(found)):
+        return f"{where}; {unsteady}{body}{_wheel(found)}"
     clear = found.clearest()
     v = found.values
     rates = v.rotor_rates_hz[clear]
@@ -88,12 +95,8 @@ def _sentence(found: "Measured") -> str:
         )
         rotor = "blades x rate: " + " or ".join(options)
         rotor += _blades(found)
-    where = f"comb in {all_together['with_comb']} of {counted(all_together['dwells'])}"
-    if all_together["with_comb"] <= CHANCE * all_together["dwells"]:
-        where += ", perhaps by chance"
     folded = str(v.band_reason[clear])
-    doubts = f"{_wheel(found)}{_unsteady(found)}{_unlike(found)}"
-    return f"{where}; {rotor}{body}{_gear(found)}{doubts}{folded and '; ' + folded}"
+    return f"{where}; {rotor}{body}{gear}{_wheel(found)}{_unlike(found)}{folded and '; ' + folded}"
 
 
 def _body(all_together: Mapping[str, Any]) -> str:
@@ -116,12 +119,15 @@ def _blades(found: "Measured") -> str:
 
 
 def _unsteady(found: "Measured") -> str:
-    """Words of caution where the combs of the dwells are not one rotor's: most differ by more than it changes."""
-    chopping_hz = found.values.chopping_hz[np.isfinite(found.values.chopping_hz)]
-    low, high = np.quantile(chopping_hz, [0.25, 0.75])
-    if len(chopping_hz) < LEAST_COMBS or high < UNSTEADY * low:
+    """What is said where the combs of the dwells are not one rotor's: most differ by more than it changes; or ""."""
+    v = found.values
+    known = np.sort(v.chopping_hz[v.chopping_hz_std < v.chopping_hz])  # lower bounds bear out any
+    if len(known) < LEAST_COMBS:
         return ""
-    return f"; the dwells do not agree: half of their combs lie within {low:.4g} to {high:.4g} Hz"
+    low, high = known[len(known) // 4], known[-1 - len(known) // 4]
+    if high < UNSTEADY * low:
+        return ""
+    return f"no steady rotor: half of their chopping frequencies lie within {low:.4g} to {high:.4g} Hz"
 
 
 def _unlike(found: "Measured") -> str:

@@ -159,7 +159,7 @@ class Recording:
 
 #: What clipping and a single channel mean for labels, and for what is measured.
 _OF_LABELS = (
-    "no comb that stays is counted",
+    "a strong line's harmonics may pass for a rotor, and no comb that stays is counted",
     "noise may pass for a comb: record I and Q, or make it analytic (scipy.signal.hilbert)",
 )
 _OF_MEASUREMENTS = (
@@ -244,7 +244,10 @@ def find_recording(path: str | os.PathLike[str]) -> Path:
     except OSError as error:
         raise unreadable(path, error) from None
     if given.suffix.lower() not in ARRAY_SUFFIXES:
-        raise BadInput(f"{path}: not a kind of recording known here: give SigMF, {', '.join(ARRAY_SUFFIXES)}")
+        raise BadInput(
+            f"{path}: not a kind of recording known here: give SigMF, {', '.join(ARRAY_SUFFIXES)} (raw int16 I and Q: "
+            'x = np.fromfile(path, "<i2").astype(np.float32); np.save("cell.npy", x[::2] + 1j * x[1::2]))'
+        )
     return given
 
 
@@ -302,7 +305,7 @@ def _one_range_cell(samples: NDArray[np.generic], name: str) -> NDArray[np.compl
     if samples.ndim == 0 or samples.size != max(samples.shape):
         raise BadInput(
             f"{name}: samples of shape {samples.shape}: a recording is one range cell, shape (pulses,): "
-            "store each range cell in a recording of its own"
+            "keep the target's cell alone, cube[:, cell] of a cube (pulses, cells)"
         )
     return complex_samples(samples.reshape(-1), name)
 

@@ -46,8 +46,8 @@ from .pictures import PICTURES
 from .series import LADDER
 from .settings import ReportConfig, report_config
 
-#: Name of the default model with its products in eight bits.
-EIGHT_BITS = f"{DEFAULT_MODEL}-int8"
+#: Name of the default model with its products in eight bits, which is not shipped.
+EIGHT_BITS = f"{DEFAULT_MODEL}-int8-trial"
 
 # The paper's measured radar: X band, PRF 20 to 30 kHz, 80 ms.
 REFERENCE = Radar(carrier_hz=9.85e9, prf_hz=25e3, pulses=2000)

@@ -85,7 +85,6 @@ def test_one_line_a_dwell_and_a_closing_line(run_json, sigmf_pair):
         (0.2, [0.2]),
         (0.11, [0.11]),
         (5.0, [0.2]),  # shorter than one dwell: taken whole
-        (1e300, [0.2]),
         (0.066674, [0.06665, 0.1333, 0.19995]),  # whole pulses: round(dwell x PRF) = 1333
     ],
 )

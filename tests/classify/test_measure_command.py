@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bladewing.classify.cli import main
 from bladewing.classify.measure import Measured, Settings, measure_recording
-from bladewing.classify.measure_words import _blades, _unlike, with_error
+from bladewing.classify.measure_words import _blades, _unlike, _unsteady, with_error
 from bladewing.classify.recording import load_recording
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 from scipy.signal import hilbert
@@ -128,6 +128,25 @@ def test_a_comb_in_a_few_of_many_dwells_is_said_to_be_perhaps_chance(folder, tmp
         assert f"comb in {held} of 20 dwells{', perhaps by chance' if caution else ''}; blades" in said
 
 
+@pytest.mark.parametrize(
+    ("chopping_hz", "said"),
+    [
+        ((140.0, 280.0), ""),
+        ((140.0, 140.0, 210.0), ""),
+        ((140.0, 141.0, 139.0, 280.0), ""),  # one octave slip
+        ((60.0, 100.0, 140.0, 210.0, 280.0, np.nan), "100 to 210"),
+        ((58.0, 70.0, 102.0, 144.0, 162.0, 51.0, 99.0), "58 to 144"),
+    ],
+)
+def test_no_rotor_is_named_where_the_middle_half_of_the_combs_disagrees(chopping_hz, said):
+    chopping_hz = np.array(chopping_hz)
+    values = SimpleNamespace(chopping_hz=chopping_hz, chopping_hz_std=0.01 * chopping_hz)
+    told = _unsteady(SimpleNamespace(values=values))
+    assert (said in told) if said else not told
+    values.chopping_hz_std = 2 * chopping_hz  # lower bounds say nothing of the sort
+    assert _unsteady(SimpleNamespace(values=values)) == ""
+
+
 def test_a_count_of_rotors_that_most_dwells_do_not_share_is_not_given_without_a_word():
     values = SimpleNamespace(
         chopping_hz=np.array([183.0, 368.0, 182.0, 184.0, 184.0, 189.0, np.nan]),
@@ -164,16 +183,22 @@ def test_what_is_shorter_than_a_dwell_is_said_to_be_left_out(folder, capsys):
     assert closing["left_out_s"] == pytest.approx(left_out_s)
     assert main(given) == 0
     assert f"the last {left_out_s:.2g} s, shorter than a dwell, are left out" in capsys.readouterr().out
-    for dwell_s in (80, 1e305):  # 80 ms were meant; and as many pulses are no whole number
-        assert main([*given[:-1], str(dwell_s)]) == 0
-        said = f"its {2 * PULSES / PRF_HZ:.6g} s, shorter than a dwell of {dwell_s:g} s, are taken whole"
-        assert said in capsys.readouterr().out
+    assert main([*given[:-1], "5"]) == 0
+    assert f"its {2 * PULSES / PRF_HZ:.6g} s, shorter than a dwell of 5 s, are taken whole" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", ["measure", "predict"])
+@pytest.mark.parametrize("dwell_s", ["80", "5.1", "1e305"])
+def test_a_dwell_of_seconds_where_milliseconds_were_meant_is_refused(command, dwell_s, folder, capsys):
+    assert main([command, str(folder / "drone.npy"), *RADAR, "--dwell", dwell_s]) == 2
+    said = f"--dwell [s] is {float(dwell_s):g}: it must be at most 5: 80 ms are 0.08"
+    assert said in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_dwell_of_more_pulses_than_can_be_measured_is_refused(tmp_path, capsys):
     np.save(tmp_path / "long.npy", np.ones(70_000, np.complex64))
-    assert main(["measure", str(tmp_path / "long.npy"), *RADAR, "--dwell", "80"]) == 2
-    said = f"a dwell of 80 s takes 70000 pulses, more than 65536: give --dwell in seconds, {64880 / PRF_HZ:.2g} at most"
+    assert main(["measure", str(tmp_path / "long.npy"), *RADAR, "--dwell", "4"]) == 2
+    said = f"a dwell of 4 s takes 70000 pulses, more than 65536: give --dwell in seconds, {64880 / PRF_HZ:.2g} at most"
     assert said in capsys.readouterr().err
 
 
@@ -337,8 +362,8 @@ def test_dwells_whose_combs_are_not_one_rotors_are_told(other_hz, tmp_path, caps
     assert main(["measure", str(tmp_path / "two.npy"), *RADAR, "--dwell", "0.08"]) == 0
     said = capsys.readouterr().out
     assert "comb in 4 of 4 dwells" in said
-    both = f"half of their combs lie within {2 * RATE_HZ:.4g} to {2 * other_hz:.4g} Hz"
-    assert ("do not agree" in said) == (both in said) == (other_hz != RATE_HZ)
+    both = f"half of their chopping frequencies lie within {2 * RATE_HZ:.4g} to {2 * other_hz:.4g} Hz"
+    assert ("no steady rotor" in said) == (both in said) == ("rpm" not in said) == (other_hz != RATE_HZ)
 
 
 def test_a_comb_that_ends_where_the_body_s_speed_does_is_called_a_wheel_s(tmp_path, capsys):

@@ -229,7 +229,7 @@ def test_numbers_have_three_digits_and_the_unit_of_what_is_shown(said: str, text
 
 def test_the_front_holds_every_choice_at_every_dwell(report: dict[str, Any]) -> None:
     rows = report["front"]["choices"]
-    models = ["spectrum-cnn-wide", "always-uav", "spectrum-cnn-wide-int8", "cascade"]
+    models = ["spectrum-cnn-wide", "always-uav", "spectrum-cnn-wide-int8-trial", "cascade"]
     assert [row["name"] for row in rows] == ["spectrum", "stft-80-90", "features", *models]
     for row in rows:
         assert [point["dwell_s"] for point in row["dwells"]] == report["front"]["dwells_s"]
@@ -269,7 +269,7 @@ def test_no_two_choices_look_alike() -> None:
     from bladewing.models import LADDER
 
     rows = [{"name": name, "kind": "picture"} for name in pictures.PICTURES]
-    names = (*LADDER, "spectrum-cnn-wide-int8", "cascade")
+    names = (*LADDER, "spectrum-cnn-wide-int8-trial", "cascade")
     rows += [{"name": "features", "kind": "features"}, *({"name": name, "kind": "model"} for name in names)]
     assert len(set(choice_looks(rows).values())) == len(rows)
 
