@@ -13,6 +13,7 @@ from bladewing.features.measure import MOST_BLADES_GIVEN, beyond_radars, measure
 from bladewing.features.measurements import BODY, EACH_ROTOR, Measurements
 from bladewing.features.one_channel import half_empty, made_analytic
 from bladewing.features.spectrum import centred_power, scaled, unit_scale
+from bladewing.features.window import KAISER
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
 from .envelope import Envelope, exchanged
@@ -325,7 +326,7 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     stop_s = start_s + pulses / recording.prf_hz
     remarks = recording.remarks(settings.dwell_s, iq, measured=True)
     if whole is recording.iq:  # else it is told that there is one channel
-        empty = sum(bool(half_empty(centred_power(scaled(dwell, unit_scale(dwell))))) for dwell in iq)
+        empty = sum(bool(half_empty(centred_power(scaled(dwell, unit_scale(dwell)), window=KAISER))) for dwell in iq)
         if empty > ONE_SIDED * count:
             remarks += (
                 f"one side: half of the spectrum is empty in {empty} of {counted(count)}, as of a single channel that "

@@ -7,6 +7,7 @@ from bladewing.features.bandwidth import threshold_band_hz
 from bladewing.features.chopping import cepstral_chopping
 from bladewing.features.notch import body_line, notch_mask, parabola_offset
 from bladewing.features.spectrum import centred_power, doppler_spectrum, noise_floor, unit_scale
+from bladewing.features.window import KAISER
 from bladewing.simulate.analytic import rotor_lines
 from bladewing.simulate.render import Rendering
 from bladewing.simulate.scene import Scene
@@ -55,8 +56,8 @@ def first_lines_hz(rendering: Rendering) -> float:
     """Distance of the first two lines on the positive side of the body [Hz]: the paper's chopping frequency; or NaN."""
     radar, iq = rendering.radar, rendering.iq
     bins = ZERO_PADDING * next_fast_len(radar.pulses)
-    power = centred_power(iq * unit_scale(iq), bins)
-    level = 10 * np.log10(power / noise_floor(power) + 1e-12)
+    power = centred_power(iq * unit_scale(iq), bins, window=KAISER)
+    level = 10 * np.log10(power / noise_floor(power, KAISER) + 1e-12)
     lobe = int(LOBE_BINS * bins / radar.pulses)
     side = level[int(level.argmax()) + lobe :]
     peaks = 1 + np.flatnonzero((side[1:-1] > side[:-2]) & (side[1:-1] >= side[2:]) & (side[1:-1] > LINE_DB))

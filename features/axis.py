@@ -6,7 +6,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .spectrum import LOWEST_DB, NOISE_BANDWIDTH_BINS, SPEED_OF_LIGHT_MPS, as_ordered, to_db
+from .spectrum import LOWEST_DB, SPEED_OF_LIGHT_MPS, as_ordered, to_db
+from .window import HANN
 
 #: Velocity below which bins are of about equal width [m/s]; above it their width grows with the velocity.
 KNEE_MPS = 4.0
@@ -89,7 +90,10 @@ class Pooling:
         return self._levels(out, 0.0 if from_floor else LOWEST_DB)
 
     def mean_and_peak_db(self, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Mean level of each axis bin, and its largest over that of noise in as many [dB], shape (..., 2, bins)."""
+        """Mean level of each axis bin, and its largest over that of noise in as many [dB], shape (..., 2, bins).
+
+        Of spectra through Hann's window.
+        """
         flat = relative_power.reshape(-1, relative_power.shape[-1])
         rows, seen = self._blank((len(flat), 2))
         self._mean(flat, seen[:, 0])
@@ -132,7 +136,7 @@ class Pooling:
     @cached_property
     def expected_peak(self) -> NDArray[np.float32]:
         """Mean of the largest of so many exponentials, in rising velocity."""
-        return expected_peak(self.spans[1], NOISE_BANDWIDTH_BINS)
+        return expected_peak(self.spans[1], HANN.noise_bandwidth_bins)
 
     @cached_property
     def _per_expected_peak(self) -> NDArray[np.float32]:

@@ -8,7 +8,8 @@ from .notch import LOBE_BINS
 from .rotor.comb_centre import AT_REST_BINS
 from .rotor.comb_fit import CombFit
 from .rotor.periodogram import Periodogram
-from .spectrum import KAISER_BETA, NOISE_BANDWIDTH_BINS, Spectrum
+from .spectrum import Spectrum
+from .window import KAISER, KAISER_BETA
 
 #: What the interpolation between bins is off by [bins], and by how much noise moves it where a line stands at its floor
 #: [bins]: it falls with the line's amplitude. The window makes it 2.5 times the bound of a line's frequency.
@@ -172,7 +173,7 @@ def _pulled_bins(spectrum: Spectrum, own: float) -> float:
     seen = np.sqrt(spectrum.relative_power[near] / top)
     unlike = np.sqrt(np.maximum((seen - _lobe(away[near])) ** 2 - NOISE_BESIDE / top, 0))
     share = float((unlike * _lobe(away[near] - 1)).max(initial=0)) / float(_lobe(np.array(1.0)))
-    curve = np.pi / NOISE_BANDWIDTH_BINS**2
+    curve = np.pi / KAISER.noise_bandwidth_bins**2
     return share / (2 * curve)
 
 

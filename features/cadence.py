@@ -14,7 +14,8 @@ from scipy import fft
 from .axis import UNSEEN_DB, expected_peak
 from .notch import Mask, weights
 from .schema import CADENCE_BINS
-from .spectrum import Spectrum, as_ordered, means, per_floor, power_of, taper, to_db
+from .spectrum import Spectrum, as_ordered, means, per_floor, power_of, to_db
+from .window import HANN, Window
 
 #: Range of the shared axis of rates [Hz]: from slow wings to the tenth flash of the fastest propeller.
 CADENCE_RANGE_HZ = (1.5, 6000.0)
@@ -27,9 +28,6 @@ CLIP = 16.0
 
 #: The mean power counts as at least this share of the noise floor: less is what rounding leaves of a lone line.
 LEAST_MEAN = 0.1
-
-#: Equivalent noise bandwidth of the Hann taper [lines].
-_HANN_LINES = 1.5
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,7 @@ class CadencePlan:
     @cached_property
     def expected_peak(self) -> NDArray[np.float32]:
         """Mean of the largest of so many exponentials, a bin."""
-        return expected_peak(self.spans[1], _HANN_LINES)
+        return expected_peak(self.spans[1], HANN.noise_bandwidth_bins)
 
 
 def cadence_edges_hz() -> NDArray[np.float64]:
@@ -72,7 +70,7 @@ def cadence_edges_hz() -> NDArray[np.float64]:
 
 
 @lru_cache(maxsize=64)
-def cadence_plan(pulses: int, prf_hz: float) -> CadencePlan:
+def cadence_plan(pulses: int, prf_hz: float, window: Window) -> CadencePlan:
     """Plan for a dwell.
 
     Parameters
@@ -81,18 +79,18 @@ def cadence_plan(pulses: int, prf_hz: float) -> CadencePlan:
         Pulses of the dwell, at least 8.
     prf_hz : float
         Pulse repetition frequency [Hz].
+    window : Window
+        Of the spectrum.
 
     Returns
     -------
     CadencePlan
     """
-    window = taper(pulses)
-    inside = np.flatnonzero(window >= LEAST_TAPER * window.max())
+    taper = window.taper(pulses)
+    inside = np.flatnonzero(taper >= LEAST_TAPER * taper.max())
     count = fft.prev_fast_len(len(inside), real=True)
     first = int(inside[0]) + (len(inside) - count) // 2
     span = slice(first, first + count)
-    hann = np.hanning(count + 2)[1:-1]
-    hann /= np.sqrt(np.sum(hann**2))
 
     line_hz, last = prf_hz / count, count // 2
     edges = cadence_edges_hz() / line_hz  # in lines
@@ -103,8 +101,8 @@ def cadence_plan(pulses: int, prf_hz: float) -> CadencePlan:
     nearest = np.rint(middle[seen]).astype(np.intp)
     starts = np.minimum(np.where(high > low, low, nearest), last)
     counts = np.maximum(np.minimum(high, last + 1) - starts, 1) if len(starts) else starts
-    per_taper, spans = (1 / window[span] ** 2).astype(np.float32), (starts, counts)
-    return CadencePlan(span, per_taper, hann.astype(np.float32), spans, seen, CADENCE_BINS)
+    per_taper, spans = (1 / taper[span] ** 2).astype(np.float32), (starts, counts)
+    return CadencePlan(span, per_taper, HANN.taper(count).astype(np.float32), spans, seen, CADENCE_BINS)
 
 
 def power_over_time(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
@@ -122,7 +120,7 @@ def power_over_time(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     ndarray of float32, shape (..., samples)
         Mean 1, less where hardly anything is left. Noise gives the exponential law.
     """
-    plan = cadence_plan(spectrum.pulses, spectrum.prf_hz)
+    plan = cadence_plan(spectrum.pulses, spectrum.prf_hz, spectrum.window)
     # a centred spectrum gives samples of alternating sign: their power is the same
     samples = fft.ifft(spectrum.transform * weights(mask), overwrite_x=True)[..., plan.span]
     power = power_of(samples)
@@ -148,7 +146,7 @@ def cadence_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
         Mean level of the lines in each bin of the axis, and the largest over that of noise in as many [dB];
         `UNSEEN_DB` at rates that the dwell does not tell or the PRF does not hold.
     """
-    plan = cadence_plan(spectrum.pulses, spectrum.prf_hz)
+    plan = cadence_plan(spectrum.pulses, spectrum.prf_hz, spectrum.window)
     power = power_over_time(spectrum, mask)
     np.minimum(power, np.float32(CLIP), out=power)
     power -= means(power)[..., None]

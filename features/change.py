@@ -58,7 +58,7 @@ def _frame_power(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Power spectra of frames, shape (..., count, bins), and what brings them into units of the floor, (..., 1, 1)."""
     per_unit = per_floor(spectrum.transform_floor)[..., None, None]
-    return centred_power(frames(scaled(iq, spectrum.scale), length, count)), per_unit
+    return centred_power(frames(scaled(iq, spectrum.scale), length, count), window=spectrum.window), per_unit
 
 
 def parts_db(iq: NDArray[np.complex64], spectrum: Spectrum, axis_bins: int) -> NDArray[np.float32]:

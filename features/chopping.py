@@ -9,6 +9,7 @@ from scipy import fft, special
 
 from .notch import Mask, parabola_offset, weights
 from .spectrum import Spectrum, at_least, bins_alike, sums
+from .window import Window
 
 #: Range in which a chopping frequency is sought [Hz]: a slow main rotor to a small propeller of four blades.
 CHOPPING_RANGE_HZ = (18.0, 1600.0)
@@ -56,7 +57,7 @@ class Chopping:
 
 
 @lru_cache(maxsize=64)
-def noise_shape(pulses: int, bins: int) -> NDArray[np.float32]:
+def noise_shape(pulses: int, bins: int, window: Window) -> NDArray[np.float32]:
     """RMS of the cepstrum of white noise, up to a factor, shape (bins // 2 + 1,): what makes all periods comparable.
 
     The window couples neighbouring bins, so the log spectrum of noise is coloured. Two bins whose amplitudes correlate
@@ -68,8 +69,10 @@ def noise_shape(pulses: int, bins: int) -> NDArray[np.float32]:
         Pulses of the dwell.
     bins : int
         Length of the spectrum.
+    window : Window
+        Its window.
     """
-    variance = fft.rfft(special.spence(1 - bins_alike(pulses, bins))).real  # Li2(x) is scipy's spence(1 - x)
+    variance = fft.rfft(special.spence(1 - bins_alike(pulses, bins, window))).real  # Li2(x) is scipy's spence(1 - x)
     return np.sqrt(np.maximum(variance, 1e-3 * variance.max())).astype(np.float32)
 
 
@@ -96,14 +99,14 @@ def cepstrum(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     level -= (np.vecdot(level, kept) / np.maximum(sums(kept), np.float32(1)))[..., None]
     level *= kept
     magnitude = np.abs(fft.rfft(level, axis=-1, overwrite_x=True))
-    magnitude *= _per_noise(spectrum.pulses, spectrum.bins)
+    magnitude *= _per_noise(spectrum.pulses, spectrum.bins, spectrum.window)
     return magnitude
 
 
 @lru_cache(maxsize=64)
-def _per_noise(pulses: int, bins: int) -> NDArray[np.float32]:
+def _per_noise(pulses: int, bins: int, window: Window) -> NDArray[np.float32]:
     """One over `noise_shape`."""
-    return np.reciprocal(noise_shape(pulses, bins))
+    return np.reciprocal(noise_shape(pulses, bins, window))
 
 
 def prominence(heights: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -19,6 +19,7 @@ from .evidence import line_log_ratio
 from .notch import Mask, weights
 from .schema import COMB_BINS
 from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, as_ordered, bins_alike, sums, to_db
+from .window import Window
 
 #: Lines are looked for up to this speed [m/s]: beyond it lie the ends of few rotors' bands, and noise.
 REACH_MPS = 80.0
@@ -102,9 +103,9 @@ def _covariance_series() -> NDArray[np.float64]:
     return np.array([float(held @ laguerre.lagval(power, np.eye(_TERMS + 1)[k])) ** 2 for k in range(1, _TERMS + 1)])
 
 
-def _noise_rms(pulses: int, bins: int, length: int) -> NDArray[np.float64]:
+def _noise_rms(pulses: int, bins: int, length: int, window: Window) -> NDArray[np.float64]:
     """Root mean square of the transform of the evidence of white noise, of a single bin, shape (length // 2 + 1,)."""
-    alike = bins_alike(pulses, bins)[: bins // 2]
+    alike = bins_alike(pulses, bins, window)[: bins // 2]
     covariance = np.polynomial.polynomial.polyval(alike, np.concatenate([[0], _covariance_series()]))
     near = np.arange(1, min(len(covariance), 64))
     turn = 2 * np.pi * np.arange(length // 2 + 1) / length
@@ -113,7 +114,7 @@ def _noise_rms(pulses: int, bins: int, length: int) -> NDArray[np.float64]:
 
 
 @lru_cache(maxsize=64)
-def comb_plan(bins: int, pulses: int, carrier_hz: float, prf_hz: float) -> CombPlan | None:
+def comb_plan(bins: int, pulses: int, carrier_hz: float, prf_hz: float, window: Window) -> CombPlan | None:
     """Plan for a dwell; None where it holds no range to search.
 
     Parameters
@@ -122,6 +123,8 @@ def comb_plan(bins: int, pulses: int, carrier_hz: float, prf_hz: float) -> CombP
         Bins of the spectrum, pulses of the dwell.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz].
+    window : Window
+        Of the spectrum.
     """
     step_mps = prf_hz / bins * SPEED_OF_LIGHT_MPS / carrier_hz / 2
     most = 2 * min(int(REACH_MPS / step_mps), (bins - 1) // 2) + 1
@@ -154,7 +157,7 @@ def comb_plan(bins: int, pulses: int, carrier_hz: float, prf_hz: float) -> CombP
         slice(first, first + count),
         blocks,
         length,
-        (1 / _noise_rms(pulses, bins, length)).astype(np.float32),
+        (1 / _noise_rms(pulses, bins, length, window)).astype(np.float32),
         lags,
         tuple(within.sum(axis=1).tolist()),
         (1 / (HEIGHT_DEVIATION * np.sqrt(summed))).astype(np.float32),
@@ -182,7 +185,7 @@ def comb_levels_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
         frequency too.
     """
     out = np.full((*spectrum.relative_power.shape[:-1], 1, COMB_BINS), UNSEEN_DB, np.float32)
-    plan = comb_plan(spectrum.bins, spectrum.pulses, spectrum.carrier_hz, spectrum.prf_hz)
+    plan = comb_plan(spectrum.bins, spectrum.pulses, spectrum.carrier_hz, spectrum.prf_hz, spectrum.window)
     if plan is not None:
         heights = comb_heights(spectrum.relative_power[..., plan.band], weights(mask[..., plan.band]), plan)
         loudest = np.maximum.reduceat(as_ordered(_loudest_sums(heights, plan)), plan.spans[0], axis=-1)

@@ -15,6 +15,7 @@ from .notch import Body, body_line, notch_mask
 from .schema import AXIS_BINS, INPUT_SHAPES
 from .spectrum import Spectrum, as_complex, doppler_spectrum
 from .vector import feature_vector
+from .window import HANN
 
 #: Fewest pulses that leave anything to measure outside the notches.
 MIN_PULSES = 16
@@ -102,7 +103,7 @@ class Dwells:
 
     @cached_property
     def _spectrum_of_dwell(self) -> Spectrum:
-        return doppler_spectrum(self._samples, **self._radar)
+        return doppler_spectrum(self._samples, **self._radar, window=HANN)
 
     @cached_property
     def _body(self) -> Body:

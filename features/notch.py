@@ -12,7 +12,7 @@ from .spectrum import Spectrum, at_least, sums, to_db
 #: bird's body with its heave stays within this of its mean at every carrier.
 NOTCH_MPS = 3.0
 
-#: The notch is never narrower than the window's main lobe, this many bins to each side.
+#: The notch is never narrower than the main lobe of the wider window, this many bins to each side.
 LOBE_BINS = 5
 
 
@@ -54,8 +54,8 @@ class Body:
 def body_line(spectrum: Spectrum) -> Body:
     """Find the strongest line of each spectrum, refined by a parabola through three levels in dB.
 
-    The window's main lobe is close to a Gaussian, of which the logarithm is a parabola: the error stays below 1 % of a
-    bin.
+    The window's main lobe is close to a Gaussian, of which the logarithm is a parabola: the error stays below 2 % of a
+    bin through Hann's window and 0.4 % through Kaiser's.
 
     Parameters
     ----------

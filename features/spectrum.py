@@ -8,14 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft, special
 
+from .window import KAISER, Window
+
 #: Speed of light [m/s].
 SPEED_OF_LIGHT_MPS = 299_792_458.0
-
-#: Kaiser window whose side lobes lie under -93 dB: static returns stand 35-54 dB above a drone's blades.
-KAISER_BETA = 12.5
-
-#: Equivalent noise bandwidth of that window [bins].
-NOISE_BANDWIDTH_BINS = 2.056
 
 #: Levels are not followed below this [dB re noise floor]: an empty side of the spectrum has no level.
 LOWEST_DB = -20.0
@@ -46,7 +42,8 @@ class Spectrum:
     ----------
     relative_power : ndarray of float32, shape (..., bins)
         Power over the noise floor [1], centred (fftshift): noise alone has mean 1 within 3 % from 700 pulses on; of
-        shorter dwells the floor is too high, by 0.2 dB at 128 to 500 pulses, 0.4 dB at 64, 1 dB at 32 and 1.7 dB at 16.
+        shorter dwells the floor is too high, through Kaiser's window by 0.2 dB at 128 to 500 pulses, 0.4 at 64, 1 at 32
+        and 1.7 at 16, through Hann's by 0.6 times that.
     floor : ndarray of float64, shape (...)
         Noise power a sample, in the square of the input's unit; 0 for an all-zero record. float64, because the square
         of a sample may leave float32.
@@ -58,6 +55,8 @@ class Spectrum:
         Power of two by which the samples were scaled before the transform.
     transform : ndarray of complex64, shape (..., bins)
         The centred transform of the scaled and windowed samples, whose power this is.
+    window : Window
+        Theirs.
     """
 
     relative_power: NDArray[np.float32]
@@ -67,6 +66,7 @@ class Spectrum:
     pulses: int
     scale: NDArray[np.float32]
     transform: NDArray[np.complex64]
+    window: Window
 
     def rows(self, rows: NDArray[np.intp] | tuple[int, ...]) -> "Spectrum":
         """The spectra of some of the records, of shape (records, bins), or of the one of such an index."""
@@ -181,26 +181,20 @@ def _velocities_mps(bins: int, prf_hz: float, wavelength_m: float) -> NDArray[np
 
 
 @lru_cache(maxsize=64)
-def packed_window(pulses: int, centred_by_sign: bool) -> NDArray[np.float32]:
-    """Kaiser window of unit noise gain, each value twice, for a sample's two parts, shape (2 pulses,).
+def packed_window(pulses: int, centred_by_sign: bool, window: Window) -> NDArray[np.float32]:
+    """A window of unit noise gain, each value twice, for a sample's two parts, shape (2 pulses,).
 
     With alternating signs it also centres the spectrum, which saves the shift.
     """
-    window = taper(pulses)
+    taper = window.taper(pulses)
     if centred_by_sign:
-        window[1::2] *= -1
-    return np.repeat(window.astype(np.float32), 2)
+        taper[1::2] *= -1
+    return np.repeat(taper.astype(np.float32), 2)
 
 
-def taper(pulses: int) -> NDArray[np.float64]:
-    """Kaiser window of unit noise gain, shape (pulses,)."""
-    window = np.kaiser(pulses, KAISER_BETA)
-    return window / np.sqrt(np.sum(window**2))
-
-
-def bins_alike(pulses: int, bins: int) -> NDArray[np.float64]:
+def bins_alike(pulses: int, bins: int, window: Window) -> NDArray[np.float64]:
     """Squared correlation of white noise in two bins, by how far they are apart, shape (bins,): 1 at 0."""
-    squared = taper(pulses) ** 2
+    squared = window.taper(pulses) ** 2
     return np.asarray(np.minimum(np.abs(fft.fft(squared / squared.sum(), n=bins)) ** 2, 1), np.float64)
 
 
@@ -211,7 +205,7 @@ def scaled(iq: NDArray[np.complex64], scale: NDArray[np.float32]) -> NDArray[np.
     return (np.ascontiguousarray(iq).view(np.float32) * scale).view(np.complex64)
 
 
-def centred_power(iq: NDArray[np.complex64], bins: int | None = None) -> NDArray[np.float32]:
+def centred_power(iq: NDArray[np.complex64], bins: int | None = None, *, window: Window) -> NDArray[np.float32]:
     """Windowed power spectrum, centred: white noise of unit power a sample gives mean 1 in every bin.
 
     Parameters
@@ -220,21 +214,23 @@ def centred_power(iq: NDArray[np.complex64], bins: int | None = None) -> NDArray
         Slow-time samples, of a size whose square float32 holds.
     bins : int, optional
         Transform length, at least `pulses`; by default the next one that transforms fast.
+    window : Window
+        The taper.
 
     Returns
     -------
     ndarray of float32, shape (..., bins)
     """
-    return power_of(centred_transform(iq, bins))
+    return power_of(centred_transform(iq, bins, window=window))
 
 
-def centred_transform(iq: NDArray[np.complex64], bins: int | None = None) -> NDArray[np.complex64]:
+def centred_transform(iq: NDArray[np.complex64], bins: int | None = None, *, window: Window) -> NDArray[np.complex64]:
     """The transform whose power `centred_power` gives, for the same samples; its phases are those of its own start."""
     pulses = iq.shape[-1]
     bins = fft.next_fast_len(pulses) if bins is None else bins
     even = bins % 2 == 0
     parts = iq.astype(np.complex64, copy=False).view(np.float32)
-    tapered = (parts * packed_window(pulses, even)).view(np.complex64)
+    tapered = (parts * packed_window(pulses, even, window)).view(np.complex64)
     transform = fft.fft(tapered, bins if bins != pulses else None, overwrite_x=True)
     return transform if even else fft.fftshift(transform, axes=-1)
 
@@ -296,7 +292,7 @@ def safe_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
     return np.where(safe[..., None], np.float32(1), unit_scale(iq))
 
 
-def noise_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
+def noise_floor(power: NDArray[np.float32], window: Window) -> NDArray[np.float32]:
     """Noise floor of centred power spectra, robust to lines, bands and an empty side.
 
     Each side is averaged in blocks of neighbouring bins; the lower quartile of the blocks, corrected for its bias on
@@ -307,6 +303,8 @@ def noise_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
     ----------
     power : ndarray of float32, shape (..., bins)
         Power spectrum.
+    window : Window
+        Of the samples: it makes neighbouring bins alike.
 
     Returns
     -------
@@ -322,7 +320,7 @@ def noise_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
     one, other = sums_of[..., 0, rank], sums_of[..., 1, rank]
     least, most = np.minimum(one, other), np.maximum(one, other)
     level = np.where(most > EMPTY_RATIO * least, most, (least + most) * _HALF)
-    return np.divide(level, quartile_of_noise(power.shape[-1], size, blocks))
+    return np.divide(level, quartile_of_noise(power.shape[-1], size, blocks, window))
 
 
 def side_sums(power: NDArray[np.float32]) -> tuple[NDArray[np.float32], int]:
@@ -347,10 +345,10 @@ def side_sums(power: NDArray[np.float32]) -> tuple[NDArray[np.float32], int]:
 
 
 @lru_cache(maxsize=64)
-def quartile_of_noise(bins: int, size: int, blocks: int) -> NDArray[np.float32]:
+def quartile_of_noise(bins: int, size: int, blocks: int, window: Window) -> NDArray[np.float32]:
     """Lower quartile of the sums of so many neighbouring bins in white noise of unit power, of so many sums."""
     # a gamma of as many degrees of freedom as the sum has: the window makes neighbours alike
-    alike = bins_alike(bins, bins)[1:size]
+    alike = bins_alike(bins, bins, window)[1:size]
     shape_k = size**2 / (size + 2 * np.arange(size - 1, 0, -1) @ alike)
     share = (quartile_rank(blocks) + 1) / (blocks + 1)  # mean of the uniform of that rank
     return np.array(size / shape_k * special.gammaincinv(shape_k, share), np.float32)
@@ -404,8 +402,8 @@ def require_radar(carrier_hz: float, prf_hz: float) -> tuple[float, float]:
 
 def noise_shows(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     """True where there is noise between the lines, of samples (..., pulses): more than `LEAST_FLOOR`, shape (...)."""
-    power = power_of(centred_transform(scaled(iq, unit_scale(iq))))
-    return np.asarray(noise_floor(power) > _least_floor(power), np.bool_)
+    power = centred_power(scaled(iq, unit_scale(iq)), window=KAISER)
+    return np.asarray(noise_floor(power, KAISER) > _least_floor(power), np.bool_)
 
 
 def _least_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -413,7 +411,7 @@ def _least_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
     return sums(power) * (LEAST_FLOOR / np.float32(power.shape[-1]))
 
 
-def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spectrum:
+def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float, window: Window = KAISER) -> Spectrum:
     """Doppler spectrum of a dwell, in units of its own noise floor.
 
     Parameters
@@ -422,6 +420,8 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spec
         Slow-time samples of one range cell, any gain; at least 2 pulses.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz], > 0.
+    window : Window
+        `KAISER`, whose side lobes hide no line beside a strong one, or `HANN`, in which weak ones stand higher.
 
     Returns
     -------
@@ -436,10 +436,10 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Spec
     samples = as_complex(iq, least=2)
     carrier_hz, prf_hz = require_radar(carrier_hz, prf_hz)
     scale = safe_scale(samples)
-    transform = centred_transform(scaled(samples, scale))
+    transform = centred_transform(scaled(samples, scale), window=window)
     power = power_of(transform)
-    floor = noise_floor(power)
+    floor = noise_floor(power, window)
     floor = np.maximum(floor, _least_floor(power))
     natural = floor / np.square(scale[..., 0], dtype=np.float64)
     relative = np.multiply(power, per_floor(floor)[..., None], out=power)
-    return Spectrum(relative, natural, carrier_hz, prf_hz, samples.shape[-1], scale, transform)
+    return Spectrum(relative, natural, carrier_hz, prf_hz, samples.shape[-1], scale, transform, window)

@@ -1,4 +1,4 @@
-"""Things that move and are neither UAV nor bird: a walking person, a vehicle, a wind turbine, a plain reflector.
+"""Things that move and are neither UAV nor bird: a person, a vehicle, a wind turbine, a plain reflector.
 
 Each is a handful of scatterers on known paths; they are the hard confusers, because parts of them move fast or turn.
 """
@@ -29,6 +29,9 @@ LIMBS = (
 )
 
 
+#: A foot on a pedal goes round at the gait, in a circle of this radius [m].
+CRANK_M = 0.17
+
 #: Most scatterers of a vehicle's body, of another's beside it, and of a vehicle's wheels together.
 MAX_BODY_POINTS, MAX_COMPANY_POINTS, MAX_WHEEL_POINTS = 48, 12, 240
 
@@ -40,9 +43,16 @@ MAX_BLADE_POINTS = 100
 
 
 def draw_person(draws: Draws, radar: Radar) -> Target:
-    """Draw a walker: a torso that sways and limbs whose speed swings about the torso's at the gait, feet in strides."""
-    speed, gait, phase = draws.value("person_mps"), draws.value("gait_hz"), draws.value("phase_rad")
-    sharper = 1.3 * draws.uniform()
+    """Draw a walker, a runner or a cyclist: a torso that sways and limbs whose speed swings about the torso's.
+
+    Feet on the ground go in strides, as much faster as the torso is; those on pedals in even circles, at any speed. A
+    bicycle's wheels, wires and hollow rims, have no echo of their own here; a vehicle's do.
+    """
+    speed = draws.value("person_mps") * draws.value("pace")
+    gait, phase = draws.value("gait_hz"), draws.value("phase_rad")
+    rides = draws.value("pedalling") > 0.75
+    sharper = np.where(rides, 0.0, 1.3 * draws.uniform())
+    swing_mps = np.where(rides, TWO_PI * gait * CRANK_M / LIMBS[-1][1], speed)
     grid = PulseGrid(radar)
     micro = np.zeros((len(draws), radar.pulses), np.complex64)
     body = np.zeros_like(micro)
@@ -50,7 +60,7 @@ def draw_person(draws: Draws, radar: Radar) -> Target:
         stretch = swing * (0.6 + 0.6 * draws.uniform())
         omega = TWO_PI * gait * (2 if number == 0 else 1)  # the torso bobs twice a stride
         offset = phase + TWO_PI * turns
-        swing_rad = -2 * TWO_PI / radar.wavelength_m * speed * stretch / omega
+        swing_rad = -2 * TWO_PI / radar.wavelength_m * swing_mps * stretch / omega
         level = amplitude * np.exp(0.3 * draws.normal())
         limb = body_echo(
             radar,

@@ -107,6 +107,8 @@ LAWS: dict[str, Law] = {
     "texture_shape": Law("log", 0.1, 10.0, "1", "K distribution, nu 0.1-10"),
     "texture_hz": Law("log", 0.2, 2.5, "Hz", "swells and gusts; decorrelation 0.1-1 s"),
     "person_mps": Law("uniform", -3.5, 3.5, "m/s", "walking to jogging"),
+    "pace": Law("log", 1.0, 2.5, "1", "over that: runners and cyclists, to 8.75 m/s"),
+    "pedalling": Law("uniform", 0.0, 1.0, "1", "above 0.75 a person rides a bicycle"),
     "gait_hz": Law("uniform", 0.8, 2.2, "Hz", "1-2 Hz"),
     # not by the logarithm: where vehicles at 20 to 30 m/s are rare beside UAVs that fast, their wheels are rotors
     "vehicle_mps": Law("uniform", 1.5, 42.0, "m/s", "along the road, from a crawl over towns to motorways"),

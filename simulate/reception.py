@@ -17,6 +17,9 @@ from .receiver import NormalsOf, Receiver
 from .setting import Setting
 from .target import mean_power
 
+#: What clutter of a kind is in a scene whose values do not say otherwise: a person walks, at `person_mps`.
+USUAL = {"person": {"pace": 1.0, "pedalling": 0.0}}
+
 
 def stream(seed: int, name: str) -> Generator:
     """The generator of one part: it depends on the seed and the part's name alone."""
@@ -67,7 +70,7 @@ def pulse_times_s(scene: Setting, seed: int) -> NDArray[np.float64]:
 def clutter_echo(part: ClutterPart, radar: Radar, seed: int) -> tuple[NDArray[np.complex64], dict[str, Any], list[str]]:
     """Clutter of mean power `level_db`, what was drawn of it, and which of its `values` it has no use for."""
     rng = stream(seed, part.name)
-    draws = Chosen(rng.random((1, WIDTH)), part.values)
+    draws = Chosen(rng.random((1, WIDTH)), USUAL.get(part.kind, {}) | part.values)
     if part.kind in DISCRETES:
         target = draw_discrete(draws, radar, part.kind)
     else:

@@ -17,6 +17,7 @@ from bladewing.features import stft as joint
 from bladewing.features.axis import pooling
 from bladewing.features.schema import AXIS_BINS, IMAGE_BINS, IMAGE_FRAMES
 from bladewing.features.vector import radar_columns
+from bladewing.features.window import HANN
 from bladewing.simulate import Radar
 from numpy.typing import NDArray
 
@@ -75,7 +76,7 @@ def spectrum_picture(iq: NDArray[np.complex64], radar: Radar, *, bins: int = AXI
     (n, 2, bins) float32
         Over the noise floor [dB].
     """
-    spectrum = doppler_spectrum(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
+    spectrum = doppler_spectrum(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz, window=HANN)
     pool = pooling(spectrum.bins, radar.carrier_hz, radar.prf_hz, bins)
     return pool.mean_and_peak_db(spectrum.relative_power)
 

@@ -13,7 +13,6 @@ from bladewing.features.inputs import model_inputs
 from bladewing.features.notch import body_line, notch_mask, residual
 from bladewing.features.schema import INPUT_SHAPES
 from bladewing.features.spectrum import (
-    KAISER_BETA,
     LEAST_FLOOR,
     Spectrum,
     centred_power,
@@ -21,6 +20,7 @@ from bladewing.features.spectrum import (
     noise_floor,
     unit_scale,
 )
+from bladewing.features.window import HANN, KAISER, Window
 from numpy.typing import NDArray
 from scipy import fft
 
@@ -77,29 +77,37 @@ def _noise_on(level: float, pulses: int) -> NDArray[np.complex64]:
     return (level + rng.normal(size=pulses) + 1j * rng.normal(size=pulses)).astype(np.complex64)
 
 
-def _exact_power(iq: NDArray[np.complex64]) -> NDArray[np.longdouble]:
+def _exact_power(iq: NDArray[np.complex64], window: Window) -> NDArray[np.longdouble]:
     """`centred_power` in long double, of the same samples and window."""
     pulses = iq.shape[-1]
-    window = np.kaiser(pulses, KAISER_BETA).astype(np.longdouble)
-    window /= np.sqrt(np.sum(window**2))
-    lines = fft.fft(iq.astype(np.clongdouble) * window, n=fft.next_fast_len(pulses))
+    taper = window.taper(pulses).astype(np.longdouble)
+    taper /= np.sqrt(np.sum(taper**2))
+    lines = fft.fft(iq.astype(np.clongdouble) * taper, n=fft.next_fast_len(pulses))
     return fft.fftshift(lines.real**2 + lines.imag**2)
 
 
 def _power_error(iq: NDArray[np.complex64]) -> float:
-    """Largest error of a bin's power, over the larger of that power and the mean of all."""
+    """Largest error of a bin's power, over the larger of that power and the mean of all, through either window."""
     scaled = iq * unit_scale(iq)
-    exact = _exact_power(scaled)
-    return float((np.abs(centred_power(scaled) - exact) / np.maximum(exact, exact.mean() * 1e-6)).max())
+    errors = []
+    for window in (HANN, KAISER):
+        exact = _exact_power(scaled, window)
+        away = np.abs(centred_power(scaled, window=window) - exact)
+        errors.append(float((away / np.maximum(exact, exact.mean() * 1e-6)).max()))
+    return max(errors)
 
 
 def _floor_error(iq: NDArray[np.complex64]) -> Outcome:
-    spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
+    """Error of the noise floor [dB], through either window."""
     scaled = iq * unit_scale(iq)
-    exact = _exact_power(scaled)
-    level = max(float(noise_floor(exact)), float(exact.mean()) * float(LEAST_FLOOR))  # type: ignore[arg-type]
-    natural = np.longdouble(level) / unit_scale(iq)[0].astype(np.longdouble) ** 2
-    return float(abs(10 * np.log10(np.longdouble(spectrum.floor) / natural)))
+    errors = []
+    for window in (HANN, KAISER):
+        spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ, window=window)
+        exact = _exact_power(scaled, window)
+        level = max(float(noise_floor(exact, window)), float(exact.mean()) * float(LEAST_FLOOR))  # type: ignore[arg-type]
+        natural = np.longdouble(level) / unit_scale(iq)[0].astype(np.longdouble) ** 2
+        errors.append(float(abs(10 * np.log10(np.longdouble(spectrum.floor) / natural))))
+    return max(errors)
 
 
 def _spectra(quick: bool) -> Iterator[Cell]:
@@ -154,7 +162,7 @@ def _long(spectrum: Spectrum) -> Spectrum:
 
 def _notched(iq: NDArray[np.complex64]) -> tuple[Spectrum, NDArray[np.bool_]]:
     """A record's spectrum, and where it counts."""
-    spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ)
+    spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ, window=HANN)
     return spectrum, notch_mask(spectrum, body_line(spectrum))
 
 
@@ -163,7 +171,7 @@ def _exact_cepstrum(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.l
     power = np.maximum(spectrum.relative_power.astype(np.longdouble), np.longdouble(1))
     level = np.minimum(10 * np.log10(power), CLIP_DB) * mask
     level -= mask * (level.sum() / max(1, np.count_nonzero(mask)))
-    return np.abs(fft.rfft(level)) / noise_shape(spectrum.pulses, spectrum.bins)
+    return np.abs(fft.rfft(level)) / noise_shape(spectrum.pulses, spectrum.bins, spectrum.window)
 
 
 def _cepstrum_error(iq: NDArray[np.complex64]) -> float:
@@ -175,7 +183,7 @@ def _cepstrum_error(iq: NDArray[np.complex64]) -> float:
 def _cadence_error(iq: NDArray[np.complex64]) -> float:
     """`cadence_db` against the same steps in long double, as powers."""
     spectrum, mask = _notched(iq)
-    plan = cadence_plan(spectrum.pulses, spectrum.prf_hz)
+    plan = cadence_plan(spectrum.pulses, spectrum.prf_hz, spectrum.window)
     power = np.abs(fft.ifft(spectrum.transform.astype(np.clongdouble) * mask))[plan.span] ** 2 * plan.per_taper
     power /= max(power.mean(), np.longdouble(LEAST_MEAN) * spectrum.transform_floor, np.longdouble(1e-36))
     power = np.minimum(power, np.longdouble(CLIP))
@@ -188,7 +196,7 @@ def _cadence_error(iq: NDArray[np.complex64]) -> float:
 def _comb_heights_error(iq: NDArray[np.complex64]) -> float:
     """`comb_heights` against long double, of the same powers; the deviation of noise is about a half."""
     spectrum, mask = _notched(iq)
-    plan = comb_plan(spectrum.bins, spectrum.pulses, _CARRIER_HZ, _PRF_HZ)
+    plan = comb_plan(spectrum.bins, spectrum.pulses, _CARRIER_HZ, _PRF_HZ, spectrum.window)
     if plan is None:
         return 0.0
     kept, power = mask[plan.band], spectrum.relative_power[plan.band]

@@ -11,7 +11,7 @@ from .spectrum import dft_power, pooled
 
 def cadence_db(radar: Spectrum, transform: Value, floor: Value, kept: Value) -> Value:
     """As `cadence.cadence_db`: from the transform's parts, its floor (above 0) and the notches' weights."""
-    plan = definition.cadence_plan(radar.pulses, radar.prf_hz)
+    plan = definition.cadence_plan(radar.pulses, radar.prf_hz, radar.window)
     if not len(plan.spans[0]):  # the dwell tells no rate of the axis
         nothing = np.full((1, 2, plan.bins), UNSEEN_DB, np.float32)
         return kept.slice(0, 1).reshape(-1, 1, 1) * 0.0 + nothing

@@ -22,7 +22,7 @@ def line_nats(relative_power: Value) -> Value:
 def comb_levels_db(radar: Spectrum, relative_power: Value, kept: Value) -> Value:
     """As `comb_levels.comb_levels_db`."""
     graph = relative_power.graph
-    plan = definition.comb_plan(radar.bins, radar.pulses, radar.carrier_hz, radar.prf_hz)
+    plan = definition.comb_plan(radar.bins, radar.pulses, radar.carrier_hz, radar.prf_hz, radar.window)
     if plan is None:
         nothing = np.full((1, 1, COMB_BINS), UNSEEN_DB, np.float32)
         return relative_power.slice(0, 1).reshape(-1, 1, 1) * 0.0 + nothing

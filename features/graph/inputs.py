@@ -10,6 +10,7 @@ from ..dropouts import LEAST_LOST
 from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
 from ..spectrum import LEAST_FLOOR, LEAST_PART, LEAST_POWER, Spectrum, doppler_spectrum
 from ..vector import BANDS, SIGNIFICANT, radar_columns
+from ..window import HANN
 from .cadence import cadence_db
 from .comb_levels import comb_levels_db
 from .measurements import (
@@ -75,7 +76,7 @@ def input_graph(
     if unknown:
         raise ValueError(f"model input {sorted(unknown)[0]!r} is not made in a graph: only {', '.join(IN_GRAPH)} are")
     # a spectrum without signal, for what depends on the radar alone
-    radar = doppler_spectrum(np.zeros(pulses, np.complex64), carrier_hz=carrier_hz, prf_hz=prf_hz)
+    radar = doppler_spectrum(np.zeros(pulses, np.complex64), carrier_hz=carrier_hz, prf_hz=prf_hz, window=HANN)
     iq = Value(graph, IQ, np.float32)
     flat = iq.reshape(-1, 2 * pulses)
     largest = flat.apply("Abs").max()
@@ -86,9 +87,13 @@ def input_graph(
     live = live & _none_lost(graph, of_pulses.apply("Abs").max(keep=False), pulses)
     packed = of_pulses.transpose(0, 2, 1)
 
-    transform = centred_transform(packed, pulses, radar.bins)
+    transform = centred_transform(packed, pulses, radar.bins, radar.window)
     power = power_of(transform, radar.bins)
-    floor = noise_floor(power, radar.bins).at_least(power.mean() * float(LEAST_FLOOR)).at_least(float(LEAST_POWER))
+    floor = (
+        noise_floor(power, radar.bins, radar.window)
+        .at_least(power.mean() * float(LEAST_FLOOR))
+        .at_least(float(LEAST_POWER))
+    )
     relative_power = power / floor
     pool = pooling(radar.bins, radar.carrier_hz, radar.prf_hz, AXIS_BINS)
     levels = pooled(relative_power, radar.bins, pool)
@@ -106,7 +111,7 @@ def input_graph(
         starts, _ = frame_starts(pulses, length, PARTS)
         frames = graph.concat(*(packed.slice(start, start + length) for start in starts), axis=1)
         bins = doppler_spectrum(np.zeros(length, np.complex64), carrier_hz=carrier_hz, prf_hz=prf_hz).bins
-        whole = centred_transform(frames.reshape(-1, 2, length), length, bins)
+        whole = centred_transform(frames.reshape(-1, 2, length), length, bins, radar.window)
         parts = power_of(whole, bins).reshape(-1, PARTS, bins)
         pool = pooling(bins, radar.carrier_hz, radar.prf_hz, AXIS_BINS)
         parts_db = pooled_mean(parts / floor.reshape(-1, 1, 1), pool).at_least(0.0)

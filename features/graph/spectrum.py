@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from .. import spectrum as definition
 from ..axis import UNSEEN_DB, Pooling
 from ..cadence import CadencePlan
+from ..window import Window
 from .operators import Value
 
 
@@ -69,10 +70,10 @@ def _by_rows(samples: Value, length: int, count: int, *, parts: int, conjugate: 
     return graph.matmul(turned, np.block([[cosine, sine], [-sine, cosine]])), rows, wanted
 
 
-def centred_transform(packed: Value, pulses: int, bins: int) -> Value:
+def centred_transform(packed: Value, pulses: int, bins: int, window: Window) -> Value:
     """As `spectrum.centred_transform`: from samples (n, 2, pulses) to real and imaginary parts (n, 2, bins)."""
     even = bins % 2 == 0
-    transform = dft((packed * definition.packed_window(pulses, even)[::2]).pad(0, bins - pulses), bins, bins)
+    transform = dft((packed * definition.packed_window(pulses, even, window)[::2]).pad(0, bins - pulses), bins, bins)
     half = (bins + 1) // 2
     return transform if even else packed.graph.concat(transform.slice(half, bins), transform.slice(0, half))
 
@@ -88,7 +89,7 @@ def unit_scale(largest: Value) -> Value:
     return 1.0 / largest.at_least(2.0**-126).at_most(2.0**126)
 
 
-def noise_floor(power: Value, bins: int) -> Value:
+def noise_floor(power: Value, bins: int, window: Window) -> Value:
     """As `spectrum.noise_floor`, shape (n, 1)."""
     half, lower = bins // 2, (bins + 1) % 2
     size = max(1, half // definition.FLOOR_BLOCKS)
@@ -98,7 +99,7 @@ def noise_floor(power: Value, bins: int) -> Value:
     one, other = levels.slice(0, 1), levels.slice(1, 2)
     least, most = one.at_most(other), one.at_least(other)
     level = power.graph.where(most > definition.EMPTY_RATIO * least, most, (least + most) / 2)
-    return level / float(definition.quartile_of_noise(bins, size, blocks))
+    return level / float(definition.quartile_of_noise(bins, size, blocks, window))
 
 
 def to_db(relative_power: Value, lowest_db: float = definition.LOWEST_DB) -> Value:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from bladewing.features import measure
 from bladewing.features.body_velocity import NOISE_BINS
-from bladewing.features.spectrum import KAISER_BETA
+from bladewing.features.window import KAISER_BETA
 from bladewing.simulate import RotorMotion, rotor_echo
 
 from .signals import CARRIER_HZ, PRF_HZ, RADAR, WAVELENGTH_M, rotors_by_chance, white

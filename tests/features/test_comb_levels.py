@@ -20,6 +20,7 @@ from bladewing.features.evidence import LINE_CAP, MISSING_SHARE
 from bladewing.features.notch import body_line, notch_mask
 from bladewing.features.schema import COMB_BINS, FEATURES
 from bladewing.features.spectrum import centred_power
+from bladewing.features.window import HANN
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate, special
@@ -39,7 +40,7 @@ def cell_of(rate_hz):
 
 def plan_of(pulses, carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ):
     bins = doppler_spectrum(np.zeros(pulses, np.complex64), carrier_hz=carrier_hz, prf_hz=prf_hz).bins
-    return comb_plan(bins, pulses, carrier_hz, prf_hz)
+    return comb_plan(bins, pulses, carrier_hz, prf_hz, HANN)
 
 
 def test_evidence_is_the_likelihood_ratio_of_a_line_that_may_be_missing():
@@ -76,7 +77,7 @@ def test_noise_is_alike_at_all_spacings_that_lie_apart(pulses):
     records = 400
     plan = plan_of(pulses)
     iq = white(np.random.default_rng(0), records, pulses)
-    nats = line_nats(centred_power(iq.astype(np.complex64))[:, plan.band])
+    nats = line_nats(centred_power(iq.astype(np.complex64), window=HANN)[:, plan.band])
     heights = np.abs(np.fft.rfft(nats - nats.mean(), plan.length)) * plan.per_noise / np.sqrt(nats.shape[1])
     apart = heights[:, plan.lags[0, 0] :: 3]
     assert np.mean(apart) == pytest.approx(MEAN_HEIGHT, rel=0.03)
@@ -106,7 +107,7 @@ def test_rotors_stand_out_where_the_cepstral_peak_does_not():
     count = 150
     blades = np.stack([rotors([rate], body=1.0) for rate in rng.uniform(45, 75, count)])
     noise = told(white(rng, count, PULSES))
-    uav = told(blades * 10 ** (-11 / 20) + white(rng, count, PULSES))
+    uav = told(blades * 10 ** (-12.5 / 20) + white(rng, count, PULSES))
     found = [np.mean(seen > np.quantile(empty, 0.98)) for seen, empty in zip(uav, noise, strict=True)]
     assert found[0] < 0.5
     assert found[1] > 0.8
@@ -143,7 +144,7 @@ def test_a_scene_of_other_wavelength_and_the_same_doppler_is_the_same():
 def test_it_is_what_its_definition_says(pulses):
     """Every step again in float64, spacing by spacing."""
     iq = 0.5 * rotors([58.6, 61.0], velocity_mps=4.0)[:pulses] + white(np.random.default_rng(5), pulses)
-    spectrum = doppler_spectrum(iq, **RADAR)
+    spectrum = doppler_spectrum(iq, **RADAR, window=HANN)
     mask = notch_mask(spectrum, body_line(spectrum))
     plan = plan_of(pulses)
     assert np.abs(spectrum.velocity_mps[plan.band]).max() <= REACH_MPS
@@ -172,9 +173,18 @@ def test_it_is_what_its_definition_says(pulses):
     assert checked > 15
 
 
-@pytest.mark.parametrize("iq", [np.zeros(PULSES, complex), np.full(PULSES, 2 - 1j), tone(1234.5)])
-def test_a_lone_line_or_silence_is_no_comb(iq):
+@pytest.mark.parametrize("iq", [np.zeros(PULSES, complex), np.full(PULSES, 2 - 1j)])
+def test_silence_or_a_constant_is_no_comb(iq):
     assert combs(iq).max() <= 0
+
+
+def test_a_lone_line_is_no_comb_up_to_80_db_over_the_noise_of_a_bin():
+    """Beyond that the side lobes of the window show past the notch, without any noise too."""
+    noise = white(np.random.default_rng(3), 60, PULSES)
+    alone = combs(noise).max(axis=-1)
+    with_line = combs(noise + 10 ** (80 / 20) * np.sqrt(1.5 / PULSES) * tone(1234.5)).max(axis=-1)
+    assert np.median(with_line) < np.median(alone) + 0.7
+    assert with_line.max() < np.quantile(alone, 0.95) + 1.5
 
 
 @pytest.mark.parametrize(("pulses", "prf_hz"), [(16, 1e5), (64, 1e3), (500, 1e5), (65536, 2e4)])

@@ -74,8 +74,8 @@ def test_one_line_is_a_body_and_leaves_noise():
     lone = features(1e3 * tone(-2 * velocity_mps / WAVELENGTH_M) + noise(count=20))
     empty = features(noise(count=20))
     np.testing.assert_allclose(lone["body_speed_mps"], 37.3, atol=0.02)
-    # amplitude 1000 over unit noise, 3000 pulses through a window of noise bandwidth 2.056 bins
-    level_db = 60 + 10 * np.log10(PULSES / 2.056)
+    # amplitude 1000 over unit noise, 3000 pulses through a window of noise bandwidth 1.5 bins
+    level_db = 60 + 10 * np.log10(PULSES / 1.5)
     np.testing.assert_allclose(lone["body_level_db"], level_db, atol=1.5)
     assert (lone["chopping_strength"] < 4.5).all()
     assert (lone["notch_residual_share"] < 1e-4).all()
@@ -105,17 +105,17 @@ def test_two_lines_are_a_band_of_one_line():
 
 @pytest.mark.parametrize("centre_hz", [0.0, 611.0, -1234.0])
 def test_a_perfect_comb_has_its_step_its_orders_and_no_smear(centre_hz):
-    values = features(100 * comb(centre_hz=centre_hz) + noise())
+    values = features(10 * comb(centre_hz=centre_hz) + noise())
     assert 10 ** values["chopping_log"] == pytest.approx(STEP_HZ, rel=0.003)
     assert values["chopping_step_mps"] == pytest.approx(STEP_HZ * WAVELENGTH_M / 2, rel=0.003)
     assert 10 ** values["chopping_turns"] == pytest.approx(STEP_HZ * PULSES / PRF_HZ, rel=0.003)
-    assert values["chopping_orders"] == pytest.approx(40, abs=0.4)
+    assert values["chopping_orders"] == pytest.approx(40, abs=0.5)  # the window widens the last line
     assert values["span_share"] == pytest.approx(40 * STEP_HZ / PRF_HZ, rel=0.02)
     assert 10 ** values["bandwidth_log"] == pytest.approx(40 * STEP_HZ, rel=0.02)
     assert values["chopping_strength"] > 10
-    assert values["chopping_repeats"] > 0.2  # lines as wide as the window's lobe: the cepstrum fades by 3 periods
+    assert values["chopping_repeats"] > 0.3  # the stronger the lines, the wider on a scale of dB, and it fades
     assert values["smearing_index"] < 0.003
-    assert values["symmetry"] > 0.85
+    assert values["symmetry"] > 0.8
 
 
 def test_a_ripple_of_the_band_does_not_outweigh_a_comb():

@@ -6,6 +6,7 @@ from bladewing.features.change import frames
 from bladewing.features.joint import frame_length, stft_image
 from bladewing.features.schema import IMAGE_FRAMES
 from bladewing.features.vector import lay_out
+from bladewing.features.window import HANN
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
@@ -153,13 +154,13 @@ def test_features_of_noise_say_nothing():
 
 def test_image_equals_scipys_short_time_fft():
     iq = scene().astype(np.complex64)
-    spectrum = doppler_spectrum(iq, **RADAR)
+    spectrum = doppler_spectrum(iq, **RADAR, window=HANN)
     length = frame_length(PULSES)
     starts = np.rint(np.linspace(0, PULSES - length, IMAGE_FRAMES)).astype(int)
     hop = int(np.gcd.reduce(starts[1:]))
-    window = np.kaiser(length, 12.5)
-    window /= np.sqrt(np.sum(window**2))
-    stft = ShortTimeFFT(window, hop, PRF_HZ, fft_mode="centered", mfft=length, phase_shift=None)
+    hann = np.hanning(length + 2)[1:-1]
+    hann /= np.sqrt(np.sum(hann**2))
+    stft = ShortTimeFFT(hann, hop, PRF_HZ, fft_mode="centered", mfft=length, phase_shift=None)
     slices = stft.stft(iq.astype(complex), p0=0)
     from bladewing.features.change import frame_power
 

@@ -63,7 +63,7 @@ def test_a_steady_line_stands_in_the_band_of_its_speed_and_swings_nowhere(veloci
     for what in ("joint_mean", "joint_peak"):
         assert max(bands, key=lambda band: values[f"{what}_{band}"]) == own
     assert values[f"joint_swing_{own}"] < 0.2 * values[f"joint_mean_{own}"]
-    assert values["joint_bandwidth_mps"] < 25  # now and then a bin of noise stands over 6 dB
+    assert values["joint_bandwidth_mps"] < 30  # now and then a bin of noise stands over 6 dB
     assert values["joint_centroid_swing_mps"] < 8
     assert values["frame_swing_db"] < 1
 

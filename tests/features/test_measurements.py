@@ -7,7 +7,7 @@ from bladewing.features.bandwidth import energy_band_mps, threshold_band_hz
 from bladewing.features.chopping import cepstral_chopping, noise_shape
 from bladewing.features.notch import LOBE_BINS, body_line, notch_mask, notch_residual_db, residual
 from bladewing.features.smearing import smearing_index
-from bladewing.features.spectrum import taper
+from bladewing.features.window import HANN, KAISER
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -142,13 +142,14 @@ def test_notch_residual_is_the_power_outside_the_notch():
         assert float(notch_residual_db(spectrum, mask)) == pytest.approx(expected, abs=1.3)
 
 
-def test_the_cepstrum_of_noise_is_as_high_as_is_told_at_every_period():
+@pytest.mark.parametrize("window", [HANN, KAISER])
+def test_the_cepstrum_of_noise_is_as_high_as_is_told_at_every_period(window):
     pulses, records = 128, 40_000
     rng = np.random.default_rng(4)
     noise = rng.standard_normal((records, 2 * pulses)).view(complex)
-    power = np.abs(np.fft.fft(noise * taper(pulses))) ** 2
+    power = np.abs(np.fft.fft(noise * window.taper(pulses))) ** 2
     seen = np.mean(np.abs(np.fft.rfft(np.log(power) + np.euler_gamma)) ** 2, axis=0)[1:]  # 0 holds the mean itself
-    told = noise_shape(pulses, pulses)[1:] ** 2
+    told = noise_shape(pulses, pulses, window)[1:] ** 2
     ratio = (seen / told).reshape(-1, 8).mean(axis=1)
     # a mean square of exponentials, eight neighbouring periods together, of which two are alike
     np.testing.assert_allclose(ratio / ratio.mean(), 1, atol=5 / np.sqrt(records * 4))

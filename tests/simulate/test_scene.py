@@ -492,6 +492,12 @@ def test_values_that_cannot_be_rendered_are_refused_and_those_at_the_bounds_are_
             clutter_of(kind, **{name: value})
 
 
+def test_a_person_walks_at_its_speed_unless_it_is_said_to_run_or_to_ride():
+    speeds = {clutter_of("person", seed, person_mps=1.3).truth[0]["velocity_mps"] for seed in range(6)}
+    assert speeds == {1.3}
+    assert clutter_of("person", person_mps=2.0, pace=2.5, pedalling=1.0).truth[0]["velocity_mps"] == 5.0
+
+
 def extremes(name: str) -> tuple[float, float]:
     """Least and largest value of a parameter that a scene may give; of those that count points, few enough to draw."""
     (low, high), above = bounds_of(name), LAWS[name].kind == "log"

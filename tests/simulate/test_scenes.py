@@ -9,6 +9,7 @@ from bladewing.simulate import Radar, discretes, rotors_echo, uav
 from bladewing.simulate.airframe import Rotor
 from bladewing.simulate.bird import draw_bird
 from bladewing.simulate.discretes import (
+    CRANK_M,
     LIMBS,
     MAX_BLADE_POINTS,
     MAX_BODY_POINTS,
@@ -76,7 +77,8 @@ def test_no_aircraft_flies_at_half_the_speed_of_its_tips(kind):
     assert ratio.min() < 1.6 * TIP_OVER_BODY
 
 
-def test_a_walkers_limbs_stay_below_five_times_the_torso():
+def test_the_limbs_on_foot_stay_below_five_times_the_torso(monkeypatch):
+    fix(monkeypatch, pedalling=0.0)
     target = draw_discrete(draws(40, 3), RADAR, "person")
     power, velocity = spectrum(target.micro)
     limit = 4.8 * abs(target.truth["velocity_mps"]) + 0.8  # 1 + 2.4 (1 + 1.3 x 0.45); resolution at 0.1 s
@@ -86,7 +88,7 @@ def test_a_walkers_limbs_stay_below_five_times_the_torso():
 
 def test_a_foot_goes_as_far_as_the_torso_in_strides(monkeypatch):
     monkeypatch.setattr(discretes, "LIMBS", (LIMBS[0], LIMBS[-1]))
-    fix(monkeypatch, person_mps=1.3, gait_hz=1.0)
+    fix(monkeypatch, person_mps=1.3, pace=1.0, pedalling=0.0, gait_hz=1.0)
     radar = Radar(9.85e9, 2e3, 2001)  # one stride
     foot = draw_discrete(draws(60, 4), radar, "person").micro.astype(complex)
     speed = -np.angle(foot[:, 1:] * foot[:, :-1].conj()) * radar.prf_hz * radar.wavelength_m / (4 * np.pi)
@@ -95,7 +97,34 @@ def test_a_foot_goes_as_far_as_the_torso_in_strides(monkeypatch):
     assert forward.max() / 1.3 < 2.4 * (1 + 1.3 * 0.45) + 0.01
     assert np.all(forward > 0.999 * back), "strides are quicker than what lies between them"
     assert np.mean(forward > 1.6 * back) > 0.3
-    assert np.mean(forward < 1.2 * back) > 0.1, "some walkers swing their feet evenly"
+    assert np.mean(forward < 1.2 * back) > 0.05, "some walkers swing their feet evenly"
+
+
+def test_a_cyclists_feet_go_round_with_the_pedals_however_fast_the_wheels(monkeypatch):
+    monkeypatch.setattr(discretes, "LIMBS", (LIMBS[0], LIMBS[-1]))
+    fix(monkeypatch, person_mps=3.0, pace=2.0, pedalling=1.0, gait_hz=1.5)
+    radar = Radar(9.85e9, 3e3, 2001)  # one turn
+    foot = draw_discrete(draws(60, 4), radar, "person").micro.astype(complex)
+    speed = -np.angle(foot[:, 1:] * foot[:, :-1].conj()) * radar.prf_hz * radar.wavelength_m / (4 * np.pi)
+    np.testing.assert_allclose(speed.mean(axis=1), 6.0, rtol=1e-3)
+    forward, back = speed.max(axis=1) - 6.0, 6.0 - speed.min(axis=1)
+    np.testing.assert_allclose(forward, back, rtol=0.01)
+    pedal_mps = 2 * np.pi * 1.5 * CRANK_M
+    assert 0.6 * pedal_mps < forward.min() < forward.max() < 1.2 * pedal_mps
+
+
+def test_some_persons_run_and_some_ride():
+    radar = Radar(9.85e9, 2e3, 2001)
+    target = draw_discrete(draws(200, 5), radar, "person")
+    speed = np.abs(target.truth["velocity_mps"])
+    assert 0.2 < np.mean(speed > 3.5) < 0.5
+    assert 6.5 < speed.max() < 8.75
+    # the limbs of who runs fast swing as fast; of who rides no faster than pedals turn
+    power, velocity = spectrum(target.micro, radar)
+    away = np.abs(velocity[None, :] - target.truth["velocity_mps"][:, None]) > 3.2
+    fast = (speed > 3.5) & (speed < 6)
+    swings = np.where(away, power, 0).sum(axis=1)[fast] / power.sum(axis=1)[fast]
+    assert 0.1 < np.mean(swings < 0.01) < 0.5
 
 
 def test_rough_blades_repeat_once_a_turn_and_lie_between_root_and_tip():

@@ -1,0 +1,49 @@
+"""The windows of Doppler spectra."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Of the Kaiser window.
+KAISER_BETA = 12.5
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """A taper over a dwell.
+
+    Parameters
+    ----------
+    shape : callable
+        From a number of pulses to the taper, of any scale, shape (pulses,).
+    noise_bandwidth_bins : float
+        Equivalent noise bandwidth [bins].
+    """
+
+    shape: Callable[[int], NDArray[np.float64]]
+    noise_bandwidth_bins: float
+
+    def taper(self, pulses: int) -> NDArray[np.float64]:
+        """Its values, of unit noise gain, shape (pulses,)."""
+        window = self.shape(pulses)
+        return np.asarray(window / np.sqrt(np.sum(window**2)), np.float64)
+
+
+def _hann(pulses: int) -> NDArray[np.float64]:
+    return np.hanning(pulses + 2)[1:-1]
+
+
+def _kaiser(pulses: int) -> NDArray[np.float64]:
+    return np.kaiser(pulses, KAISER_BETA)
+
+
+#: For models. Lines stand 1.4 dB higher over the noise than with the other, and parts that overlap by half miss
+#: nothing. Side lobes fall by 18 dB an octave: -54 dB past five bins, where the notch about a body ends at the
+#: earliest, -81 past fifteen. Accuracy 0.774 with it, 0.765 with the other (docs/ablation.md).
+HANN = Window(_hann, 1.5)
+
+#: For `measure`, which looks for lines right beside strong ones: side lobes under -93 dB, past a main lobe of 4.1 bins,
+#: where static returns stand 35 to 54 dB above a drone's blades.
+KAISER = Window(_kaiser, 2.056)
