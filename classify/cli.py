@@ -122,9 +122,10 @@ def predict(
 ) -> None:
     """Say of each dwell of each recording: uav, bird, clutter or unknown, with probabilities and the reason."""
     from . import predict as work
+    from .envelope import dwell_length
     from .inference import Classifier
     from .recording import of_each
-    from .samples import dwell_length, positive
+    from .samples import positive
 
     dwell_s = dwell_length(dwell)
     rule = {"--budget-us": budget_us, "--max-false-alarm": max_false_alarm, "--coverage": coverage}

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, fields
 
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 
+from .errors import BadInput
 from .samples import positive
 
 _ROUNDING = 1e-9  # relative: 0.005 s x 25 kHz must be 125 pulses, whatever the last bit says
@@ -172,3 +173,19 @@ def _down(value: float) -> str:
 def _four_digits(value: float, whole: Callable[[float], int], slack: float) -> str:
     step = 10.0 ** (math.floor(math.log10(value)) - 3)
     return f"{whole(value / step * slack) * step:.4g}"
+
+
+def dwell_length(value: object) -> float:
+    """Check the length of a dwell [s]: above 0, and none of seconds where thousandths were meant.
+
+    None is longer than models know of, and rotors keep their rates for tenths of a second.
+
+    Raises
+    ------
+    BadInput
+        It is not.
+    """
+    dwell_s = positive(value, "--dwell [s]")
+    if dwell_s > Envelope.dwell_max_s:
+        raise BadInput(f"--dwell [s] is {dwell_s:g}: it must be at most {Envelope.dwell_max_s:g}: 80 ms are 0.08")
+    return dwell_s

@@ -16,11 +16,10 @@ from bladewing.features.spectrum import centred_power, scaled, unit_scale
 from bladewing.features.window import KAISER
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
-from .envelope import Envelope, exchanged
+from .envelope import Envelope, dwell_length, exchanged
 from .errors import BadInput
 from .progress import Progress
 from .recording import Recording
-from .samples import dwell_length
 from .terminal import counted
 
 #: What a dwell's JSON object holds beside its times and the reason, in this order.

@@ -11,9 +11,6 @@ from .errors import BadInput
 
 _COMPLEX64 = np.dtype(np.complex64)
 
-#: No dwell is longer: models know of none, and rotors keep their rates for tenths of a second.
-MOST_DWELL_S = 5.0
-
 
 def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
     """Check samples and give them as complex64.
@@ -77,20 +74,6 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
             f"({int(np.sum(~finite))} of {iq.size} are not): {cure}"
         )
     return iq
-
-
-def dwell_length(value: object) -> float:
-    """Check the length of a dwell [s]: above 0, and none of seconds where thousandths were meant.
-
-    Raises
-    ------
-    BadInput
-        It is not.
-    """
-    dwell_s = positive(value, "--dwell [s]")
-    if dwell_s > MOST_DWELL_S:
-        raise BadInput(f"--dwell [s] is {dwell_s:g}: it must be at most {MOST_DWELL_S:g}: 80 ms are 0.08")
-    return dwell_s
 
 
 def positive(value: object, name: str) -> float:

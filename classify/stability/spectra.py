@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from bladewing.features import measure
@@ -86,28 +87,26 @@ def _exact_power(iq: NDArray[np.complex64], window: Window) -> NDArray[np.longdo
     return fft.fftshift(lines.real**2 + lines.imag**2)
 
 
-def _power_error(iq: NDArray[np.complex64]) -> float:
-    """Largest error of a bin's power, over the larger of that power and the mean of all, through either window."""
+def _power_error(iq: NDArray[np.complex64], window: Window) -> float:
+    """Largest error of a bin's power, over the larger of that power and the mean of all."""
     scaled = iq * unit_scale(iq)
-    errors = []
-    for window in (HANN, KAISER):
-        exact = _exact_power(scaled, window)
-        away = np.abs(centred_power(scaled, window=window) - exact)
-        errors.append(float((away / np.maximum(exact, exact.mean() * 1e-6)).max()))
-    return max(errors)
+    exact = _exact_power(scaled, window)
+    away = np.abs(centred_power(scaled, window=window) - exact)
+    return float((away / np.maximum(exact, exact.mean() * 1e-6)).max())
 
 
-def _floor_error(iq: NDArray[np.complex64]) -> Outcome:
-    """Error of the noise floor [dB], through either window."""
-    scaled = iq * unit_scale(iq)
-    errors = []
-    for window in (HANN, KAISER):
-        spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ, window=window)
-        exact = _exact_power(scaled, window)
-        level = max(float(noise_floor(exact, window)), float(exact.mean()) * float(LEAST_FLOOR))  # type: ignore[arg-type]
-        natural = np.longdouble(level) / unit_scale(iq)[0].astype(np.longdouble) ** 2
-        errors.append(float(abs(10 * np.log10(np.longdouble(spectrum.floor) / natural))))
-    return max(errors)
+def _floor_error(iq: NDArray[np.complex64], window: Window) -> float:
+    """Error of the noise floor [dB]."""
+    spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ, window=window)
+    exact = _exact_power(iq * unit_scale(iq), window)
+    level = max(float(noise_floor(exact, window)), float(exact.mean()) * float(LEAST_FLOOR))  # type: ignore[arg-type]
+    natural = np.longdouble(level) / unit_scale(iq)[0].astype(np.longdouble) ** 2
+    return float(abs(10 * np.log10(np.longdouble(spectrum.floor) / natural)))
+
+
+def _through_either(error: Callable[[NDArray[np.complex64], Window], float], iq: NDArray[np.complex64]) -> float:
+    """The larger error of the two windows."""
+    return max(error(iq, window) for window in (HANN, KAISER))
 
 
 def _spectra(quick: bool) -> Iterator[Cell]:
@@ -115,8 +114,8 @@ def _spectra(quick: bool) -> Iterator[Cell]:
     counts = [*_COUNTS, *([] if quick else [1 << 20])]
     amplitudes = [1e-45, 1e-42, 1e-38, 1e-30, 1.0, 1e30, 1e36]
     for stage, measured, limit, work in (
-        ("spectrum", error, 0.02, _power_error),
-        ("noise floor", "error [dB]", 0.05, _floor_error),
+        ("spectrum", error, 0.02, partial(_through_either, _power_error)),
+        ("noise floor", "error [dB]", 0.05, partial(_through_either, _floor_error)),
     ):
         yield from _sweeps(stage, measured, limit, work, counts, amplitudes)
 

@@ -170,9 +170,8 @@ def cepstral_chopping(radar: Spectrum, level_db: Value, kept: Value) -> Chopping
     where = graph.where
     level = level_db.at_least(0.0).at_most(chopping.CLIP_DB) * kept
     level = level - kept * (level.sum() / kept.sum().at_least(1.0))
-    heights = dft_power(level, radar.bins, periods).apply("Sqrt") / chopping.noise_shape(
-        radar.pulses, radar.bins, radar.window
-    )
+    noise = chopping.noise_shape(radar.pulses, radar.bins, radar.window)
+    heights = dft_power(level, radar.bins, periods).apply("Sqrt") / noise
     flat = _prominence(heights, periods)
 
     window = flat.slice(first, last + 1)

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from ..bodies import LINE_DB, line_among, other_body, slow_body, turns_of
 from ..notch import LOBE_BINS, NOTCH_MPS, Body, body_line
 from ..spectrum import Spectrum
-from ..window import KAISER
 
 #: Noise alone seldom has so strong a bin [dB] in the notch about velocity zero; a background's skirt has.
 SKIRT_DB = 9.0
@@ -56,7 +55,7 @@ def strong_lines(spectrum: Spectrum) -> StrongLines:
         line = body
         # the strongest line of all, if it is as slow as that, has its own level; if not, it is the one that moves
         if abs(turns_of(spectrum, body)) * pulses <= rest_half:
-            line = line_among(spectrum, offset > rest_half + 2 * KAISER.noise_bandwidth_bins, [0.0])
+            line = line_among(spectrum, offset > rest_half + 2 * spectrum.window.noise_bandwidth_bins, [0.0])
         else:
             centres = [(0.0, rest_db)]
         if line.level_db > LINE_DB:

@@ -86,26 +86,27 @@ def test_the_limbs_on_foot_stay_below_five_times_the_torso(monkeypatch):
     assert outside.max() < 1e-3
 
 
-def test_a_foot_goes_as_far_as_the_torso_in_strides(monkeypatch):
+def speed_of_a_foot(monkeypatch, count, prf_hz, **values):
+    """Of so many persons over a turn of 2001 pulses, shape (count, pulses - 1) [m/s]."""
     monkeypatch.setattr(discretes, "LIMBS", (LIMBS[0], LIMBS[-1]))
-    fix(monkeypatch, person_mps=1.3, pace=1.0, pedalling=0.0, gait_hz=1.0)
-    radar = Radar(9.85e9, 2e3, 2001)  # one stride
-    foot = draw_discrete(draws(60, 4), radar, "person").micro.astype(complex)
-    speed = -np.angle(foot[:, 1:] * foot[:, :-1].conj()) * radar.prf_hz * radar.wavelength_m / (4 * np.pi)
+    fix(monkeypatch, **values)
+    radar = Radar(9.85e9, prf_hz, 2001)
+    foot = draw_discrete(draws(count, 4), radar, "person").micro.astype(complex)
+    return -np.angle(foot[:, 1:] * foot[:, :-1].conj()) * radar.prf_hz * radar.wavelength_m / (4 * np.pi)
+
+
+def test_a_foot_goes_as_far_as_the_torso_in_strides(monkeypatch):
+    speed = speed_of_a_foot(monkeypatch, 240, 2e3, person_mps=1.3, pace=1.0, pedalling=0.0, gait_hz=1.0)
     np.testing.assert_allclose(speed.mean(axis=1), 1.3, rtol=1e-3)
     forward, back = speed.max(axis=1) - 1.3, 1.3 - speed.min(axis=1)
     assert forward.max() / 1.3 < 2.4 * (1 + 1.3 * 0.45) + 0.01
     assert np.all(forward > 0.999 * back), "strides are quicker than what lies between them"
     assert np.mean(forward > 1.6 * back) > 0.3
-    assert np.mean(forward < 1.2 * back) > 0.05, "some walkers swing their feet evenly"
+    assert np.mean(forward < 1.2 * back) > 0.1, "some walkers swing their feet evenly"
 
 
 def test_a_cyclists_feet_go_round_with_the_pedals_however_fast_the_wheels(monkeypatch):
-    monkeypatch.setattr(discretes, "LIMBS", (LIMBS[0], LIMBS[-1]))
-    fix(monkeypatch, person_mps=3.0, pace=2.0, pedalling=1.0, gait_hz=1.5)
-    radar = Radar(9.85e9, 3e3, 2001)  # one turn
-    foot = draw_discrete(draws(60, 4), radar, "person").micro.astype(complex)
-    speed = -np.angle(foot[:, 1:] * foot[:, :-1].conj()) * radar.prf_hz * radar.wavelength_m / (4 * np.pi)
+    speed = speed_of_a_foot(monkeypatch, 60, 3e3, person_mps=3.0, pace=2.0, pedalling=1.0, gait_hz=1.5)
     np.testing.assert_allclose(speed.mean(axis=1), 6.0, rtol=1e-3)
     forward, back = speed.max(axis=1) - 6.0, 6.0 - speed.min(axis=1)
     np.testing.assert_allclose(forward, back, rtol=0.01)
