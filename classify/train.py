@@ -46,8 +46,7 @@ def run_training(
     """Train the models of the ladder on synthetic records and write them to a folder.
 
     Interrupted, the same call goes on: with what is drawn, with the models that are finished, and with a network from
-    its last whole epoch. On the same machine with the same number of threads the models have the bytes
-    of a run that nothing interrupted.
+    its last whole epoch. On the same machine the models have the bytes of a run that nothing interrupted.
 
     Parameters
     ----------
@@ -104,7 +103,7 @@ def _train_all(
     progress: bool,
 ) -> dict[str, Any]:
     """Draw or read the records, train every model on them, and write these with their account."""
-    # Threads that spin while they wait make training several times slower beside another busy process.
+    # Trees' threads that spin while they wait make training several times slower beside another busy process.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     started = time.perf_counter()
     resumed = parts.begun

@@ -140,7 +140,7 @@ class Dwells:
 
     @cached_property
     def _spectrum(self) -> NDArray[np.float32]:
-        return np.concatenate([self._levels, self._change[..., None, :]], axis=-2)
+        return np.concatenate([self._levels, self._change[..., None, :], self._parts], axis=-2)
 
     @cached_property
     def _features(self) -> NDArray[np.float32]:

@@ -18,8 +18,8 @@ AXIS_BINS = 256
 #: Channels of the "levels" input: mean level, peak level over noise [dB each].
 LEVEL_CHANNELS = 2
 
-#: Channels of the "spectrum" input: the levels, and their change over the dwell's parts [dB].
-SPECTRUM_CHANNELS = LEVEL_CHANNELS + 1
+#: Channels of the "spectrum" input: the levels, their change over the dwell's parts, and the mean level in each [dB].
+SPECTRUM_CHANNELS = LEVEL_CHANNELS + 1 + PARTS
 
 #: Bins of the shared axis of rates of the "cadence" input.
 CADENCE_BINS = 96

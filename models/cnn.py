@@ -256,8 +256,8 @@ class EvidenceNet(nn.Module):
 class SpectrumNet(EvidenceNet):
     """1-D network over the velocity spectrum, alone or beside other evidence.
 
-    About 125 000 parameters and 1.0 million multiplications a record of 3 x 256 beside rates of 2 x 96 and 1 x 64 and
-    measurements; twice as wide, 228 000 and 3.2 million.
+    About 126 000 parameters and 1.1 million multiplications a record of 10 x 256 beside rates of 2 x 96 and 1 x 64 and
+    measurements; twice as wide, 230 000 and 3.4 million.
 
     Parameters
     ----------

@@ -81,8 +81,10 @@ LAWS: dict[str, Law] = {
     "edge_asymmetry": Law("uniform", -0.9, 0.9, "1", "advancing and receding edges unlike"),
     "blade_inequality": Law("log", 0.01, 1.0, "1", "spread of blade amplitudes, natural log"),
     "uav_body_db": Law("uniform", -10.0, 35.0, "dB", "body over blade power; blade lines 10-45 dB under body (P)"),
-    "uav_velocity_mps": Law("uniform", -30.0, 30.0, "m/s", "small UAVs"),
-    "fast_uav_mps": Law("uniform", -65.0, 65.0, "m/s", "racing drones and fast fixed wings"),
+    "uav_mps": Law("uniform", 4.0, 30.0, "m/s", "small UAVs under way"),
+    "fast_uav_mps": Law("uniform", 4.0, 65.0, "m/s", "racing drones and fast fixed wings"),
+    "tilt_rad": Law("uniform", 0.0, np.deg2rad(30.0), "rad", "discs of multirotors in fast flight"),
+    "climb_mps": Law("uniform", -6.0, 6.0, "m/s", "small UAVs; the wind as well for a fixed wing"),
     "uav_acceleration_mps2": Law("uniform", -4.0, 4.0, "m/s^2", "small UAVs"),
     "vibration_m": Law("log", 1e-6, 3e-4, "m", "airframe shaken at the rotor rate, within `uav.SHAKEN_MPS2`"),
     # birds

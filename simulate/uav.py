@@ -2,6 +2,7 @@
 
 from dataclasses import fields, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,10 +62,10 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
     """
     rotors = ROTORS[kind]
     beta = draws.value("uav_beta_rad")
-    velocity = np.where(draws.chance(0.3), 0.0, draws.either("uav_velocity_mps", "fast_uav_mps", FAST_CHANCE))
+    flown, velocity = _flight(draws, kind, beta)
     acceleration = draws.acceleration_mps2("uav_acceleration_mps2")
     length = draws.value("main_length_m" if kind == "helicopter" else "blade_length_m")
-    least_mps = np.maximum(TWO_PI * length * LEAST_ROTATION_HZ, TIP_OVER_BODY * np.abs(velocity))
+    least_mps = np.maximum(TWO_PI * length * LEAST_ROTATION_HZ, TIP_OVER_BODY * np.abs(flown))
     rotation = draws.value("tip_mps", least=least_mps) / (TWO_PI * length)
     blades = np.where(draws.chance(0.65), 2, np.where(draws.chance(0.75), 3, 4))
     amplitudes = _blade_amplitudes(draws)
@@ -102,7 +103,7 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
         tail.append(rotor)
     shaken_m, phase, rest = (draws.value(law) for law in ("vibration_m", "phase_rad", "phase_rad"))
     shaken_m = np.minimum(shaken_m, SHAKEN_MPS2 / (TWO_PI * rates[:, 0]) ** 2)
-    path = {
+    path: dict[str, Any] = {
         "velocity_mps": velocity,
         "acceleration_mps2": acceleration,
         "vibration_rad": 2 * TWO_PI / radar.wavelength_m * shaken_m,
@@ -119,6 +120,24 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
             micro[rows] = rotors_echo(radar, some, len(rows), **{name: value[rows] for name, value in path.items()})
     body = body_echo(radar, len(draws), **path, phase_rad=rest)
     return Target(micro, body, draws.value("uav_body_db"), truth=truth)
+
+
+def _flight(draws: Draws, kind: str, beta_rad: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Speed along the way that is flown, and the part of it along the line of sight, which the aspect leaves.
+
+    A propeller pulls along its axis, a lifting rotor nearly square to it: seen along its axis the one flies with all of
+    its speed towards the radar, the other with hardly any, so that no lifting rotor's tips look slower than its body.
+    """
+    still = draws.chance(0.3)
+    flown = draws.sign() * draws.either("uav_mps", "fast_uav_mps", FAST_CHANCE)
+    tilt = draws.sign() * draws.value("tilt_rad") * np.minimum(np.abs(flown) / 20.0, 1.0)
+    climb = draws.value("climb_mps")
+    if kind == "fixed_wing":
+        seen = flown * np.sin(beta_rad) + climb
+    else:
+        height = np.clip(beta_rad + tilt, 0.0, np.pi / 2)
+        seen = flown * np.cos(height) + climb * np.sin(height)
+    return np.where(still, 0.0, flown), np.where(still, 0.0, seen)
 
 
 def _motion(draws: Draws, rate_hz: NDArray[np.float64], radar: Radar) -> RotorMotion:

@@ -117,7 +117,7 @@ def input_graph(
         parts_db = pooled_mean(parts / floor.reshape(-1, 1, 1), pool).at_least(0.0)
         away = parts_db - parts_db.sum(-2) / PARTS
         change = ((away * away).sum(-2, keep=False) / PARTS).apply("Sqrt")
-        out["spectrum"] = graph.concat(levels, change.reshape(-1, 1, AXIS_BINS), axis=1)
+        out["spectrum"] = graph.concat(levels, change.reshape(-1, 1, AXIS_BINS), parts_db, axis=1)
         if "features" in names:
             level_db = to_db(relative_power)
             mean = levels.slice(0, 1, axis=-2).reshape(-1, AXIS_BINS)

@@ -10,7 +10,6 @@ from collections.abc import Callable
 import numpy as np
 from bladewing.classify.gather import Gathered, gather
 from bladewing.classify.train_network import CLASS_OF_KIND, kinds_of
-from bladewing.features import INPUT_SHAPES
 from bladewing.features.schema import FEATURES, LEVEL_CHANNELS
 from bladewing.models.augment import VelocityMirror
 from bladewing.models.calibration import softmax
@@ -31,14 +30,16 @@ GROUPS: dict[str, Callable[[str], bool]] = {
     "change over the dwell": lambda name: name.startswith(("change_", "centroid_", "busy_")),
 }
 
-#: Inputs of each trial; "levels" are the spectrum's first channels.
+#: Inputs of each trial; "levels" and "change" are the spectrum's first channels.
 TRIALS = {
     "levels": ("levels",),
-    "levels, change": ("spectrum",),
+    "levels, change": ("change",),
+    "levels, change, parts": ("spectrum",),
     "levels, cadence": ("levels", "cadence"),
     "levels, cadence, combs": ("levels", "cadence", "combs"),
-    "levels, change, cadence": ("spectrum", "cadence"),
-    "levels, change, measurements": ("spectrum", "features"),
+    "spectrum, cadence": ("spectrum", "cadence"),
+    "spectrum, measurements": ("spectrum", "features"),
+    "all without parts": ("change", "cadence", "combs", "features"),
     "all without combs": ("spectrum", "cadence", "features"),
     "all": ("spectrum", "cadence", "combs", "features"),
 }
@@ -51,7 +52,8 @@ CLASSES_TOLD = "all, told classes and no kinds"
 
 def inputs_of(part: Gathered, names: tuple[str, ...], held: NDArray[np.bool_]) -> dict[str, NDArray]:
     """The named inputs, measurements that are `held` at zero."""
-    given = part.inputs | {"levels": part.inputs["spectrum"][:, :LEVEL_CHANNELS]}
+    spectrum = part.inputs["spectrum"]
+    given = part.inputs | {"levels": spectrum[:, :LEVEL_CHANNELS], "change": spectrum[:, : LEVEL_CHANNELS + 1]}
     given["features"] = np.where(held, np.float32(0), given["features"])
     return {name: given[name] for name in names}
 
@@ -66,9 +68,9 @@ def trial(
     kinds: bool = True,
 ) -> tuple[float, float, float, float]:
     """Balanced accuracy, half its 95 % interval, UAVs found at 1 % and nats a record of one network."""
-    shapes = {name: INPUT_SHAPES[name] for name in names}
-    net = SpectrumNet(shapes, seed=seed, **({"kinds": CLASS_OF_KIND} if kinds else {}))
     train, validate, test = (inputs_of(sets[purpose], names, held) for purpose in ("train", "validate", "bench"))
+    shapes = {name: values.shape[1:] for name, values in train.items()}
+    net = SpectrumNet(shapes, seed=seed, **({"kinds": CLASS_OF_KIND} if kinds else {}))
     train_network(
         net,
         Lessons(train, sets["train"].labels, kinds_of(sets["train"]) if kinds else None),

@@ -75,7 +75,10 @@ def test_nor_do_those_of_records_from_python() -> None:
     spoilt[:, ::97] = 0
     given, clear = (Classifier.load().predict(iq, carrier_hz=9.85e9, prf_hz=25e3) for iq in (spoilt, whole))
     np.testing.assert_array_equal(given.labels, clear.labels)
-    np.testing.assert_allclose(given.probabilities, clear.probabilities, atol=0.05)
+    # one sample in a hundred is another: what a record turns by depends on the model, but all hold no rotor
+    away = np.abs(given.probabilities - clear.probabilities)
+    assert away.max() < 0.1
+    assert away.mean() < 0.02
 
 
 def test_of_a_recording_that_clips_no_comb_that_stays_is_counted(tmp_path) -> None:

@@ -95,6 +95,16 @@ def test_blocks_of_any_size_give_the_same(monkeypatch, names):
         np.testing.assert_allclose(parts[name], whole[name], rtol=1e-4, atol=1e-3)
 
 
+def test_the_spectrum_is_the_levels_their_change_and_those_of_each_part():
+    given = model_inputs(np.stack([scene(0), scene(1)]), **RADAR, names=("levels", "spectrum"))
+    levels, change, parts = np.split(given["spectrum"], (2, 3), axis=-2)
+    np.testing.assert_array_equal(levels, given["levels"])
+    np.testing.assert_allclose(change[..., 0, :], parts.std(axis=-2), atol=1e-4)
+    # flashes at 117 Hz: each part of 21 ms holds some, so all are near the level of the whole
+    seen = levels[:, 0] > 10
+    assert np.abs((parts.mean(axis=-2) - levels[:, 0])[seen]).mean() < 4
+
+
 def test_only_what_is_asked_for_is_computed():
     assert set(model_inputs(scene(), **RADAR, names=("image",))) == {"image"}
     with pytest.raises(ValueError, match="'cepstrogram' is unknown"):

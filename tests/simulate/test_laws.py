@@ -58,6 +58,29 @@ def test_no_rotor_turns_as_slowly_as_a_wheel():
         assert turns_hz[longest].min() < 1.1 * LEAST_ROTATION_HZ  # the law begins there, not beyond
 
 
+@given(seed=st.integers(0, 2**32), beta_deg=st.floats(0.0, 90.0))
+def test_a_propeller_flies_along_its_axis_and_a_lifting_rotor_square_to_it(seed, beta_deg):
+    beta, climb = np.full(300, np.deg2rad(beta_deg)), LAWS["climb_mps"].high
+    for kind in ("fixed_wing", "quadcopter"):
+        flown, seen = uav._flight(Draws(np.random.default_rng(seed).random((300, WIDTH))), kind, beta)
+        assert 0.18 < np.mean(flown == 0) < 0.42  # of three in ten: 4.5 standard deviations
+        assert (seen[flown == 0] == 0).all()
+        if kind == "fixed_wing":
+            assert (np.abs(seen - flown * np.sin(beta)) <= climb).all()
+        else:
+            least, most = np.abs(flown) * np.cos(
+                np.clip(beta[0] + LAWS["tilt_rad"].high * np.array([[1], [-1]]), 0, 1.6)
+            )
+            assert (np.abs(seen) <= most + climb).all()
+            assert (np.abs(seen) >= least - climb).all()
+
+
+def test_hardly_any_lifting_rotor_is_seen_with_tips_slower_than_its_body():
+    truth = draw_records(Radar(9.85e9, 25e3, 16), 3000, 3, kind="quadcopter").truth
+    tips = truth["tip_mps"] * np.cos(truth["beta_rad"])
+    assert np.mean(tips < np.abs(truth["velocity_mps"])) < 0.01  # with speeds of any aspect it is 0.023
+
+
 @settings(max_examples=4)
 @given(seed=st.integers(0, 2**32))
 def test_rates_levels_and_lengths_of_records_follow_their_laws(seed):

@@ -125,10 +125,10 @@ def test_no_law_passes_another():
     assert LAWS["sea_width_mps"].high < LAWS["sea_velocity_mps"].high
     assert LAWS["texture_hz"].high < 1 / 0.1  # slower than speckle
     assert LAWS["full_scale_db"].low < 0 < LAWS["full_scale_db"].high  # some clip
-    assert LAWS["unambiguous_mps"].high > LAWS["tip_mps"].high + LAWS["uav_velocity_mps"].high
+    assert LAWS["unambiguous_mps"].high > LAWS["tip_mps"].high + LAWS["uav_mps"].high
     assert LAWS["insect_wingbeat_hz"].low > MAX_WINGBEAT_HZ  # no bird beats as fast as an insect
     assert LAWS["insect_depth"].high < 1
-    for law in ("phase_rad", "edge_asymmetry", "uav_velocity_mps", "mover_mps", "person_mps", "insect_velocity_mps"):
+    for law in ("phase_rad", "edge_asymmetry", "climb_mps", "mover_mps", "person_mps", "insect_velocity_mps"):
         assert LAWS[law].low == -LAWS[law].high, law  # no direction is special
 
 
