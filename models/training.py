@@ -145,7 +145,7 @@ class TrainingResult:
 
 
 @contextmanager
-def one_thread() -> Iterator[None]:
+def _one_thread() -> Iterator[None]:
     """Hold torch to one thread: layers as small as these wait for one another longer than they compute.
 
     A step of 256 records takes 0.6 of the time that it takes on two processors, and another busy process slows it by
@@ -159,7 +159,7 @@ def one_thread() -> Iterator[None]:
         torch.set_num_threads(threads)
 
 
-@one_thread()
+@_one_thread()
 def train_network(
     net: EvidenceNet,
     lessons: Lessons,
@@ -269,7 +269,7 @@ def train_network(
     return TrainingResult(work.best_epoch, place.type, seconds, tuple(work.history), len(work.history) < epochs)
 
 
-@one_thread()
+@_one_thread()
 def network_scores(net: EvidenceNet, inputs: Inputs) -> NDArray[np.float32]:
     """Return the raw scores of a network, and leave it in the state for inference.
 

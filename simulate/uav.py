@@ -126,7 +126,7 @@ def _flight(draws: Draws, kind: str, beta_rad: NDArray[np.float64]) -> tuple[NDA
     """Speed along the way that is flown, and the part of it along the line of sight, which the aspect leaves.
 
     A propeller pulls along its axis, a lifting rotor nearly square to it: seen along its axis the one flies with all of
-    its speed towards the radar, the other with hardly any, so that no lifting rotor's tips look slower than its body.
+    its speed towards the radar, the other with hardly any: few lifting rotors have tips that look slower than their body.
     """
     still = draws.chance(0.3)
     flown = draws.sign() * draws.either("uav_mps", "fast_uav_mps", FAST_CHANCE)
