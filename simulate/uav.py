@@ -125,8 +125,8 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
 def _flight(draws: Draws, kind: str, beta_rad: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Speed along the way that is flown, and the part of it along the line of sight, which the aspect leaves.
 
-    A propeller pulls along its axis, a lifting rotor nearly square to it: seen along its axis the one flies with all of
-    its speed towards the radar, the other with hardly any: few lifting rotors have tips that look slower than their body.
+    A propeller pulls along its axis, a lifting rotor nearly square to it. Seen along its axis the one flies with all of
+    its speed towards the radar, the other with hardly any: few lifting rotors' tips look slower than their body.
     """
     still = draws.chance(0.3)
     flown = draws.sign() * draws.either("uav_mps", "fast_uav_mps", FAST_CHANCE)
