@@ -56,6 +56,13 @@ VALUES = (
 #: Of these, and of the alternatives, those that count something.
 WHOLE = ("comb_order", "rotor_count", "blades")
 
+#: What it holds of combs: medians over the dwells.
+OF_COMBS = ("chopping_hz", "bandwidth_hz", "tip_speed_mps", "rotation_hz", "blade_length_m")
+
+#: Where the middle half of so many combs and more reaches over this ratio, they are not the same in all dwells, and no
+#: rotor is named: a wind turbine's blades, hundreds of echoes each, show another comb in every second dwell.
+LEAST_COMBS, UNSTEADY = 4, 1.25
+
 #: What a recording's JSON object holds of the wingbeat and of the body's course.
 WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std", "acceleration_mps2", "acceleration_mps2_std")
 
@@ -169,11 +176,14 @@ class Measured:
     def together(self) -> dict[str, Any]:
         """Medians over the dwells that hold a comb, or both of a helicopter's, and how many those are.
 
-        Without any comb, the body's velocity is that of all dwells; see `body`.
+        Where no comb is, or they are not one rotor's, the reason in place of their medians. Without any comb, the
+        body's velocity is that of all dwells; see `body`.
         """
         held = np.isfinite(self.values.chopping_hz)
-        names = ("chopping_hz", "bandwidth_hz", "tip_speed_mps", "rotation_hz", "blade_length_m")
-        medians: dict[str, Any] = {name: _median(getattr(self.values, name)[held]) for name in names}
+        reason = disagreement(self.values) if held.any() else "no comb in any dwell"
+        medians: dict[str, Any] = dict.fromkeys(OF_COMBS)
+        if not reason:
+            medians = {name: _median(getattr(self.values, name)[held]) for name in OF_COMBS}
         telling = held if held.any() else ~held
         medians |= self.body(telling) | {"body_velocity_range_mps": self.body_range(telling)}
         geared = np.isfinite(self.values.gear_ratio)
@@ -181,7 +191,7 @@ class Measured:
         gear = {name: _median(getattr(self.values, name)[geared]) for name in pair}
         counts = {"dwells": len(self.iq), "with_comb": int(held.sum()), "with_second_comb": int(geared.sum())}
         beside = {"left_out_s": self.recording.left_out_s(self.iq), "remarks": list(self.remarks)}
-        return {**counts, **beside, **medians, **gear, **self.over_all()}
+        return {**counts, "reason": reason or None, **beside, **medians, **gear, **self.over_all()}
 
     def body(self, dwells: np.ndarray) -> dict[str, float | None]:
         """The body's velocity over some of the dwells and its deviation; nothing where none of them tells it.
@@ -332,6 +342,22 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
                 "was made analytic: whether a body comes or goes is not told",
             )
     return Measured(recording, iq, start_s, stop_s, values, acceleration, acceleration_std, beat, remarks)
+
+
+def helicopter(values: Measurements) -> bool:
+    """Whether most dwells with a comb hold a main and a tail rotor's: a single one of many may be chance."""
+    return bool(np.isfinite(values.gear_ratio).sum() > 0.5 * np.isfinite(values.chopping_hz).sum())
+
+
+def disagreement(values: Measurements) -> str:
+    """Why the combs of the dwells are not one rotor's, where most differ by more than that changes; else ""."""
+    known = np.sort(values.chopping_hz[values.chopping_hz_std < values.chopping_hz])  # lower bounds bear out any
+    if len(known) < LEAST_COMBS or helicopter(values):
+        return ""
+    low, high = known[len(known) // 4], known[-1 - len(known) // 4]
+    if high < UNSTEADY * low:
+        return ""
+    return f"no steady rotor: half of their chopping frequencies lie within {low:.4g} to {high:.4g} Hz"
 
 
 def _number(value: Any, *, whole: bool = False) -> float | None:

@@ -10,17 +10,13 @@ from bladewing.features.rotor.comb import OVER_BODY
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 
 from .errors import one_line
-from .measure import CHANCE
+from .measure import CHANCE, helicopter
 from .terminal import counted, print_table, print_words
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from .measure import Measured
-
-#: Where the middle half of so many combs and more reaches over this ratio, they are not the same in all dwells, and no
-#: rotor is named: a wind turbine's blades, hundreds of echoes each, show another comb in every second dwell.
-LEAST_COMBS, UNSTEADY = 4, 1.25
 
 #: Bodies whose velocity differs by more from dwell to dwell have no single one [m/s].
 UNSTEADY_MPS = 1.0
@@ -72,9 +68,9 @@ def _sentence(found: "Measured") -> str:
     where = f"comb in {all_together['with_comb']} of {counted(all_together['dwells'])}"
     if all_together["with_comb"] <= CHANCE * all_together["dwells"]:
         where += ", perhaps by chance"
+    if all_together["reason"]:
+        return f"{where}; {all_together['reason']}{body}{_wheel(found)}"
     gear = _gear(found)
-    if not gear and (unsteady := _unsteady(found)):
-        return f"{where}; {unsteady}{body}{_wheel(found)}"
     clear = found.clearest()
     v = found.values
     rates = v.rotor_rates_hz[clear]
@@ -118,18 +114,6 @@ def _blades(found: "Measured") -> str:
     return f"; {number} blade{'s' * (number > 1)} in {np.count_nonzero(told == number)} of {counted(len(turns))}"
 
 
-def _unsteady(found: "Measured") -> str:
-    """What is said where the combs of the dwells are not one rotor's: most differ by more than it changes; or ""."""
-    v = found.values
-    known = np.sort(v.chopping_hz[v.chopping_hz_std < v.chopping_hz])  # lower bounds bear out any
-    if len(known) < LEAST_COMBS:
-        return ""
-    low, high = known[len(known) // 4], known[-1 - len(known) // 4]
-    if high < UNSTEADY * low:
-        return ""
-    return f"no steady rotor: half of their chopping frequencies lie within {low:.4g} to {high:.4g} Hz"
-
-
 def _unlike(found: "Measured") -> str:
     """Words of caution where most dwells count other rotors than the one whose rates are named; or ""."""
     v, named = found.values, found.clearest()
@@ -158,10 +142,9 @@ def _wheel(found: "Measured") -> str:
 def _gear(found: "Measured") -> str:
     """A helicopter's main and tail comb and their ratio in words, of the dwell with the smallest error; or ""."""
     v = found.values
-    geared = np.isfinite(v.gear_ratio)
-    # a single dwell of many may be chance
-    if geared.sum() <= 0.5 * np.isfinite(v.chopping_hz).sum():
+    if not helicopter(v):
         return ""
+    geared = np.isfinite(v.gear_ratio)
     n = int(np.nanargmin(v.gear_ratio_std))
     main, tail, ratio = (
         with_error(getattr(v, name)[n], getattr(v, f"{name}_std")[n])

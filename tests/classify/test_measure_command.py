@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bladewing.classify.cli import main
-from bladewing.classify.measure import Measured, Settings, measure_recording
-from bladewing.classify.measure_words import _blades, _unlike, _unsteady, with_error
+from bladewing.classify.measure import OF_COMBS, Measured, Settings, disagreement, measure_recording
+from bladewing.classify.measure_words import _blades, _unlike, with_error
 from bladewing.classify.recording import load_recording
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 from scipy.signal import hilbert
@@ -71,6 +71,19 @@ def test_noise_has_nulls_and_a_reason(folder, capsys):
     assert dwell["gear_reason"] == "no comb"
     assert dwell["reason"].startswith("no comb")
     assert closing["recording"]["with_comb"] == 0
+    assert closing["recording"]["reason"] == "no comb in any dwell"
+
+
+def test_combs_that_are_not_one_rotors_have_no_median_but_a_reason(tmp_path, capsys):
+    rng, path = np.random.default_rng(6), tmp_path / "unlike.npy"
+    unlike = [spinning(rate_hz, PULSES) + 10 for rate_hz in (40.3, 47.1, 61.7, 83.3)]  # none of the mains
+    for parts, steady in ((unlike, False), (unlike[:1] * 4, True)):
+        np.save(path, (np.concatenate(parts) + white(rng, 4 * PULSES)).astype(np.complex64))
+        assert main(["measure", str(path), *RADAR, "--json", "--dwell", str(PULSES / PRF_HZ), "--blades", "2"]) == 0
+        told = json.loads(capsys.readouterr().out.splitlines()[-1])["recording"]
+        assert told["with_comb"] == 4
+        assert [told[name] is not None for name in OF_COMBS[:4]] == [steady] * 4
+        assert (told["reason"] is None) if steady else told["reason"].startswith("no steady rotor: half")
 
 
 def test_a_body_without_a_rotor_has_its_velocity(tmp_path, capsys):
@@ -140,11 +153,16 @@ def test_a_comb_in_a_few_of_many_dwells_is_said_to_be_perhaps_chance(folder, tmp
 )
 def test_no_rotor_is_named_where_the_middle_half_of_the_combs_disagrees(chopping_hz, said):
     chopping_hz = np.array(chopping_hz)
-    values = SimpleNamespace(chopping_hz=chopping_hz, chopping_hz_std=0.01 * chopping_hz)
-    told = _unsteady(SimpleNamespace(values=values))
+    values = SimpleNamespace(
+        chopping_hz=chopping_hz, chopping_hz_std=0.01 * chopping_hz, gear_ratio=np.full(len(chopping_hz), np.nan)
+    )
+    told = disagreement(values)
     assert (said in told) if said else not told
+    values.gear_ratio[:] = 4.7  # of a helicopter's two combs now this is the stronger one, now that
+    assert disagreement(values) == ""
+    values.gear_ratio[:] = np.nan
     values.chopping_hz_std = 2 * chopping_hz  # lower bounds say nothing of the sort
-    assert _unsteady(SimpleNamespace(values=values)) == ""
+    assert disagreement(values) == ""
 
 
 def test_a_count_of_rotors_that_most_dwells_do_not_share_is_not_given_without_a_word():
