@@ -56,14 +56,14 @@ VALUES = (
 #: Of these, and of the alternatives, those that count something.
 WHOLE = ("comb_order", "rotor_count", "blades")
 
-#: What it holds of combs: medians over the dwells.
+#: What a recording's JSON object holds of combs: medians over the dwells.
 OF_COMBS = ("chopping_hz", "bandwidth_hz", "tip_speed_mps", "rotation_hz", "blade_length_m")
 
 #: Where the middle half of so many combs and more reaches over this ratio, they are not the same in all dwells, and no
 #: rotor is named: a wind turbine's blades, hundreds of echoes each, show another comb in every second dwell.
 LEAST_COMBS, UNSTEADY = 4, 1.25
 
-#: What a recording's JSON object holds of the wingbeat and of the body's course.
+#: And of the wingbeat and of the body's course.
 WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std", "acceleration_mps2", "acceleration_mps2_std")
 
 #: Pulses of a dwell at most, as of one that is named: to measure so many takes a quarter of a minute.

@@ -30,6 +30,9 @@ FAST_CHANCE = 0.2
 #: (helicopters), propellers by a third. What turns no faster than it moves is a wheel.
 TIP_OVER_BODY = 2.5
 
+#: From this speed on discs are tilted as far as they ever are [m/s]: drag holds the thrust by then.
+TILTED_MPS = 20.0
+
 #: An airframe is shaken by its rotors with no more than this [m/s^2]: five times gravity, beyond which no autopilot
 #: flies. What a wave sees of it is its length over the wavelength, so that only short waves see much.
 SHAKEN_MPS2 = 50.0
@@ -130,7 +133,7 @@ def _flight(draws: Draws, kind: str, beta_rad: NDArray[np.float64]) -> tuple[NDA
     """
     still = draws.chance(0.3)
     flown = draws.sign() * draws.either("uav_mps", "fast_uav_mps", FAST_CHANCE)
-    tilt = draws.sign() * draws.value("tilt_rad") * np.minimum(np.abs(flown) / 20.0, 1.0)
+    tilt = draws.sign() * draws.value("tilt_rad") * np.minimum(np.abs(flown) / TILTED_MPS, 1.0)
     climb = draws.value("climb_mps")
     if kind == "fixed_wing":
         seen = flown * np.sin(beta_rad) + climb

@@ -69,7 +69,7 @@ def test_a_propeller_flies_along_its_axis_and_a_lifting_rotor_square_to_it(seed,
             assert (np.abs(seen - flown * np.sin(beta)) <= climb).all()
         else:
             least, most = np.abs(flown) * np.cos(
-                np.clip(beta[0] + LAWS["tilt_rad"].high * np.array([[1], [-1]]), 0, 1.6)
+                np.clip(beta[0] + LAWS["tilt_rad"].high * np.array([[1], [-1]]), 0, np.pi / 2)
             )
             assert (np.abs(seen) <= most + climb).all()
             assert (np.abs(seen) >= least - climb).all()
