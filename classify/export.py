@@ -1,8 +1,8 @@
 """The work behind `bladewing export`: one ONNX graph from raw IQ to probabilities, for one radar and one dwell.
 
 It holds what `Classifier.predict` does of a record inside the envelope: the inputs (`bladewing.features.graph`), the
-model with its calibration, and the answer; only lost pulses are not filled in. Only operators of the ONNX standard, so
-any runtime can serve it.
+model with its calibration, and the answer; only what lost pulses or has one channel alone is not mended. Only operators
+of the ONNX standard, so any runtime can serve it.
 """
 
 import hashlib
@@ -53,8 +53,8 @@ def export_raw_iq(
         The file to write, its name ending in ".onnx". Its graph reads "iq", float32 of shape (batch, pulses, 2), batch
         1 or more, I and Q at any gain, and gives "probabilities", float32 (batch, 3) in the order uav, bird, clutter,
         and "label", int64 (batch,): the place in (uav, bird, clutter, unknown). A record without signal, or with a
-        sample that is not finite or three and more lost pulses (exactly 0, which `Classifier.predict` fills in), is
-        unknown with probabilities of 1/3.
+        sample that is not finite, three and more lost pulses (exactly 0, which `Classifier.predict` fills in) or one
+        channel alone (which that makes analytic), is unknown with probabilities of 1/3.
     carrier_hz, prf_hz
         Carrier and pulse repetition frequency [Hz] that it is made for.
     pulses
@@ -182,7 +182,7 @@ def _sealed(
 def _difference(written: bytes, classifier: Classifier, carrier_hz: float, prf_hz: float, pulses: int) -> float:
     """Largest difference of a probability from the classifier's, over noise with lines of every strength.
 
-    Half of them are one-sided, as analytic recordings are: what they lack lies exactly at the lowest level.
+    Half of them are one-sided, as analytic recordings are: noise is put in place of what they lack.
     """
     rng = np.random.default_rng(0)
     noise = rng.normal(size=(_CHECKED, pulses, 2)).astype(np.float32)

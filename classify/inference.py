@@ -247,7 +247,7 @@ class Classifier:
         iq
             Shape (..., pulses), complex: one range cell, one sample a pulse. Leading axes are a batch, and every
             record is answered as if it were alone. The gain does not matter. Pulses that were lost, which are exactly
-            0, are filled in by what those beside them tell of them.
+            0, are filled in by what those beside them tell of them; one channel, I without Q, is made analytic.
         carrier_hz
             Carrier [Hz].
         prf_hz

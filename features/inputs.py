@@ -10,8 +10,10 @@ from .axis import Pooling, pooling
 from .cadence import cadence_db
 from .change import change_db, parts_db
 from .comb_levels import comb_levels_db
+from .empty_side import without_empty_side
 from .joint import joint_vector, stft_image
 from .notch import Body, body_line, notch_mask
+from .one_channel import made_analytic
 from .schema import AXIS_BINS, INPUT_SHAPES
 from .spectrum import Spectrum, as_complex, doppler_spectrum
 from .vector import feature_vector
@@ -34,7 +36,8 @@ def model_inputs(
     Parameters
     ----------
     iq : array_like of complex, shape (..., pulses)
-        Slow-time samples of one range cell, any gain.
+        Slow-time samples of one range cell, any gain. Of one channel, I without Q, that holds noise they are made
+        analytic; a side of the spectrum that is empty, as it then is, is filled with noise (`empty_side`).
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz].
     names : collection of str
@@ -85,14 +88,19 @@ class Dwells:
     """
 
     def __init__(self, samples: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float) -> None:
-        self._samples = samples
         self._radar = {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
+        samples = made_analytic(samples)
+        spectrum = self._spectrum_of(samples)
+        self._samples = without_empty_side(samples, spectrum)
+        self._spectrum_of_dwell = spectrum if self._samples is samples else self._spectrum_of(self._samples)
 
     def rows(self, rows: NDArray[np.intp]) -> "Dwells":
         """Some of the records, with what is computed of them so far."""
-        some = Dwells(self._samples[rows], **self._radar)
+        some = object.__new__(Dwells)
         for name, piece in self.__dict__.items():
-            if name not in ("_samples", "_radar", "_pool"):
+            if name in ("_radar", "_pool"):
+                some.__dict__[name] = piece
+            else:
                 some.__dict__[name] = piece[rows] if isinstance(piece, np.ndarray) else piece.rows(rows)
         return some
 
@@ -101,9 +109,8 @@ class Dwells:
         # the measurements last: they take the mean level from the levels where these are made
         return {name: getattr(self, f"_{name}") for name in sorted(names, key=lambda name: (name == "features", name))}
 
-    @cached_property
-    def _spectrum_of_dwell(self) -> Spectrum:
-        return doppler_spectrum(self._samples, **self._radar, window=HANN)
+    def _spectrum_of(self, samples: NDArray[np.complex64]) -> Spectrum:
+        return doppler_spectrum(samples, **self._radar, window=HANN)
 
     @cached_property
     def _body(self) -> Body:

@@ -20,6 +20,11 @@ def one_channel(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
 
     To the bit: two equal blades at rest without any noise are a straight line in I and Q as well, of any direction.
     """
+    real, imaginary = np.abs(iq[..., :1].real), np.abs(iq[..., :1].imag)
+    if not np.count_nonzero(
+        (real == 0) | (imaginary == 0) | (real == imaginary)
+    ):  # most show that in their first pulse
+        return np.zeros(iq.shape[:-1], bool)
     real, imaginary = iq.real, iq.imag
     alike = (real == imaginary).all(axis=-1) | (real == -imaginary).all(axis=-1)
     one, other = real.any(axis=-1), imaginary.any(axis=-1)

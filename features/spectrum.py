@@ -57,6 +57,8 @@ class Spectrum:
         The centred transform of the scaled and windowed samples, whose power this is.
     window : Window
         Theirs.
+    side_floors : ndarray of float32, shape (..., 2)
+        Noise power of a bin of `transform` on the lower and on the upper side, of which the floor is made.
     """
 
     relative_power: NDArray[np.float32]
@@ -67,10 +69,11 @@ class Spectrum:
     scale: NDArray[np.float32]
     transform: NDArray[np.complex64]
     window: Window
+    side_floors: NDArray[np.float32]
 
     def rows(self, rows: NDArray[np.intp] | tuple[int, ...]) -> "Spectrum":
         """The spectra of some of the records, of shape (records, bins), or of the one of such an index."""
-        arrays = ("relative_power", "floor", "scale", "transform")
+        arrays = ("relative_power", "floor", "scale", "transform", "side_floors")
         return replace(self, **{name: getattr(self, name)[rows] for name in arrays})
 
     @property
@@ -295,9 +298,8 @@ def safe_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
 def noise_floor(power: NDArray[np.float32], window: Window) -> NDArray[np.float32]:
     """Noise floor of centred power spectra, robust to lines, bands and an empty side.
 
-    Each side is averaged in blocks of neighbouring bins; the lower quartile of the blocks, corrected for its bias on
-    white noise, is that side's floor. Their mean counts, or the larger one where the other side is empty, as it is in
-    recordings made analytic from a single real channel.
+    The mean of both sides' floors counts, or the larger one where the other side is empty, as it is in recordings made
+    analytic from a single real channel.
 
     Parameters
     ----------
@@ -311,16 +313,29 @@ def noise_floor(power: NDArray[np.float32], window: Window) -> NDArray[np.float3
     ndarray of float32, shape (...)
         Mean noise power of a bin.
     """
+    return _floor_of(_side_floors(power, window))
+
+
+def _side_floors(power: NDArray[np.float32], window: Window) -> NDArray[np.float32]:
+    """Noise floor of the lower and of the upper side of centred power spectra, shape (..., 2).
+
+    Each side is averaged in blocks of neighbouring bins; the lower quartile of the blocks, corrected for its bias on
+    white noise, is that side's floor.
+    """
     if power.shape[-1] < 4:
-        return power.mean(axis=-1)
-    sums_of, size = side_sums(power)
-    blocks = sums_of.shape[-1]
-    rank = quartile_rank(blocks)
-    sums_of.partition(rank, axis=-1)
-    one, other = sums_of[..., 0, rank], sums_of[..., 1, rank]
+        return power.mean(axis=-1, keepdims=True).repeat(2, axis=-1)
+    blocks, size = side_sums(power)
+    count = blocks.shape[-1]
+    rank = quartile_rank(count)
+    blocks.partition(rank, axis=-1)
+    return np.divide(blocks[..., rank], quartile_of_noise(power.shape[-1], size, count, window))
+
+
+def _floor_of(sides: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The floor that both sides' (..., 2) come to, shape (...)."""
+    one, other = sides[..., 0], sides[..., 1]
     least, most = np.minimum(one, other), np.maximum(one, other)
-    level = np.where(most > EMPTY_RATIO * least, most, (least + most) * _HALF)
-    return np.divide(level, quartile_of_noise(power.shape[-1], size, blocks, window))
+    return np.where(most > EMPTY_RATIO * least, most, (least + most) * _HALF)
 
 
 def side_sums(power: NDArray[np.float32]) -> tuple[NDArray[np.float32], int]:
@@ -438,8 +453,8 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float, window:
     scale = safe_scale(samples)
     transform = centred_transform(scaled(samples, scale), window=window)
     power = power_of(transform)
-    floor = noise_floor(power, window)
-    floor = np.maximum(floor, _least_floor(power))
+    sides = _side_floors(power, window)
+    floor = np.maximum(_floor_of(sides), _least_floor(power))
     natural = floor / np.square(scale[..., 0], dtype=np.float64)
     relative = np.multiply(power, per_floor(floor)[..., None], out=power)
-    return Spectrum(relative, natural, carrier_hz, prf_hz, samples.shape[-1], scale, transform, window)
+    return Spectrum(relative, natural, carrier_hz, prf_hz, samples.shape[-1], scale, transform, window, sides)

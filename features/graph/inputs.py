@@ -8,11 +8,12 @@ from ..axis import pooling
 from ..change import PARTS, frame_starts, part_length
 from ..dropouts import LEAST_LOST
 from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
-from ..spectrum import LEAST_FLOOR, LEAST_PART, LEAST_POWER, Spectrum, doppler_spectrum
+from ..spectrum import LEAST_PART, Spectrum, doppler_spectrum
 from ..vector import BANDS, SIGNIFICANT, radar_columns
 from ..window import HANN
 from .cadence import cadence_db
 from .comb_levels import comb_levels_db
+from .empty_side import without_empty_side
 from .measurements import (
     Body,
     band_levels_db,
@@ -31,7 +32,17 @@ from .measurements import (
     threshold_width_hz,
 )
 from .operators import Graph, Value
-from .spectrum import centred_transform, noise_floor, pooled, pooled_mean, power_of, to_db, unit_scale
+from .spectrum import (
+    centred_transform,
+    noise_floor,
+    noise_shows,
+    pooled,
+    pooled_mean,
+    power_of,
+    side_floors,
+    to_db,
+    unit_scale,
+)
 
 #: The model inputs that are made in a graph.
 IN_GRAPH = ("features", "levels", "spectrum", "cadence", "combs")
@@ -65,7 +76,8 @@ def input_graph(
     inputs : dict of str to Value
         As `inputs.model_inputs` gives them, shape (records, *INPUT_SHAPES[name]).
     live : Value
-        Whether a record holds a signal, only finite samples and no lost pulses, shape (records, 1).
+        Whether a record holds a signal, of two channels where there is noise, only finite samples and no lost pulses,
+        shape (records, 1).
 
     Raises
     ------
@@ -84,16 +96,16 @@ def input_graph(
     # no sum of what is not finite is within any limit; such a record spoils no other, and its answer is replaced
     live = (largest >= LEAST_PART) & (scaled.sum().apply("Abs") <= 8.0 * pulses)
     of_pulses = scaled.reshape(-1, pulses, 2)
-    live = live & _none_lost(graph, of_pulses.apply("Abs").max(keep=False), pulses)
+    size = of_pulses.apply("Abs")
+    live = live & _none_lost(graph, size.max(keep=False), pulses)
     packed = of_pulses.transpose(0, 2, 1)
 
     transform = centred_transform(packed, pulses, radar.bins, radar.window)
     power = power_of(transform, radar.bins)
-    floor = (
-        noise_floor(power, radar.bins, radar.window)
-        .at_least(power.mean() * float(LEAST_FLOOR))
-        .at_least(float(LEAST_POWER))
-    )
+    packed, transform = without_empty_side(packed, transform, power, pulses, radar.bins, radar.window)
+    power = power_of(transform, radar.bins)
+    floor = noise_floor(power, side_floors(power, radar.bins, radar.window))
+    live = live & (_two_channels(size) | noise_shows(power, floor).apply("Not"))
     relative_power = power / floor
     pool = pooling(radar.bins, radar.carrier_hz, radar.prf_hz, AXIS_BINS)
     levels = pooled(relative_power, radar.bins, pool)
@@ -139,6 +151,16 @@ def _none_lost(graph: Graph, size: Value, pulses: int) -> Value:
     others = graph.where(is_there, size, float(np.finfo(np.float32).max))
     of_a_step = others <= others.min() * (1 + _OF_A_STEP)
     return (zeros < float(LEAST_LOST)) | (zeros < of_a_step.count())
+
+
+def _two_channels(size: Value) -> Value:
+    """Whether there are two, much as `one_channel.one_channel` tells them, shape (records, 1).
+
+    I and Q come as sizes, shape (records, pulses, 2).
+    """
+    real, imaginary = size.slice(0, 1), size.slice(1, 2)
+    apart = (real - imaginary).apply("Abs")
+    return size.graph.concat(real, imaginary, apart).max(axis=-2, keep=False).min() > 0.0
 
 
 def _feature_vector(

@@ -9,6 +9,9 @@ from ..cadence import CadencePlan
 from ..window import Window
 from .operators import Value
 
+#: A floor of this share of a limit is above it, whatever rounding makes of the mean.
+_ABOVE = 0.99
+
 
 def dft(packed: Value, length: int, count: int) -> Value:
     """Discrete Fourier transform as two matrix products with twiddle factors between (Cooley and Tukey 1965).
@@ -89,17 +92,27 @@ def unit_scale(largest: Value) -> Value:
     return 1.0 / largest.at_least(2.0**-126).at_most(2.0**126)
 
 
-def noise_floor(power: Value, bins: int, window: Window) -> Value:
-    """As `spectrum.noise_floor`, shape (n, 1)."""
+def side_floors(power: Value, bins: int, window: Window) -> Value:
+    """As `Spectrum.side_floors`, shape (n, 2)."""
     half, lower = bins // 2, (bins + 1) % 2
     size = max(1, half // definition.FLOOR_BLOCKS)
     blocks = half // size
     sides = power.graph.concat(power.slice(lower, lower + blocks * size), power.slice(bins - blocks * size, bins))
     levels = sides.reshape(-1, 2, blocks, size).sum(keep=False).ranked(definition.quartile_rank(blocks)).squeeze()
-    one, other = levels.slice(0, 1), levels.slice(1, 2)
+    return levels / float(definition.quartile_of_noise(bins, size, blocks, window))
+
+
+def noise_floor(power: Value, sides: Value) -> Value:
+    """As the floor that `spectrum.doppler_spectrum` takes, of power and `side_floors`, shape (n, 1)."""
+    one, other = sides.slice(0, 1), sides.slice(1, 2)
     least, most = one.at_most(other), one.at_least(other)
     level = power.graph.where(most > definition.EMPTY_RATIO * least, most, (least + most) / 2)
-    return level / float(definition.quartile_of_noise(bins, size, blocks, window))
+    return level.at_least(power.mean() * float(definition.LEAST_FLOOR)).at_least(float(definition.LEAST_POWER))
+
+
+def noise_shows(power: Value, floor: Value) -> Value:
+    """Whether the floor is noise, not the share of the power that it is at least, shape (n, 1)."""
+    return power.mean() * float(definition.LEAST_FLOOR / _ABOVE) < floor
 
 
 def to_db(relative_power: Value, lowest_db: float = definition.LOWEST_DB) -> Value:

@@ -16,6 +16,7 @@ from bladewing.classify.model_file import read_model
 from bladewing.features.graph.inputs import IN_GRAPH, IQ, input_graph
 from bladewing.features.graph.operators import Graph
 from bladewing.features.inputs import model_inputs
+from bladewing.features.one_channel import made_analytic
 from bladewing.features.schema import FEATURES, INPUT_SHAPES
 from bladewing.models.seal import verify
 from onnx import TensorProto, helper
@@ -48,13 +49,13 @@ def extremes(pulses: int, *, prf_hz: float, **_: float) -> np.ndarray:
     """One record each of what leaves ordinary ranges."""
     ordinary = records(1, prf_hz=prf_hz, pulses=pulses, seed=9)[0]
     spike = np.zeros(pulses, np.complex64)
-    spike[pulses // 3] = 1
+    spike[pulses // 3] = 1 + 2j
     late = ordinary.copy()
     late[: pulses // 2] = 0
     gains = [1e-20, 1e-10, 1e10, 1e20, 2.0**40]
     return np.stack(
         [
-            np.zeros(pulses), np.full(pulses, 1 + 2j), spike, ordinary.real, np.tile([1, -1], pulses)[:pulses], late,
+            np.zeros(pulses), np.full(pulses, 1 + 2j), spike, np.tile([1 + 2j, -1 - 2j], pulses)[:pulses], late,
             *(ordinary * np.float32(gain) for gain in gains),
         ]
     ).astype(np.complex64)  # fmt: skip
@@ -181,6 +182,20 @@ def test_records_that_cannot_be_judged_are_unknown_and_spoil_no_other(small):
     np.testing.assert_array_equal(label[1:4], 3)
     np.testing.assert_allclose(probabilities[1:4], 1 / 3, rtol=1e-6)
     np.testing.assert_allclose(probabilities[[0, 4]], alone[0][[0, 4]], atol=1e-6)
+
+
+def test_one_channel_alone_is_unknown_until_it_is_made_analytic(small):
+    _, radar, session = small
+    iq = records(8, **radar)
+    given = {name: radar[name] for name in ("carrier_hz", "prf_hz")}
+    for part in (iq.real, 1j * iq.imag, (1 + 1j) * iq.real, (1 - 1j) * iq.imag):
+        probabilities, label = run(session, part.astype(np.complex64))
+        np.testing.assert_array_equal(label, 3)
+        np.testing.assert_allclose(probabilities, 1 / 3, rtol=1e-6)
+    made = made_analytic(iq.real.astype(np.complex64))
+    probabilities, _ = run(session, made)
+    expected = Classifier.load("spectrum-cnn-fast").predict(iq.real.astype(np.complex64), **given)
+    np.testing.assert_allclose(probabilities, expected.probabilities, atol=TOLERANCE)
 
 
 def test_lost_pulses_are_unknown_and_what_a_converter_rounds_to_zero_is_none(small):

@@ -1,0 +1,65 @@
+"""An empty side of the spectrum, filled with noise: one channel made analytic tells nothing of it.
+
+No radar of two channels ever sees such a side, and models know their records far better. With noise there the record is
+one of theirs, whose lines lie on one side (what that brings: docs/ablation.md).
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from .spectrum import LEAST_FLOOR, LOWEST_DB, Spectrum, means
+
+#: A side whose floor lies so far below the other's has no level that is followed.
+EMPTY_SHARE = np.float32(10 ** (LOWEST_DB / 10))
+
+#: Of the noise, which is the same for all records of so many pulses.
+_SEED = 20
+
+
+@lru_cache(maxsize=16)
+def side_noise(pulses: int) -> NDArray[np.complex64]:
+    """Noise on the lower and on the upper side of the spectrum, mirror images, shape (2, pulses).
+
+    As dense there as white noise of unit power a sample.
+    """
+    rng = np.random.default_rng((_SEED, pulses))
+    transform = rng.standard_normal((pulses, 2)).view(np.complex128)[:, 0] * np.sqrt(pulses / 2)
+    transform[fft.fftfreq(pulses) <= 0] = 0
+    upper = fft.ifft(transform).astype(np.complex64)
+    out = np.stack([upper.conj(), upper])
+    out.flags.writeable = False
+    return out
+
+
+def empty_sides(spectrum: Spectrum) -> NDArray[np.bool_]:
+    """Whether the lower and the upper side are empty beside the noise of the other, shape (..., 2)."""
+    sides = spectrum.side_floors
+    return np.asarray(sides < EMPTY_SHARE * sides[..., ::-1], np.bool_)
+
+
+def without_empty_side(iq: NDArray[np.complex64], spectrum: Spectrum) -> NDArray[np.complex64]:
+    """Fill empty sides with noise as strong as the other side's.
+
+    Parameters
+    ----------
+    iq : ndarray of complex64, shape (..., pulses)
+        Slow-time samples.
+    spectrum : Spectrum
+        Of these.
+
+    Returns
+    -------
+    ndarray of complex64, shape (..., pulses)
+        The samples themselves where no record has an empty side. Where both sides hold nothing but lines without any
+        noise, as only a calculation gives them, none is empty.
+    """
+    empty = empty_sides(spectrum)
+    if not np.count_nonzero(empty):
+        return iq
+    empty &= (means(spectrum.relative_power) * LEAST_FLOOR < np.float32(0.99))[..., None]
+    # float64, because the square of a sample may leave float32
+    amplitude = np.sqrt(spectrum.floor)[..., None].astype(np.float32)
+    return iq + amplitude * (empty.astype(np.float32) @ side_noise(spectrum.pulses))
