@@ -356,7 +356,8 @@ class Classifier:
             told[:, :-1] = probabilities
             if self._noise:
                 label, kin, own = self._noise
-                told[:, -1] = probabilities[:, label] * softmax(others[0][:, kin])[:, own]
+                scores = others[0][:, kin]
+                told[:, -1] = probabilities[:, label] * np.exp(scores[:, own] - np.logaddexp.reduce(scores, axis=-1))
             parts.append(told)
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 

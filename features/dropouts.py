@@ -81,9 +81,11 @@ def without_lost(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
     iq
         Records, shape (..., pulses), finite.
     """
-    with_zeros = np.argwhere((iq == 0).any(axis=-1))
+    zeros = iq == 0
+    if not np.count_nonzero(zeros):
+        return iq
     out = iq
-    for index in map(tuple, with_zeros):
+    for index in map(tuple, np.argwhere(zeros.any(axis=-1))):
         lost = lost_pulses(iq[index])
         if lost.any():
             out = iq.copy() if out is iq else out

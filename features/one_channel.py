@@ -20,11 +20,6 @@ def one_channel(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
 
     To the bit: two equal blades at rest without any noise are a straight line in I and Q as well, of any direction.
     """
-    real, imaginary = np.abs(iq[..., :1].real), np.abs(iq[..., :1].imag)
-    if not np.count_nonzero(
-        (real == 0) | (imaginary == 0) | (real == imaginary)
-    ):  # most show that in their first pulse
-        return np.zeros(iq.shape[:-1], bool)
     real, imaginary = iq.real, iq.imag
     alike = (real == imaginary).all(axis=-1) | (real == -imaginary).all(axis=-1)
     one, other = real.any(axis=-1), imaginary.any(axis=-1)
@@ -36,6 +31,10 @@ def made_analytic(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
 
     What holds no noise at all was never recorded: two equal blades at rest give such a record, of which I is all.
     """
+    first = iq[..., :1]
+    real, imaginary = np.abs(first.real), np.abs(first.imag)
+    if np.count_nonzero((real != imaginary) & (real > 0) & (imaginary > 0)) == first.size:  # of most
+        return iq
     one = one_channel(iq)
     if one.any():
         one[one] = noise_shows(iq[one, :NOISE_PULSES])
