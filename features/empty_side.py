@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .spectrum import LEAST_FLOOR, LOWEST_DB, Spectrum, means
+from .spectrum import LEAST_FLOOR, LOWEST_DB, Spectrum, doppler_spectrum, means
 
 #: A side whose floor lies so far below the other's has no level that is followed.
 EMPTY_SHARE = np.float32(10 ** (LOWEST_DB / 10))
@@ -40,26 +40,32 @@ def empty_sides(spectrum: Spectrum) -> NDArray[np.bool_]:
     return np.asarray(sides < EMPTY_SHARE * sides[..., ::-1], np.bool_)
 
 
-def without_empty_side(iq: NDArray[np.complex64], spectrum: Spectrum) -> NDArray[np.complex64]:
+def without_empty_side(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray[np.complex64], Spectrum]:
     """Fill empty sides with noise as strong as the other side's.
 
     Parameters
     ----------
-    iq : ndarray of complex64, shape (..., pulses)
+    iq : ndarray of complex64, shape (records, pulses)
         Slow-time samples.
     spectrum : Spectrum
         Of these.
 
     Returns
     -------
-    ndarray of complex64, shape (..., pulses)
+    iq : ndarray of complex64, shape (records, pulses)
         The samples themselves where no record has an empty side. Where both sides hold nothing but lines without any
         noise, as only a calculation gives them, none is empty.
+    spectrum : Spectrum
+        Of these.
     """
     empty = empty_sides(spectrum)
     if not np.count_nonzero(empty):
-        return iq
+        return iq, spectrum
     empty &= (means(spectrum.relative_power) * LEAST_FLOOR < np.float32(0.99))[..., None]
+    rows = np.flatnonzero(empty.any(axis=-1))
     # float64, because the square of a sample may leave float32
-    amplitude = np.sqrt(spectrum.floor)[..., None].astype(np.float32)
-    return iq + amplitude * (empty.astype(np.float32) @ side_noise(spectrum.pulses))
+    amplitude = np.sqrt(spectrum.floor[rows])[..., None].astype(np.float32)
+    out = iq.copy()
+    out[rows] += amplitude * (empty[rows].astype(np.float32) @ side_noise(spectrum.pulses))
+    radar = {"carrier_hz": spectrum.carrier_hz, "prf_hz": spectrum.prf_hz}
+    return out, spectrum.with_rows(rows, doppler_spectrum(out[rows], **radar, window=spectrum.window))

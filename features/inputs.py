@@ -15,7 +15,7 @@ from .joint import joint_vector, stft_image
 from .notch import Body, body_line, notch_mask
 from .one_channel import made_analytic
 from .schema import AXIS_BINS, INPUT_SHAPES
-from .spectrum import Spectrum, as_complex, doppler_spectrum
+from .spectrum import as_complex, doppler_spectrum
 from .vector import feature_vector
 from .window import HANN
 
@@ -88,17 +88,15 @@ class Dwells:
     """
 
     def __init__(self, samples: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float) -> None:
-        self._radar = {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
         samples = made_analytic(samples)
-        spectrum = self._spectrum_of(samples)
-        self._samples = without_empty_side(samples, spectrum)
-        self._spectrum_of_dwell = spectrum if self._samples is samples else self._spectrum_of(self._samples)
+        spectrum = doppler_spectrum(samples, carrier_hz=carrier_hz, prf_hz=prf_hz, window=HANN)
+        self._samples, self._spectrum_of_dwell = without_empty_side(samples, spectrum)
 
     def rows(self, rows: NDArray[np.intp]) -> "Dwells":
         """Some of the records, with what is computed of them so far."""
         some = object.__new__(Dwells)
         for name, piece in self.__dict__.items():
-            if name in ("_radar", "_pool"):
+            if name == "_pool":
                 some.__dict__[name] = piece
             else:
                 some.__dict__[name] = piece[rows] if isinstance(piece, np.ndarray) else piece.rows(rows)
@@ -108,9 +106,6 @@ class Dwells:
         """The named inputs, each of shape (records, *INPUT_SHAPES[name]); see `model_inputs`."""
         # the measurements last: they take the mean level from the levels where these are made
         return {name: getattr(self, f"_{name}") for name in sorted(names, key=lambda name: (name == "features", name))}
-
-    def _spectrum_of(self, samples: NDArray[np.complex64]) -> Spectrum:
-        return doppler_spectrum(samples, **self._radar, window=HANN)
 
     @cached_property
     def _body(self) -> Body:

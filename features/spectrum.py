@@ -34,6 +34,10 @@ _FLOOR_QUANTILE = 0.25
 FLOOR_BLOCKS, EMPTY_RATIO = 64, np.array(4, np.float32)
 
 
+#: What a spectrum holds of each record.
+_OF_RECORDS = ("relative_power", "floor", "scale", "transform", "side_floors")
+
+
 @dataclass(frozen=True, eq=False)
 class Spectrum:
     """Power spectra on their own axes, in units of their noise floors.
@@ -73,8 +77,14 @@ class Spectrum:
 
     def rows(self, rows: NDArray[np.intp] | tuple[int, ...]) -> "Spectrum":
         """The spectra of some of the records, of shape (records, bins), or of the one of such an index."""
-        arrays = ("relative_power", "floor", "scale", "transform", "side_floors")
-        return replace(self, **{name: getattr(self, name)[rows] for name in arrays})
+        return replace(self, **{name: getattr(self, name)[rows] for name in _OF_RECORDS})
+
+    def with_rows(self, rows: NDArray[np.intp], others: "Spectrum") -> "Spectrum":
+        """The same spectra, of shape (records, bins), with those of some of the records replaced by others."""
+        arrays = {name: getattr(self, name).copy() for name in _OF_RECORDS}
+        for name, values in arrays.items():
+            values[rows] = getattr(others, name)
+        return replace(self, **arrays)
 
     @property
     def bins(self) -> int:

@@ -17,8 +17,8 @@ def hann_spectrum(iq: np.ndarray):
 
 
 def filled(iq: np.ndarray) -> np.ndarray:
-    iq = iq.astype(np.complex64)
-    return without_empty_side(iq, hann_spectrum(iq))
+    iq = iq[None].astype(np.complex64)
+    return without_empty_side(iq, hann_spectrum(iq))[0][0]
 
 
 def channel(seed: int, pulses: int = PULSES, strength: float = 100.0) -> np.ndarray:
@@ -45,8 +45,9 @@ def test_the_noise_is_white_on_one_side_and_nothing_on_the_other(pulses):
 def test_records_of_two_channels_are_left_as_they_are(seed):
     noise = white(np.random.default_rng(seed), PULSES)
     for iq in (noise, 100 * tone(3000.0) + noise, 100 * rotors([58.6, 60.1], velocity_mps=-20.0) + noise):
-        iq = iq.astype(np.complex64)
-        assert without_empty_side(iq, hann_spectrum(iq)) is iq
+        iq = iq[None].astype(np.complex64)
+        spectrum = hann_spectrum(iq)
+        assert all(out is given for out, given in zip(without_empty_side(iq, spectrum), (iq, spectrum), strict=True))
 
 
 def test_lines_without_noise_have_no_empty_side():
