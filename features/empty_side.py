@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .spectrum import LEAST_FLOOR, LOWEST_DB, Spectrum, doppler_spectrum, means
+from .spectrum import LEAST_FLOOR, LOWEST_DB, Spectrum, means
 
 #: A side whose floor lies so far below the other's has no level that is followed.
 EMPTY_SHARE = np.float32(10 ** (LOWEST_DB / 10))
@@ -40,8 +40,10 @@ def empty_sides(spectrum: Spectrum) -> NDArray[np.bool_]:
     return np.asarray(sides < EMPTY_SHARE * sides[..., ::-1], np.bool_)
 
 
-def without_empty_side(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray[np.complex64], Spectrum]:
-    """Fill empty sides with noise as strong as the other side's.
+def filled_sides(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray[np.intp], NDArray[np.complex64]]:
+    """Records with an empty side, and these with noise there as strong as the other side's.
+
+    Where both sides hold nothing but lines without any noise, as only a calculation gives them, none is empty.
 
     Parameters
     ----------
@@ -52,20 +54,17 @@ def without_empty_side(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[N
 
     Returns
     -------
-    iq : ndarray of complex64, shape (records, pulses)
-        The samples themselves where no record has an empty side. Where both sides hold nothing but lines without any
-        noise, as only a calculation gives them, none is empty.
-    spectrum : Spectrum
-        Of these.
+    rows : ndarray of int, shape (filled,)
+        Which of the records.
+    samples : ndarray of complex64, shape (filled, pulses)
+        Theirs.
     """
     empty = empty_sides(spectrum)
-    if not np.count_nonzero(empty):
-        return iq, spectrum
-    empty &= (means(spectrum.relative_power) * LEAST_FLOOR < np.float32(0.99))[..., None]
+    rows = np.flatnonzero(empty)
+    if not len(rows):
+        return rows, iq[:0]
+    empty &= (means(spectrum.relative_power) * LEAST_FLOOR < np.float32(0.99))[:, None]
     rows = np.flatnonzero(empty.any(axis=-1))
     # float64, because the square of a sample may leave float32
-    amplitude = np.sqrt(spectrum.floor[rows])[..., None].astype(np.float32)
-    out = iq.copy()
-    out[rows] += amplitude * (empty[rows].astype(np.float32) @ side_noise(spectrum.pulses))
-    radar = {"carrier_hz": spectrum.carrier_hz, "prf_hz": spectrum.prf_hz}
-    return out, spectrum.with_rows(rows, doppler_spectrum(out[rows], **radar, window=spectrum.window))
+    amplitude = np.sqrt(spectrum.floor[rows])[:, None].astype(np.float32)
+    return rows, iq[rows] + amplitude * (empty[rows].astype(np.float32) @ side_noise(spectrum.pulses))

@@ -10,7 +10,7 @@ from .axis import Pooling, pooling
 from .cadence import cadence_db
 from .change import change_db, parts_db
 from .comb_levels import comb_levels_db
-from .empty_side import without_empty_side
+from .empty_side import filled_sides
 from .joint import joint_vector, stft_image
 from .notch import Body, body_line, notch_mask
 from .one_channel import made_analytic
@@ -88,17 +88,32 @@ class Dwells:
     """
 
     def __init__(self, samples: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float) -> None:
-        samples = made_analytic(samples)
-        spectrum = doppler_spectrum(samples, carrier_hz=carrier_hz, prf_hz=prf_hz, window=HANN)
-        self._samples, self._spectrum_of_dwell = without_empty_side(samples, spectrum)
+        radar = {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
+        self._given = made_analytic(samples)
+        spectrum = doppler_spectrum(self._given, **radar, window=HANN)
+        self._filled = rows, filled = filled_sides(self._given, spectrum)
+        if len(rows):
+            spectrum = spectrum.with_rows(rows, doppler_spectrum(filled, **radar, window=HANN))
+        self._spectrum_of_dwell = spectrum
+
+    @cached_property
+    def _samples(self) -> NDArray[np.complex64]:
+        """Samples with what was filled in: a copy, which not every model needs."""
+        rows, filled = self._filled
+        if not len(rows):
+            return self._given
+        samples = self._given.copy()
+        samples[rows] = filled
+        return samples
 
     def rows(self, rows: NDArray[np.intp]) -> "Dwells":
         """Some of the records, with what is computed of them so far."""
         some = object.__new__(Dwells)
+        some._samples = self._samples[rows]
         for name, piece in self.__dict__.items():
             if name == "_pool":
-                some.__dict__[name] = piece
-            else:
+                some._pool = self._pool
+            elif name not in ("_given", "_filled", "_samples"):
                 some.__dict__[name] = piece[rows] if isinstance(piece, np.ndarray) else piece.rows(rows)
         return some
 

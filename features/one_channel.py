@@ -33,9 +33,9 @@ def made_analytic(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
     """
     first = iq[..., :1]
     real, imaginary = np.abs(first.real), np.abs(first.imag)
-    if np.count_nonzero((real != imaginary) & (real > 0) & (imaginary > 0)) == first.size:  # of most
-        return iq
-    one = one_channel(iq)
+    one = ((real == imaginary) | (real == 0) | (imaginary == 0)).any(axis=-1)  # few records are looked at further
+    if one.any():
+        one[one] = one_channel(iq[one])
     if one.any():
         one[one] = noise_shows(iq[one, :NOISE_PULSES])
     if not one.any():

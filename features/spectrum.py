@@ -80,11 +80,12 @@ class Spectrum:
         return replace(self, **{name: getattr(self, name)[rows] for name in _OF_RECORDS})
 
     def with_rows(self, rows: NDArray[np.intp], others: "Spectrum") -> "Spectrum":
-        """The same spectra, of shape (records, bins), with those of some of the records replaced by others."""
-        arrays = {name: getattr(self, name).copy() for name in _OF_RECORDS}
-        for name, values in arrays.items():
-            values[rows] = getattr(others, name)
-        return replace(self, **arrays)
+        """Spectra of shape (records, bins), some replaced by others, which are written over these: nothing is copied."""
+        scale = self.scale.copy()  # it may be one for all records there are
+        out = replace(self, scale=scale)
+        for name in _OF_RECORDS:
+            getattr(out, name)[rows] = getattr(others, name)
+        return out
 
     @property
     def bins(self) -> int:
