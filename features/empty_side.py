@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .spectrum import LEAST_FLOOR, LOWEST_DB, Spectrum, means
+from .spectrum import LEAST_FLOOR, LOWEST_DB, SHOWN_SHARE, Spectrum, means
 
 #: A side whose floor lies so far below the other's has no level that is followed.
 EMPTY_SHARE = np.float32(10 ** (LOWEST_DB / 10))
@@ -63,7 +63,7 @@ def filled_sides(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray
     rows = np.flatnonzero(empty)
     if not len(rows):
         return rows, iq[:0]
-    empty &= (means(spectrum.relative_power) * LEAST_FLOOR < np.float32(0.99))[:, None]
+    empty &= (means(spectrum.relative_power) * LEAST_FLOOR < SHOWN_SHARE)[:, None]
     rows = np.flatnonzero(empty.any(axis=-1))
     # float64, because the square of a sample may leave float32
     amplitude = np.sqrt(spectrum.floor[rows])[:, None].astype(np.float32)

@@ -33,7 +33,8 @@ def made_analytic(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
     """
     first = iq[..., :1]
     real, imaginary = np.abs(first.real), np.abs(first.imag)
-    one = ((real == imaginary) | (real == 0) | (imaginary == 0)).any(axis=-1)  # few records are looked at further
+    # few records are looked at further than their first pulse
+    one = np.asarray(((real == imaginary) | (real == 0) | (imaginary == 0)).any(axis=-1))
     if one.any():
         one[one] = one_channel(iq[one])
     if one.any():

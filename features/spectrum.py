@@ -26,6 +26,9 @@ _DB_A_NEPER = np.array(10 / math.log(10), np.float32)  # of power
 #: Under any power that is not 0: divides in its stead.
 LEAST_POWER = np.array(1e-36, np.float32)
 
+#: Noise shows where the least floor is at most this share of the floor, whatever rounding makes of a mean.
+SHOWN_SHARE = np.float32(0.99)
+
 # Energies of a record: neither its lines, at most that strong, nor its floor leave float32.
 _SAFE_ENERGY = np.array(1e-14, np.float32), np.array(1e30, np.float32)
 _FLOOR_QUANTILE = 0.25
@@ -80,7 +83,7 @@ class Spectrum:
         return replace(self, **{name: getattr(self, name)[rows] for name in _OF_RECORDS})
 
     def with_rows(self, rows: NDArray[np.intp], others: "Spectrum") -> "Spectrum":
-        """Spectra of shape (records, bins), some replaced by others, which are written over these: nothing is copied."""
+        """Spectra of shape (records, bins), some replaced by others, which are written over these, not into copies."""
         scale = self.scale.copy()  # it may be one for all records there are
         out = replace(self, scale=scale)
         for name in _OF_RECORDS:

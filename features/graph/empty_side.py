@@ -10,7 +10,7 @@ from .operators import Value
 from .spectrum import noise_floor, noise_shows, side_floors
 
 
-def without_empty_side(
+def filled_sides(
     packed: Value, transform: Value, power: Value, pulses: int, bins: int, window: Window
 ) -> tuple[Value, Value]:
     """As `empty_side.filled_sides`, of samples and of their transform, to which the noise's own is added.

@@ -13,7 +13,7 @@ from ..vector import BANDS, SIGNIFICANT, radar_columns
 from ..window import HANN
 from .cadence import cadence_db
 from .comb_levels import comb_levels_db
-from .empty_side import without_empty_side
+from .empty_side import filled_sides
 from .measurements import (
     Body,
     band_levels_db,
@@ -102,7 +102,7 @@ def input_graph(
 
     transform = centred_transform(packed, pulses, radar.bins, radar.window)
     power = power_of(transform, radar.bins)
-    packed, transform = without_empty_side(packed, transform, power, pulses, radar.bins, radar.window)
+    packed, transform = filled_sides(packed, transform, power, pulses, radar.bins, radar.window)
     power = power_of(transform, radar.bins)
     floor = noise_floor(power, side_floors(power, radar.bins, radar.window))
     live = live & (_two_channels(size) | noise_shows(power, floor).apply("Not"))

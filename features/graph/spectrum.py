@@ -9,9 +9,6 @@ from ..cadence import CadencePlan
 from ..window import Window
 from .operators import Value
 
-#: A floor of this share of a limit is above it, whatever rounding makes of the mean.
-_ABOVE = 0.99
-
 
 def dft(packed: Value, length: int, count: int) -> Value:
     """Discrete Fourier transform as two matrix products with twiddle factors between (Cooley and Tukey 1965).
@@ -112,7 +109,7 @@ def noise_floor(power: Value, sides: Value) -> Value:
 
 def noise_shows(power: Value, floor: Value) -> Value:
     """Whether the floor is noise, not the share of the power that it is at least, shape (n, 1)."""
-    return power.mean() * float(definition.LEAST_FLOOR / _ABOVE) < floor
+    return power.mean() * float(definition.LEAST_FLOOR / definition.SHOWN_SHARE) < floor
 
 
 def to_db(relative_power: Value, lowest_db: float = definition.LOWEST_DB) -> Value:
