@@ -160,7 +160,7 @@ class Recording:
 #: What clipping and a single channel mean for labels, and for what is measured.
 _OF_LABELS = (
     "a strong line's harmonics may pass for a rotor, and no comb that stays is counted",
-    "whether a target comes or goes is not told, and fewer are named: record I and Q",
+    "it is not told whether a target comes or goes: record I and Q",
 )
 _OF_MEASUREMENTS = (
     "tips may come out too fast",
