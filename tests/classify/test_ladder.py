@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from bladewing.classify import BadInput, Classifier, ladder, model_file
 from bladewing.classify.cli import main
-from bladewing.classify.ladder import by_budget, by_place, front
+from bladewing.classify.ladder import COST_KEY, by_budget, by_place, front
 from bladewing.classify.model_file import model_names
 
 
@@ -69,7 +69,8 @@ def test_the_classifier_loads_by_place_and_by_budget(monkeypatch):
 def test_predict_says_what_a_budget_buys(monkeypatch, sigmf_pair, capsys):
     monkeypatch.setattr(model_file, "measured_fft_us", lambda: 1.0)
     account = ladder.shipped_account()
-    for enough, name in ((15, by_place("fast", account)), (1000, by_place("best", account))):
+    fast = by_place("fast", account)
+    for enough, name in ((int(account[fast][COST_KEY]) + 1, fast), (1000, by_place("best", account))):
         assert main(["predict", str(sigmf_pair()), "--budget-us", str(enough)]) == 0
         said = f"bladewing: note: the budget of {enough} us buys the model {name}\n"
         assert capsys.readouterr().err == said

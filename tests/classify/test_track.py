@@ -279,10 +279,12 @@ def test_reason_shows_that_the_probability_is_below_the_limit():
     ],
 )
 def test_what_the_whole_track_shows_multiplies_odds_at_the_end_alone(shown, name, factor):
-    # a little ahead, and limits so low that what is found lets the class be declared
-    p = [[0.45 if other == name else 0.275 for other in CLASSES]] * 4
-    plain, more = (fused(p, ["unknown"] * 4, accept=(0.3,) * 3, shown=found) for found in ((), shown))
-    best = CLASSES.index(name)
+    # ahead also with its odds halved, which reach the limits with what is found and not without
+    p, best = [[0.6 if other == name else 0.2 for other in CLASSES]] * 4, CLASSES.index(name)
+    ahead = fused(p, ["unknown"] * 4, accept=(1.0,) * 3, shown=()).probabilities[best]
+    between = np.sqrt(max(factor, 1)) / 2 * ahead / (1 - ahead)
+    accept = (between / (1 + between),) * 3
+    plain, more = (fused(p, ["unknown"] * 4, accept=accept, shown=found) for found in ((), shown))
     odds = [track.probabilities / (1 - track.probabilities) for track in (plain, more)]
     assert odds[1][best] == pytest.approx(factor * odds[0][best], rel=1e-5)
     others = [k for k in range(3) if k != best]
