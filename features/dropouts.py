@@ -23,6 +23,9 @@ MOST_ORDERS, BLOCK, STRETCHES = 32, 8192, 6
 #: Share of the mean power that holds a law's coefficients back: next to nothing beside any noise.
 RIDGE = 1e-10
 
+#: Two truths beside each other, as one number.
+_TWO_TRUE = np.array([True, True]).view(np.uint16)
+
 #: Fewer sizes that differ are a converter's that hardly steps at all: it gives 0 most of the time.
 LEAST_DISTINCT = 8
 
@@ -45,32 +48,34 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
         noise, or nothing else. Zeros of longer silences are no lost pulses.
     """
     none = np.zeros(len(iq), bool)
+    zero = _zeros(iq)
     size = _sizes(iq)
-    there = size > 0
-    _, runs = _zero_runs(iq)
-    lost = none.copy()
-    lost[~there] = np.repeat(runs, runs) <= MOST_IN_A_ROW
-    zeros = int(lost.sum())
-    if not zeros or not there.any():
-        return none
-    held = np.sort(size[there])
+    held = np.sort(size[~zero])
     steps = np.diff(held)
     steps = steps[steps > 0]
     if len(steps) + 1 < LEAST_DISTINCT:
         return none
     nearly = np.float32(NEAR_STEPS) * np.median(steps)
+    near = int(np.searchsorted(held, nearly, side="right"))
+    if np.count_nonzero(zero) <= NEAR_SHARE * near:  # what most converters of coarse steps give ends here
+        return none
+    _, runs = _runs(zero)
+    lost = none.copy()
+    lost[zero] = np.repeat(runs, runs) <= MOST_IN_A_ROW
+    zeros = int(lost.sum())
+    if zeros <= NEAR_SHARE * near:
+        return none
     # a lost pulse stands among others; zeros of what hardly reaches the converter's first step stand among such
-    beside = there & (np.convolve(lost, [1, 0, 1], "same") > 0)
+    beside = ~zero & (np.convolve(lost, [1, 0, 1], "same") > 0)
     if np.median(size[beside]) <= nearly:
         return none
-    near = int(np.searchsorted(held, nearly, side="right"))
     places = PLACES if iq.real.any() and iq.imag.any() else PLACES_OF_ONE
     stepless = 1 - (len(steps) + 1) / len(held) < ALIKE
     if zeros < LEAST_LOST:
         no_chance = stepless and len(held) >= ENOUGH and not lost[[0, -1]].any()
     else:
         no_chance = stepless or _chance(zeros, near, 1 / places) < CHANCE
-    return lost if zeros > NEAR_SHARE * near and no_chance else none
+    return lost if no_chance else none
 
 
 def without_lost(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
@@ -81,7 +86,7 @@ def without_lost(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
     iq
         Records, shape (..., pulses), finite.
     """
-    zeros = iq == 0
+    zeros = _zeros(iq)
     if not np.count_nonzero(zeros):
         return iq
     out = iq
@@ -105,15 +110,21 @@ def _sizes(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
     return np.asarray(np.maximum(np.abs(iq.real), np.abs(iq.imag)))
 
 
-def _zero_runs(iq: NDArray[np.complex64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Where each run of zeros begins, and its pulses."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], iq == 0, [0]])))
+def _zeros(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
+    """Where samples are exactly 0: of both parts at once, in a sixth of the time of a complex comparison."""
+    both = np.ascontiguousarray(iq).view(np.float32) == 0
+    return np.asarray(both.view(np.uint16) == _TWO_TRUE, np.bool_)
+
+
+def _runs(zero: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Where each run of zeros begins, and its pulses, of a record's."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], zero, [False]])))
     return edges[::2], np.diff(edges)[::2]
 
 
 def longest_silence(iq: NDArray[np.complex64]) -> tuple[int, int]:
     """Where the longest run of zeros begins that is too long to be filled in, and its pulses; 0 where there is none."""
-    starts, lengths = _zero_runs(iq)
+    starts, lengths = _runs(_zeros(iq))
     if not len(lengths) or lengths.max() <= MOST_IN_A_ROW or lengths.max() == len(iq):
         return 0, 0
     if len(np.unique(_sizes(iq))) <= LEAST_DISTINCT:  # what hardly steps is often 0

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .spectrum import LEAST_FLOOR, LOWEST_DB, SHOWN_SHARE, Spectrum, means
+from .spectrum import LOWEST_DB, Spectrum
 
 #: A side whose floor lies so far below the other's has no level that is followed.
 EMPTY_SHARE = np.float32(10 ** (LOWEST_DB / 10))
@@ -60,11 +60,11 @@ def filled_sides(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray
         Theirs.
     """
     empty = empty_sides(spectrum)
-    rows = np.flatnonzero(empty)
+    if np.count_nonzero(empty):
+        empty &= spectrum.noise_shows[:, None]
+    rows = np.flatnonzero(empty[:, 0] | empty[:, 1])
     if not len(rows):
         return rows, iq[:0]
-    empty &= (means(spectrum.relative_power) * LEAST_FLOOR < SHOWN_SHARE)[:, None]
-    rows = np.flatnonzero(empty.any(axis=-1))
     # float64, because the square of a sample may leave float32
     amplitude = np.sqrt(spectrum.floor[rows])[:, None].astype(np.float32)
     return rows, iq[rows] + amplitude * (empty[rows].astype(np.float32) @ side_noise(spectrum.pulses))

@@ -2,14 +2,12 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
-from .spectrum import noise_shows
+from .spectrum import doppler_spectrum
 
 #: A side of the spectrum so far below the noise of the other is empty; one bin in so many does not count at either end.
 EMPTY_SHARE, ENDS = 1e-2, 50
-
-#: A record is continued by so many of its pulses, mirrored, before its other side is taken away.
-MIRRORED = 2048
 
 #: So many pulses tell whether there is noise.
 NOISE_PULSES = 65_536
@@ -38,20 +36,27 @@ def made_analytic(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
     if one.any():
         one[one] = one_channel(iq[one])
     if one.any():
-        one[one] = noise_shows(iq[one, :NOISE_PULSES])
+        # whatever the radar is
+        one[one] = doppler_spectrum(iq[one, :NOISE_PULSES], carrier_hz=1.0, prf_hz=1.0).noise_shows
     if not one.any():
         return iq
-    from scipy.signal import hilbert  # here, because hardly any record needs it, and it takes a while
-
     made, some = iq.copy(), iq[one]
     channel = np.where(some.real.any(axis=-1, keepdims=True), some.real, some.imag)
-    # the transform goes round: what jumps from the end to the beginning would spread over all of the record
-    beyond = min(channel.shape[-1] - 1, MIRRORED)
-    around = np.pad(channel, ((0, 0), (beyond, beyond)), mode="reflect").astype(np.float64)
-    both = hilbert(around)[:, beyond : around.shape[-1] - beyond]
-    most = np.finfo(np.float32).max
-    made.real[one], made.imag[one] = np.clip(both.real, -most, most), np.clip(both.imag, -most, most)
+    made.real[one], made.imag[one] = channel, _quadrature(channel)
     return made
+
+
+def _quadrature(channel: NDArray[np.float32]) -> NDArray[np.float32]:
+    """What is a quarter of a turn behind every line of a channel, shape (..., pulses), same shape.
+
+    Of its cosine transform, which continues the channel by its mirror image: from the end to the beginning nothing
+    jumps, which would spread over all of the record.
+    """
+    cosines = fft.dct(channel.astype(np.float64), type=2)  # float64, because its sums may leave float32
+    sines = np.roll(cosines, -1, axis=-1)  # of 1 cycle up to all of them, where cosines begin at 0
+    sines[..., -1] = 0
+    most = np.finfo(np.float32).max
+    return fft.idst(sines, type=2, overwrite_x=True).clip(-most, most).astype(np.float32)
 
 
 def half_empty(relative_power: NDArray[np.float32]) -> NDArray[np.bool_]:

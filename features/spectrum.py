@@ -101,6 +101,12 @@ class Spectrum:
         return (self.floor * np.square(self.scale[..., 0], dtype=np.float64)).astype(np.float32)
 
     @property
+    def noise_shows(self) -> NDArray[np.bool_]:
+        """Whether there is noise between the lines, more than `LEAST_FLOOR`, shape (...)."""
+        shows = means(self.relative_power) * LEAST_FLOOR < SHOWN_SHARE
+        return np.asarray(shows & (self.floor > 0), np.bool_)
+
+    @property
     def wavelength_m(self) -> float:
         """Wavelength [m]."""
         return SPEED_OF_LIGHT_MPS / self.carrier_hz
@@ -427,12 +433,6 @@ def require_radar(carrier_hz: float, prf_hz: float) -> tuple[float, float]:
         if not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
     return float(carrier_hz), float(prf_hz)
-
-
-def noise_shows(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
-    """True where there is noise between the lines, of samples (..., pulses): more than `LEAST_FLOOR`, shape (...)."""
-    power = centred_power(scaled(iq, unit_scale(iq)), window=KAISER)
-    return np.asarray(noise_floor(power, KAISER) > _least_floor(power), np.bool_)
 
 
 def _least_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:

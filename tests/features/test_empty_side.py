@@ -110,7 +110,7 @@ def test_a_mirrored_record_is_a_mirror_image():
 
 @pytest.mark.parametrize("of", [np.real, np.imag])
 def test_one_channel_is_read_as_if_made_analytic(of):
-    """As it came, both sides alike, a mover was a pair of lines and noise a comb: seven times as many false UAVs."""
+    """As it came, both sides alike, a mover was a pair of lines and noise a comb: ten times as many false UAVs."""
     noisy = white(np.random.default_rng(5), PULSES) + 3 * tone(3000.0)
     one = of(noisy).astype(np.complex64)
     apart = [model_inputs(iq, **RADAR, names=("levels",))["levels"][0] for iq in (one, hilbert(of(noisy)))]
