@@ -12,7 +12,7 @@ from typing import NoReturn
 import numpy as np
 from bladewing.features.allocator import keep_freed
 from bladewing.features.dropouts import without_lost
-from bladewing.features.inputs import Dwells, in_blocks, model_inputs
+from bladewing.features.inputs import dwells_of
 from bladewing.features.spectrum import LEAST_PART, largest_part
 from bladewing.models import KIND_SCORES
 from bladewing.models.calibration import softmax
@@ -323,7 +323,8 @@ class Classifier:
 
     def _judged(self, records: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> list[NDArray[np.float32]]:
         """What is told of a bounded number of records, in one or more pieces."""
-        return [self._answer(model_inputs(records, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs))]
+        each = dwells_of(records, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs)
+        return [self._answer(dwells.inputs(self.inputs)) for dwells in each]
 
     def from_inputs(self, inputs: Mapping[str, NDArray[np.floating]]) -> NDArray[np.float32]:
         """Probabilities of records whose inputs are made; others than the model's are passed over.
@@ -441,12 +442,11 @@ class Cascade(Classifier):
     def _judged(self, records: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> list[NDArray[np.float32]]:
         """What is told of a bounded number of records, in one or more pieces."""
         out = []
-        for block in in_blocks(records):
-            dwells = Dwells(block, carrier_hz=carrier_hz, prf_hz=prf_hz)
+        for dwells in dwells_of(records, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs):
             told = self.first._answer(dwells.inputs(self.first.inputs))
             rows = np.flatnonzero(~self.sure(told[:, :-1]))
             if len(rows):
-                asked = dwells if len(rows) == len(block) else dwells.rows(rows)
+                asked = dwells if len(rows) == len(told) else dwells.rows(rows)
                 told[rows] = super()._answer(asked.inputs(self._reads))
             out.append(told)
         return out

@@ -1,6 +1,6 @@
 """From slow-time samples to the named inputs that models take: only what is asked for is computed."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from functools import cached_property
 
 import numpy as np
@@ -61,11 +61,9 @@ def model_inputs(
     if unknown:
         raise ValueError(f"model input {sorted(unknown)[0]!r} is unknown: it must be one of {', '.join(INPUT_SHAPES)}")
     samples = as_complex(iq, MIN_PULSES)
-    framed = "image" in wanted or "joint_features" in wanted
     flat = samples.reshape(-1, samples.shape[-1])
-    blocks = [
-        Dwells(block, carrier_hz=carrier_hz, prf_hz=prf_hz).inputs(wanted) for block in in_blocks(flat, framed=framed)
-    ]
+    each = dwells_of(flat, carrier_hz=carrier_hz, prf_hz=prf_hz, names=wanted)
+    blocks = [dwells.inputs(wanted) for dwells in each]
     made = blocks[0] if len(blocks) == 1 else {name: np.concatenate([b[name] for b in blocks]) for name in blocks[0]}
     return {name: rows.reshape(samples.shape[:-1] + INPUT_SHAPES[name]) for name, rows in made.items()}
 
@@ -74,6 +72,15 @@ def in_blocks(samples: NDArray[np.complex64], *, framed: bool = False) -> list[N
     """Cut records (n, pulses) into as many as are worked on at a time, one block at least; `framed` for an STFT."""
     high = max(1, BLOCK_SAMPLES // (IMAGE_SHARE if framed else 1) // samples.shape[-1])
     return [samples[first : first + high] for first in range(0, max(1, len(samples)), high)]
+
+
+def dwells_of(
+    samples: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float, names: Collection[str]
+) -> Iterator["Dwells"]:
+    """Records (n, pulses), a block at a time, for inputs of these names."""
+    framed = "image" in names or "joint_features" in names
+    for block in in_blocks(samples, framed=framed):
+        yield Dwells(block, carrier_hz=carrier_hz, prf_hz=prf_hz)
 
 
 class Dwells:

@@ -75,13 +75,13 @@ def test_the_size_of_the_steps_changes_nothing(mixed, monkeypatch, limit):
 
 def test_a_step_is_bounded_in_records_and_samples(mixed, monkeypatch):
     sizes = []
-    real = inference.model_inputs
+    real = inference.dwells_of
 
     def spy(iq, **options):
         sizes.append(iq.shape)
         return real(iq, **options)
 
-    monkeypatch.setattr(inference, "model_inputs", spy)
+    monkeypatch.setattr(inference, "dwells_of", spy)
     mixed.predict(noise(100, (600,)), **RADAR)
     assert [records for records, _ in sizes] == [256, 256, 88]
     sizes.clear()
