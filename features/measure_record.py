@@ -177,8 +177,9 @@ def _turning(family: Family) -> dict[str, Any]:
         chopping = float(rotors.rates.mean()) * prf_hz
         # of two rotors nearer than the dwell tells apart one alone was counted
         std = float(np.hypot(np.sqrt((rotors.stds**2).sum()) / count, hidden_shift(rotors.fits))) * prf_hz
+    spread = max(rotors.spread, rotors.unseen)
     if not rotors.resolved:  # the mean lies anywhere within what the unresolved rates span
-        std = float(np.hypot(std, rotors.spread * prf_hz / np.sqrt(12)))
+        std = float(np.hypot(std, spread * prf_hz / np.sqrt(12)))
     drifts, drift_stds = family.drifts * (rotors.rates if count > 1 else comb.chopping) * prf_hz**2
     each = (rotors.rates * prf_hz, rotors.stds * prf_hz, drifts, drift_stds)
     padded = (np.pad(values, (0, MAX_ROTORS - count), constant_values=np.nan) for values in each)
@@ -191,7 +192,7 @@ def _turning(family: Family) -> dict[str, Any]:
         "chopping_drift_hz_per_s_std": float(np.sqrt((drift_stds**2).sum())) / count,
         "rotor_count": float(count),
         "rotors_resolved": rotors.resolved,
-        "rotor_spread_hz": rotors.spread * prf_hz,
+        "rotor_spread_hz": spread * prf_hz,
     }
 
 

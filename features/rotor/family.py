@@ -179,7 +179,7 @@ def by_turns(family: Family, blades: int | None) -> Family:
         return replace(family, may_be_turn=number > 1)
     turned = replace(comb, per_turn=number, blades=number, blades_sure=True)
     rates, stds, spread = number * rotors.rates, number * rotors.stds, number * rotors.spread
-    rotors = replace(rotors, rates=rates, stds=stds, spread=spread)
+    rotors = replace(rotors, rates=rates, stds=stds, spread=spread, unseen=number * rotors.unseen)
     return replace(family, comb=turned, edge=edge, edge_std=std, rotors=rotors)
 
 

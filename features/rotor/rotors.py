@@ -99,6 +99,8 @@ class Rotors:
     row_edge : (float, float) or None
         Of a lone rotor whose blades are rows of points, where its lines end, and the standard deviation [cycles a
         sample from the body].
+    unseen : float
+        Range of rates within which others are that wander, none of whose lines are seen [cycles a sample].
     """
 
     rates: NDArray[np.float64]
@@ -109,6 +111,7 @@ class Rotors:
     rest: NDArray[np.complex128]
     next_rate: float
     row_edge: tuple[float, float] | None = None
+    unseen: float = 0.0
 
 
 def _low_power(rest: Periodogram, places: NDArray[np.float64], fits: Sequence[CombFit]) -> float:

@@ -55,6 +55,10 @@ LEAST_BINS = 100
 #: What a lone rotor leaves may be a change of its rate; from this share of its lines' power on they say little of it.
 LEFT_ALONE = 0.25
 
+#: Where that much of it is left, rates wander: all but the loudest rotor's lines run into one another, and its rate
+#: says little of theirs. Of steady rotors nothing is left, whether the dwell tells their rates apart or not.
+LEFT_WANDERING = 0.5
+
 #: As does what is left where it comes, with so many of its deviations, to the mean rotor found: one more like it would
 #: not have been seen.
 HIDDEN_DEVIATIONS = 1.5
@@ -246,6 +250,11 @@ def judged(
     fitted_to : float, optional
         How far out lines were fitted [cycles a sample from the body], where that may not be as far as they reach.
     """
+    about = _power_about(data, rotors.rest, rotors.fits[0].centre)
+    share, hidden = _left_over(about, rotors.fits, edge)
+    any_rate = 2 * RATE_SPREAD * float(rotors.rates.mean())  # of one airframe
+    if share > LEFT_WANDERING:
+        rotors = replace(rotors, unseen=any_rate)
     if not rotors.resolved:
         return rotors
     several = len(rotors.fits) > 1
@@ -266,13 +275,11 @@ def judged(
             chopping = per_turn * rotors.fits[0].spacing
             rotors = replace(rotors, row_edge=(row.edge * chopping, row.edge_std * chopping))
             twice = False
-    about = _power_about(data, rotors.rest, rotors.fits[0].centre)
-    share, hidden = _left_over(about, rotors.fits, edge)
     # lines that come back from the other end of the span are none of a family that ends within it
     contradicted = not several and rotors.fits[0].is_folded and edge < 0.5
     past = (not several or fitted_to is not None) and _stands_past(about, rotors.fits, fitted_to or edge)
     if fitted_to is None and others_flash(data, rotors.rest, (fit.spacing for fit in rotors.fits), edge):
-        return not_all(rotors, data, 2 * RATE_SPREAD * float(rotors.rates.mean()))  # they may be any of one airframe
+        return not_all(rotors, data, any_rate)  # they may be any
     if not (twice or paired or hidden or past or contradicted or share > (LEFT_SHARE if several else LEFT_ALONE)):
         return rotors
     apart = abs(rotors.next_rate - float(rotors.rates[0])) if hidden and not several else 0.0

@@ -184,3 +184,31 @@ def test_a_tone_that_swings_is_one_comb_without_a_band(index):
     assert found.chopping_hz == pytest.approx(0.0134 * 36e3, rel=1e-3)
     assert np.isnan(found.bandwidth_hz)
     assert found.band_reason
+
+
+def wandering(seed, swing):
+    """Four rotors within 16 % whose rates wander by so much, rms, and their chopping frequencies' mean [Hz]."""
+    rng, times_s = np.random.default_rng(seed), np.arange(PULSES) / PRF_HZ
+    rates_hz = 70 * (1 + rng.uniform(-0.08, 0.08, 4))
+    iq, means_hz = np.full(PULSES, 10.0 + 0j), []
+    for rate_hz in rates_hz:
+        sways = np.sin(2 * np.pi * rng.uniform(3, 20, (3, 1)) * times_s + rng.uniform(0, 7, (3, 1))).sum(axis=0)
+        own_hz = rate_hz * (1 + swing * np.sqrt(2 / 3) * sways)
+        angle = 2 * np.pi * (np.cumsum(own_hz) / PRF_HZ + rng.uniform())
+        echo = rotor_echo(angle, wavelength_m=WAVELENGTH_M, blade_length_m=0.15)
+        iq += echo / np.sqrt(np.mean(np.abs(echo) ** 2)) * np.exp(2j * np.pi * rng.uniform())
+        means_hz.append(2 * own_hz.mean())
+    return 3 * iq + white(rng, PULSES), np.mean(means_hz)
+
+
+def test_rotors_that_wander_leave_room_for_the_mean_of_all():
+    """The loudest one's lines stand, those of the others run into one another: its rate is not theirs."""
+    errors = []
+    for seed in range(16):
+        iq, mean_hz = wandering(seed, 0.012)
+        found = measure(iq, **RADAR)
+        assert not found.rotors_resolved
+        if abs(found.chopping_hz / mean_hz - 1) < 0.15:  # no fraction or multiple, which are others' rates too
+            errors.append((found.chopping_hz - mean_hz) / found.chopping_hz_std)
+    assert len(errors) >= 10
+    assert np.mean(np.square(errors)) < 3
