@@ -17,6 +17,7 @@ from .periodogram import Periodogram
 from .rotors import Separation, Sought
 from .slow_lines import remove_bands
 from .turning import DEGREES, FIRST_DEGREES, even_change, late_by, margin_of, resampled
+from .unresolved import LEFT_WANDERING, left_over
 
 #: Rotors are sought that change by up to this over the dwell, relative, in steps that put the outermost lines at its
 #: ends out by half of so many radians; so many steps to each side at most.
@@ -48,6 +49,14 @@ class ChangingSeparation(Separation):
         self.seeks_apart = False
         self.furthest = min(FURTHER * self.furthest, 0.5)
         self._read: dict[float, Periodogram] = {}  # what is left, by the change at which it was read
+
+    @property
+    def is_hopeless(self) -> bool:
+        """Of rates that change smoothly hardly anything is left by now; what wanders is seldom told, for all that."""
+        if self.fitted_out or not self.fits:
+            return False
+        edge = self.reach * self.nominal
+        return left_over(self.data, self.rest.samples, self.fits, edge)[0] > LEFT_WANDERING
 
     def in_turn(self, sought: list[Sought]) -> Iterator[Sought]:
         """These."""

@@ -245,6 +245,11 @@ class Separation:
         self.seeks_apart = True
 
     @property
+    def is_hopeless(self) -> bool:
+        """Whether more is left than a closer fit of those found, or one more, will ever explain."""
+        return False
+
+    @property
     def rates(self) -> list[float]:
         """Of the rotors found [cycles a sample]."""
         return [fit.spacing for fit in self.fits]
@@ -441,6 +446,7 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float, how: type[Separa
     if reach * RATE_SPREAD * nominal * data.pulses < 2:
         return alone
     found = how(data, comb, centre, reach)
+    left_open = replace(alone, resolved=False, spread=found.resolution)
     first, most, rate, last = 0.0, 0.0, nominal, _NO_ROTOR
     while len(found.fits) < MAX_ROTORS:
         sought = found.sought()
@@ -450,6 +456,8 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float, how: type[Separa
         if not found.fits:
             first = evidence
         least = max(FURTHER_EVIDENCE if len(found.fits) > 1 else LEAST_EVIDENCE, LEAST_SHARE * first)
+        if evidence < max(least, DOUBTFUL_SHARE * most) and found.is_hopeless:
+            return left_open
         if evidence < least:
             break
         if evidence < DOUBTFUL_SHARE * most and found.fit_out(FURTHER_STEPS):
@@ -463,6 +471,8 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float, how: type[Separa
             if one in sought and (verdict.unresolved or not one.is_apart):
                 said.append(verdict)
         else:
+            if found.is_hopeless:
+                return left_open
             if found.fit_out(FURTHER_STEPS):
                 continue
             last = said[0]

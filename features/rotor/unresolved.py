@@ -141,7 +141,7 @@ def _power_about(data: Periodogram, rest: NDArray[np.complex128], centre: float)
     return np.abs(away - np.rint(away)), power, seen
 
 
-def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[float, bool]:
+def _left_over(about: _About, fits: Sequence[CombFit], edge: float) -> tuple[float, bool]:
     """What is left within the band: its share of the lines' power, and whether it may be a rotor.
 
     The share is 0 where that is not clearly more than the noise beyond the band.
@@ -172,6 +172,13 @@ def _left_over(about: _About, fits: list[CombFit], edge: float) -> tuple[float, 
     deviation = noise * float(np.sqrt(1 / within.sum() + 1 / max(beyond.sum(), LEAST_BINS)))
     most = over + noise * taken / within.sum() + HIDDEN_DEVIATIONS * deviation
     return share, most * within.sum() > held
+
+
+def left_over(
+    data: Periodogram, rest: NDArray[np.complex128], fits: Sequence[CombFit], edge: float
+) -> tuple[float, bool]:
+    """What combs leave within their band: its share of the lines' power, and whether it may be a rotor."""
+    return _left_over(_power_about(data, rest, fits[0].centre), fits, edge)
 
 
 def _stands_past(about: _About, fits: Sequence[CombFit], edge: float) -> bool:

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
+from bladewing.features.rotor import changing
+from bladewing.features.rotor.changing_fit import fit_changing
 from bladewing.features.rotor.periodogram import prepare
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 
@@ -212,3 +214,19 @@ def test_rotors_that_wander_leave_room_for_the_mean_of_all():
             errors.append((found.chopping_hz - mean_hz) / found.chopping_hz_std)
     assert len(errors) >= 10
     assert np.mean(np.square(errors)) < 3
+
+
+def test_what_wanders_is_given_up_early_with_the_same_answer(monkeypatch):
+    fits = []
+    monkeypatch.setattr(changing, "fit_changing", lambda *a, **k: fits.append(1) or fit_changing(*a, **k))
+
+    def answers():
+        fits.clear()
+        found = [measure(wandering(seed, 0.012)[0], **RADAR) for seed in (1, 8, 12)]
+        return len(fits), [(one.chopping_hz, one.rotor_count, one.tip_speed_mps) for one in found]
+
+    few, early = answers()
+    monkeypatch.setattr(changing.ChangingSeparation, "is_hopeless", False)
+    many, late = answers()
+    np.testing.assert_array_equal(early, late)
+    assert few < 0.8 * many
