@@ -103,17 +103,27 @@ def _read(spectra: NDArray[np.complex128], frequency: NDArray[np.floating], puls
     return np.asarray(np.einsum("lt,klt->kl", weight, spectra.take(bins, axis=1)) / pulses, np.complex128)
 
 
-def against_lines(samples: NDArray[np.complex128], frequency: NDArray[np.floating]) -> NDArray[np.complex128]:
-    """Means of samples against unit lines whose time counts from the middle, shape (rows, lines).
+class LinesSeen:
+    """Records ready to be seen by unit lines of any frequencies, as often as one likes.
 
     Parameters
     ----------
     samples : ndarray of complex128, shape (rows, pulses)
         Records.
-    frequency : ndarray, shape (lines,)
-        [cycles a sample].
     """
-    return _read(_to_read(samples), frequency, samples.shape[-1])
+
+    def __init__(self, samples: NDArray[np.complex128]) -> None:
+        self._spectra, self._pulses = _to_read(samples), samples.shape[-1]
+
+    def means(self, frequency: NDArray[np.floating]) -> NDArray[np.complex128]:
+        """Means of the samples against unit lines whose time counts from the middle, shape (rows, lines).
+
+        Parameters
+        ----------
+        frequency : ndarray, shape (lines,)
+            [cycles a sample].
+        """
+        return _read(self._spectra, frequency, self._pulses)
 
 
 def sum_of_lines(

@@ -16,7 +16,7 @@ from .comb_fit import CombFit
 from .periodogram import Periodogram
 from .rotors import Separation, Sought
 from .slow_lines import remove_bands
-from .turning import DEGREES, FIRST_DEGREES, even_change, late_by, margin_of, resampled
+from .turning import DEGREES, FIRST_DEGREES, Resampling, even_change, late_by, margin_of
 from .unresolved import LEFT_WANDERING, left_over
 
 #: Rotors are sought that change by up to this over the dwell, relative, in steps that put the outermost lines at its
@@ -49,6 +49,8 @@ class ChangingSeparation(Separation):
         self.seeks_apart = False
         self.furthest = min(FURTHER * self.furthest, 0.5)
         self._read: dict[float, Periodogram] = {}  # what is left, by the change at which it was read
+        self._late = {change: late_by(even_change(change, data.pulses), data.pulses) for change in self._changes()}
+        self._left: Resampling | None = None
 
     @property
     def is_hopeless(self) -> bool:
@@ -65,23 +67,23 @@ class ChangingSeparation(Separation):
     def _strongest(self, rates: NDArray[np.float64], *, is_apart: bool = False) -> Sought:
         return max((self._by(change, rates, is_apart=is_apart) for change in self._changes()), key=lambda s: s.evidence)
 
-    def _changes(self) -> NDArray[np.float64]:
+    def _changes(self) -> list[float]:
         """Changes over the dwell that are tried, relative."""
         turns = self.nominal * self.reach * self.data.pulses  # an even change puts the ends out by an eighth of these
         step = STEP_RAD * 8 / (2 * np.pi * turns)
         count = min(int(FURTHEST_CHANGE / step), MOST_STEPS)
-        return np.asarray(step * np.arange(-count, count + 1), np.float64)
+        return [float(change) for change in step * np.arange(-count, count + 1)]
 
     def _by(self, change: float, rates: NDArray[np.float64], *, is_apart: bool) -> Sought:
         """The loudest in what is left, read as a rotor of that change turns evenly."""
-        held = self._read_at(float(change)) if change else self.rest
-        return replace(self._loudest_in(held, rates, is_apart=is_apart), change=float(change))
+        held = self._read_at(change) if change else self.rest
+        return replace(self._loudest_in(held, rates, is_apart=is_apart), change=change)
 
     def _read_at(self, change: float) -> Periodogram:
         if change not in self._read:
-            pulses, margin = self.data.pulses, margin_of(self.data.pulses)
-            late = late_by(even_change(change, pulses), pulses)
-            even = resampled(np.pad(self.rest.samples, margin), self.centre, late)
+            if self._left is None:
+                self._left = Resampling(np.pad(self.rest.samples, margin_of(self.data.pulses)), self.centre)
+            even = self._left.read(self._late[change])
             self._read[change] = self.data.left(remove_bands(even, self.data.strong.bands), self.level)
         return self._read[change]
 
@@ -89,7 +91,7 @@ class ChangingSeparation(Separation):
         super()._take(fits, samples)
         outermost = max(reach * fit.spacing for reach, fit in zip(self.reaches, fits, strict=True))
         self.furthest = min(max(self.furthest, FURTHER * outermost), 0.5)
-        self._read = {}
+        self._read, self._left = {}, None
 
     def _is_the_comb(self, rate: float) -> bool:
         return False  # that was fitted as if it did not change

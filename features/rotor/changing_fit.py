@@ -15,7 +15,7 @@ from ..lines import middle_times, squared
 from .comb_fit import ENOUGH, NOTCH_RIDGE, CombFit, lines_at_one_place, orders_within, over_orders, ridges
 from .periodogram import LEAST_LEVEL, Level, Periodogram
 from .slow_lines import band_basis, remove_bands
-from .turning import inverse_of, other_rate, polynomials
+from .turning import inverse_of, other_rate, own_polynomials
 
 #: A step takes lines^2 x pulses multiplications and holds several times lines x pulses samples, no more than these.
 MOST_PRODUCTS, MOST_SAMPLES = 3_000_000_000, 8_000_000
@@ -79,7 +79,7 @@ def turning_lines(
         Pulses of the record.
     """
     time = middle_times(pulses)
-    turn = 2 * np.pi * rate * (time + ahead @ polynomials(time, pulses))
+    turn = 2 * np.pi * rate * (time + ahead @ own_polynomials(pulses))
     powers = np.empty((int(np.abs(orders).max()) + 1, pulses), np.complex64)
     powers[0] = 1
     powers[1:2] = np.exp(1j * turn)
@@ -125,7 +125,7 @@ class _Turning:
     def __init__(self, data: Periodogram, starts: Sequence[Start], centre: float, degrees: int) -> None:
         self.pulses, self.count, self.degrees = data.pulses, len(starts), degrees
         self.time = middle_times(data.pulses)
-        self.shapes = polynomials(self.time, data.pulses)[:degrees]
+        self.shapes = own_polynomials(data.pulses)[:degrees]
         self.centre, self.pull = centre, 0.0
         self.rates, self.ahead = np.array([one.rate for one in starts]), np.array([one.ahead for one in starts])
         self.orders = [orders_within(data, centre, one.rate, (-one.reach, one.reach)) for one in starts]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..lines import against_lines, middle_times, squared, sum_of_lines
+from ..lines import LinesSeen, squared, sum_of_lines
 from .changing_fit import ChangingFit, Start, fit_changing, most_lines
 from .comb import Comb
 from .comb_fit import ENOUGH, LEAST_RIDGE, CombFit, lines_at_one_place
@@ -21,6 +21,7 @@ from .turning import (
     DEGREES,
     FIRST_DEGREES,
     MOST_CHANGE,
+    Resampling,
     change_of,
     changed,
     inverse_of,
@@ -28,8 +29,8 @@ from .turning import (
     late_by,
     margin_of,
     other_rate,
+    own_polynomials,
     polynomials,
-    resampled,
 )
 
 #: Lines are seen in so many parts of the dwell, or parts of so many samples where those are longer: within one of them
@@ -117,7 +118,7 @@ def straightened(data: Periodogram, comb: Comb, edge: float, *, least_gain: floa
     if not is_sure(fit.ahead, fit.ahead_std) or not change_of(fit.ahead, pulses) < MOST_CHANGE:
         return None
     late = late_by(fit.ahead, pulses)
-    return Straightened(resampled(_continued(data.samples, fit), fit.centre, late), data, fit)
+    return Straightened(Resampling(_continued(data.samples, fit), fit.centre).read(late), data, fit)
 
 
 def _each_by_itself(data: Periodogram, rate: float, centre: float, reach: int) -> tuple[NDArray[np.float64], float]:
@@ -207,7 +208,7 @@ def ahead_left(
     pulses, frequency = data.pulses, np.concatenate([fit.frequencies for fit in fits])
     amplitudes = np.concatenate([fit.amplitudes for fit in fits])
     leads = [2 * np.pi * fit.spacing * fit.orders for fit in fits]
-    shapes = polynomials(middle_times(pulses), pulses)
+    shapes = own_polynomials(pulses)
     turned = [
         sum_of_lines(pulses, fit.frequencies, 1j * lead * fit.amplitudes) for fit, lead in zip(fits, leads, strict=True)
     ]
@@ -215,7 +216,7 @@ def ahead_left(
     # what the record gains by each polynomial of each rotor, and by another velocity or an acceleration of the body
     gained = remove_bands(np.concatenate([*(shapes * one for one in turned), shapes[:2] * still]), data.strong.bands)
     # what other amplitudes would make of it does not count
-    seen = against_lines(np.concatenate([gained, rest[None]]), frequency).T
+    seen = LinesSeen(np.concatenate([gained, rest[None]])).means(frequency).T
     products = notched_products(frequency, pulses, data.strong.bands).plain
     snr = np.concatenate([fit.snr for fit in fits])
     products.flat[:: len(products) + 1] += np.where(lines_at_one_place(frequency, pulses) > 1, 1 / snr, LEAST_RIDGE)

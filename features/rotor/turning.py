@@ -1,10 +1,12 @@
 """Rotors that do not turn evenly: how far ahead of an even one they are, and records read at other times."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from ..lines import against_lines, middle_times
+from ..lines import LinesSeen, middle_times
 
 #: How far a rotor is ahead of an even one is a sum of Legendre polynomials in time, of these degrees. The first is
 #: another rate, the second one that changes evenly. Where a change is first sought it is taken to be even: the first so
@@ -35,6 +37,14 @@ def polynomials(time: NDArray[np.float64], pulses: int) -> NDArray[np.float64]:
     return np.asarray(values, np.float64)
 
 
+@lru_cache(maxsize=4)
+def own_polynomials(pulses: int) -> NDArray[np.float64]:
+    """The same at the times of the pulses themselves, shape (degrees, pulses), not to be written to."""
+    values = polynomials(middle_times(pulses), pulses)
+    values.setflags(write=False)
+    return values
+
+
 def bend(ahead: NDArray[np.float64], pulses: int) -> float:
     """Even relative change of the rate a sample that puts a rotor so far ahead."""
     return 12 * float(ahead[1]) / pulses**2
@@ -52,7 +62,7 @@ def other_rate(ahead: float, pulses: int) -> float:
 
 def change_of(ahead: NDArray[np.float64], pulses: int) -> float:
     """How far the rate departs from the one that was known, relative."""
-    return float(np.abs(np.diff(ahead @ polynomials(middle_times(pulses), pulses))).max())
+    return float(np.abs(np.diff(ahead @ own_polynomials(pulses))).max())
 
 
 def changed(ahead: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -62,19 +72,20 @@ def changed(ahead: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def late_by(ahead: NDArray[np.float64], pulses: int) -> NDArray[np.float64]:
     """By how much later than an even rotor one that is ahead has turned as far, but for another rate [samples]."""
-    time, late = middle_times(pulses), np.zeros(pulses)
-    for _ in range(FIXED_STEPS):
-        late = -changed(ahead) @ polynomials(time + late, pulses)
-    return late
+    time, departs = middle_times(pulses), -changed(ahead)
+    late = departs @ own_polynomials(pulses)
+    for _ in range(FIXED_STEPS - 1):
+        late = departs @ polynomials(time + late, pulses)
+    return np.asarray(late, np.float64)
 
 
 def margin_of(pulses: int) -> int:
-    """How far past each end of a record `resampled` may read [samples]."""
+    """How far past each end of a record `Resampling` may read [samples]."""
     return FADING + int(MOST_CHANGE * pulses / 6)
 
 
-def resampled(samples: NDArray[np.complex128], centre: float, late: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """Samples read at other times, about a line that stays.
+class Resampling:
+    """Samples that are read at other times, about a line that stays.
 
     Parameters
     ----------
@@ -82,20 +93,21 @@ def resampled(samples: NDArray[np.complex128], centre: float, late: NDArray[np.f
         A record and what comes before and after it; the whole is taken to repeat.
     centre : float
         Frequency of the line [cycles a sample].
-    late : ndarray, shape (pulses,)
-        By how much later each is read [samples].
-
-    Returns
-    -------
-    ndarray of complex128, shape (pulses,)
     """
-    size, pulses = len(samples), len(late)
-    spectrum = fft.fftshift(fft.fft(samples * np.exp(-2j * np.pi * centre * middle_times(size))))
-    # a spectrum's samples seen by a unit line are the record's at a time
-    place = (np.arange(pulses) + (size - pulses) / 2 + late) / size
-    off = size // 2 - (size - 1) / 2  # of the spectrum's zero from its middle
-    read = against_lines(spectrum[None], -place)[0]
-    return np.asarray(read * np.exp(2j * np.pi * (centre * middle_times(pulses) - off * place)), np.complex128)
+
+    def __init__(self, samples: NDArray[np.complex128], centre: float) -> None:
+        self._size, self._centre = len(samples), centre
+        spectrum = fft.fftshift(fft.fft(samples * np.exp(-2j * np.pi * centre * middle_times(self._size))))
+        self._spectrum = LinesSeen(spectrum[None])
+
+    def read(self, late: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """The record's samples by so much later each, shape (pulses,) both [samples]."""
+        size, pulses = self._size, len(late)
+        # a spectrum's samples seen by a unit line are the record's at a time
+        place = (np.arange(pulses) + (size - pulses) / 2 + late) / size
+        off = size // 2 - (size - 1) / 2  # of the spectrum's zero from its middle
+        turns = self._centre * middle_times(pulses) - off * place
+        return np.asarray(self._spectrum.means(-place)[0] * np.exp(2j * np.pi * turns), np.complex128)
 
 
 def is_sure(ahead: NDArray[np.float64], std: NDArray[np.float64], deviations: float = SURE_DEVIATIONS) -> bool:

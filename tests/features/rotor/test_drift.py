@@ -7,7 +7,7 @@ from bladewing.features.rotor.drift import ahead_left, straightened
 from bladewing.features.rotor.family import find_family
 from bladewing.features.rotor.periodogram import prepared
 from bladewing.features.rotor.slow_lines import remove_bands
-from bladewing.features.rotor.turning import bend, is_sure, resampled
+from bladewing.features.rotor.turning import Resampling, bend, is_sure
 from bladewing.features.spectrum import doppler_spectrum
 
 from ...benchmarks import records
@@ -39,7 +39,7 @@ def test_a_comb_read_later_is_the_closed_form_at_those_times(margin, pulses):
     time = np.arange(pulses) - (pulses - 1) / 2
     late = 3.0 * (2 * time / pulses) ** 2 - 1.3
     turn = np.exp(2j * np.pi * centre * time)
-    read = resampled(echo(whole) * np.exp(2j * np.pi * centre * whole), centre, late)
+    read = Resampling(echo(whole) * np.exp(2j * np.pi * centre * whole), centre).read(late)
     np.testing.assert_allclose(read, echo(time + late) * turn, atol=1e-4)
 
 
