@@ -57,6 +57,33 @@ def _turned_taps(frequency: NDArray[np.floating], pulses: int) -> tuple[NDArray[
     return (first[:, None] + TAP) % size, weight * turns
 
 
+class LinesSeen:
+    """Records ready to be seen by unit lines of any frequencies, as often as one likes.
+
+    Parameters
+    ----------
+    samples : ndarray of complex128, shape (rows, pulses)
+        Records.
+    """
+
+    def __init__(self, samples: NDArray[np.complex128]) -> None:
+        self._pulses = samples.shape[-1]
+        size, shape = kernel(self._pulses)
+        self._spectra = fft.fft(samples * shape, size)
+
+    def means(self, frequency: NDArray[np.floating]) -> NDArray[np.complex128]:
+        """Means of the samples against unit lines whose time counts from the middle, shape (rows, lines).
+
+        Parameters
+        ----------
+        frequency : ndarray, shape (lines,)
+            [cycles a sample].
+        """
+        bins, weight = _turned_taps(frequency, self._pulses)
+        read = np.einsum("lt,klt->kl", weight, self._spectra.take(bins, axis=1))
+        return np.asarray(read / self._pulses, np.complex128)
+
+
 @dataclass(frozen=True)
 class LineSpace:
     """One record, ready to be read at any frequency.
@@ -70,9 +97,9 @@ class LineSpace:
     samples: NDArray[np.complex128]
 
     @cached_property
-    def _spectra(self) -> NDArray[np.complex128]:
-        """Spectra of the samples and of the samples times their time, shape (2, bins)."""
-        return _to_read(np.stack([self.samples, self.samples * middle_times(len(self.samples))]))
+    def _seen(self) -> LinesSeen:
+        """The samples, and the samples times their time."""
+        return LinesSeen(np.stack([self.samples, self.samples * middle_times(len(self.samples))]))
 
     def at(self, frequency: NDArray[np.floating]) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
         """Mean of the samples, and of the samples times time, against unit lines.
@@ -87,43 +114,8 @@ class LineSpace:
         amplitude, moment : ndarray of complex128, shape (lines,)
             Time counts from the middle of the record, in samples.
         """
-        seen = _read(self._spectra, frequency, len(self.samples))
+        seen = self._seen.means(frequency)
         return seen[0], seen[1]
-
-
-def _to_read(samples: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Spectra of samples (rows, pulses) that `_read` reads."""
-    size, shape = kernel(samples.shape[-1])
-    return np.asarray(fft.fft(samples * shape, size), np.complex128)
-
-
-def _read(spectra: NDArray[np.complex128], frequency: NDArray[np.floating], pulses: int) -> NDArray[np.complex128]:
-    """Means of each row's samples against unit lines, shape (rows, lines)."""
-    bins, weight = _turned_taps(frequency, pulses)
-    return np.asarray(np.einsum("lt,klt->kl", weight, spectra.take(bins, axis=1)) / pulses, np.complex128)
-
-
-class LinesSeen:
-    """Records ready to be seen by unit lines of any frequencies, as often as one likes.
-
-    Parameters
-    ----------
-    samples : ndarray of complex128, shape (rows, pulses)
-        Records.
-    """
-
-    def __init__(self, samples: NDArray[np.complex128]) -> None:
-        self._spectra, self._pulses = _to_read(samples), samples.shape[-1]
-
-    def means(self, frequency: NDArray[np.floating]) -> NDArray[np.complex128]:
-        """Means of the samples against unit lines whose time counts from the middle, shape (rows, lines).
-
-        Parameters
-        ----------
-        frequency : ndarray, shape (lines,)
-            [cycles a sample].
-        """
-        return _read(self._spectra, frequency, self._pulses)
 
 
 def sum_of_lines(

@@ -17,7 +17,7 @@ from .periodogram import Periodogram
 from .rotors import Separation, Sought
 from .slow_lines import remove_bands
 from .turning import DEGREES, FIRST_DEGREES, Resampling, even_change, late_by, margin_of
-from .unresolved import LEFT_WANDERING, left_over
+from .unresolved import LEFT_WANDERING, left_over, power_about
 
 #: Rotors are sought that change by up to this over the dwell, relative, in steps that put the outermost lines at its
 #: ends out by half of so many radians; so many steps to each side at most.
@@ -49,6 +49,7 @@ class ChangingSeparation(Separation):
         self.seeks_apart = False
         self.furthest = min(FURTHER * self.furthest, 0.5)
         self._read: dict[float, Periodogram] = {}  # what is left, by the change at which it was read
+        # by how much later each of the changes that are tried has turned as far
         self._late = {change: late_by(even_change(change, data.pulses), data.pulses) for change in self._changes()}
         self._left: Resampling | None = None
 
@@ -57,15 +58,15 @@ class ChangingSeparation(Separation):
         """Of rates that change smoothly hardly anything is left by now; what wanders is seldom told, for all that."""
         if self.fitted_out or not self.fits:
             return False
-        edge = self.reach * self.nominal
-        return left_over(self.data, self.rest.samples, self.fits, edge)[0] > LEFT_WANDERING
+        about = power_about(self.data, self.rest.samples, self.fits[0].centre)
+        return left_over(about, self.fits, self.reach * self.nominal)[0] > LEFT_WANDERING
 
     def in_turn(self, sought: list[Sought]) -> Iterator[Sought]:
         """These."""
         return iter(sought)
 
     def _strongest(self, rates: NDArray[np.float64], *, is_apart: bool = False) -> Sought:
-        return max((self._by(change, rates, is_apart=is_apart) for change in self._changes()), key=lambda s: s.evidence)
+        return max((self._by(change, rates, is_apart=is_apart) for change in self._late), key=lambda s: s.evidence)
 
     def _changes(self) -> list[float]:
         """Changes over the dwell that are tried, relative."""

@@ -478,7 +478,7 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float, how: type[Separa
             last = said[0]
             break
     if not found.fits:
-        return replace(alone, resolved=not last.unresolved, spread=found.resolution if last.unresolved else 0.0)
+        return left_open if last.unresolved else alone
     found.fit_out(LAST_STEPS)
     found.make_whole()
     fits = sorted(found.fits, key=lambda fit: fit.spacing)

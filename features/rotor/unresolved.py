@@ -125,7 +125,7 @@ def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None, 
 _About = tuple[NDArray[np.float64], NDArray[np.floating], NDArray[np.bool_]]
 
 
-def _power_about(data: Periodogram, rest: NDArray[np.complex128], centre: float) -> _About:
+def power_about(data: Periodogram, rest: NDArray[np.complex128], centre: float) -> _About:
     """Of each bin of what is left: how far from a centre it is [cycles a sample], its power, whether it can be seen.
 
     A background's skirt is nothing that rotors leave: there the power is in units of that, or what is so loud would
@@ -141,7 +141,7 @@ def _power_about(data: Periodogram, rest: NDArray[np.complex128], centre: float)
     return np.abs(away - np.rint(away)), power, seen
 
 
-def _left_over(about: _About, fits: Sequence[CombFit], edge: float) -> tuple[float, bool]:
+def left_over(about: _About, fits: Sequence[CombFit], edge: float) -> tuple[float, bool]:
     """What is left within the band: its share of the lines' power, and whether it may be a rotor.
 
     The share is 0 where that is not clearly more than the noise beyond the band.
@@ -172,13 +172,6 @@ def _left_over(about: _About, fits: Sequence[CombFit], edge: float) -> tuple[flo
     deviation = noise * float(np.sqrt(1 / within.sum() + 1 / max(beyond.sum(), LEAST_BINS)))
     most = over + noise * taken / within.sum() + HIDDEN_DEVIATIONS * deviation
     return share, most * within.sum() > held
-
-
-def left_over(
-    data: Periodogram, rest: NDArray[np.complex128], fits: Sequence[CombFit], edge: float
-) -> tuple[float, bool]:
-    """What combs leave within their band: its share of the lines' power, and whether it may be a rotor."""
-    return _left_over(_power_about(data, rest, fits[0].centre), fits, edge)
 
 
 def _stands_past(about: _About, fits: Sequence[CombFit], edge: float) -> bool:
@@ -257,8 +250,8 @@ def judged(
     fitted_to : float, optional
         How far out lines were fitted [cycles a sample from the body], where that may not be as far as they reach.
     """
-    about = _power_about(data, rotors.rest, rotors.fits[0].centre)
-    share, hidden = _left_over(about, rotors.fits, edge)
+    about = power_about(data, rotors.rest, rotors.fits[0].centre)
+    share, hidden = left_over(about, rotors.fits, edge)
     any_rate = 2 * RATE_SPREAD * float(rotors.rates.mean())  # of one airframe
     if share > LEFT_WANDERING:
         rotors = replace(rotors, unseen=any_rate)
