@@ -1,42 +1,43 @@
-"""A comb that holds several rotors' lines among its own: at a common fraction of their rates.
+"""A comb that holds several rotors' lines among its own: at a common fraction of their rates, or anywhere below them.
 
-In a long dwell the lines of rotors some hertz apart part at the lowest orders: nothing lies at one spacing for all of
-them. A fifth of one rate is then a sixth of another's, and a comb at that holds the lines of both, more than those of
-either. But a rotor's comb has nearly all of its lines, and of such a one most are not there.
+Lines of rotors of unlike rates stand all over the band. A fifth of one rate is then a sixth of another's, and a comb at
+that holds the lines of both, more than those of either; and any fine one meets some of many lines by chance. But of a
+rotor's comb nearly all lines are there, far more than of the places between them, and of such a one few are.
 """
 
 from dataclasses import replace
 from itertools import starmap
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .comb_search import FINE_STEPS, FLASH_SHARE, Candidate, factors_about, loudest_of_each, spacing_limits
+from .comb_search import FINE_STEPS, FLASH_SHARE, Candidate, factors_about, heights, loudest_of_each, spacing_limits
 from .flashes import flash_evidence
 from .folding import may_come_back
 from .periodogram import Periodogram
 
-#: A comb may be such a fraction where fewer of its lines are there than the one share: then a multiple is the rotor's
-#: of which more than the other share are there. Of rotors' combs near the noise fewer are there, but of no multiple
-#: more.
-FEW_THERE, MOST_THERE = 0.75, 0.85
+#: A comb may be such a one where fewer of its lines are there than this share, and those that are speak by so much on
+#: average [nats]: of any comb near the noise many are missing.
+FEW_THERE, LOUD_NATS = 0.75, 1.6
 
-#: And where a line of that multiple speaks for it by so much on average [nats], of `LINE_CAP` at most.
-LEAST_MEAN_NATS = 2.5
+#: Then a whole multiple of its spacing, so near to it [bins at the PRF], is the rotor's where more than this share of
+#: its lines are there, where a line speaks for it by so much on average [nats], of `LINE_CAP` at most, and all of them
+#: by this share of what those of the comb found do: one that holds two rotors' lines among others is hardly twice as
+#: loud as the louder one, and outer lines by chance are a far smaller share. Unlike blades leave the comb as it is.
+OFF_BINS, WHOLE_THERE, WHOLE_MEAN_NATS, WHOLE_SHARE = 4, 0.85, 2.5, 0.65
 
-#: And where so large a share of what speaks for the comb found speaks for it: one that holds two rotors' lines among
-#: others is hardly twice as loud as the louder one, some outer lines by chance are a far smaller share.
-WHOLE_SHARE = 0.65
+#: Any other is where this holds, where lines reach this share as far, and where their being there says so much [nats],
+#: so many times as much as it does of the comb found, and times what they speak for this share.
+MOST_THERE, LEAST_MEAN_NATS = 0.78, 2.0
+SHARE_OF_REACH, LEAST_TOLD, MORE_TOLD, SHARE_OF_BOTH = 0.75, 10.0, 1.08, 0.6
 
-#: Multiples tried.
-MULTIPLES = range(2, 10)
-
-#: Rates of which a comb is nearly a fraction are off from its multiple by up to so many bins at the PRF.
-OFF_BINS = 4
+#: Coarser ones are so many times as far apart at least; and so many of the loudest are looked at.
+COARSER, LOUDEST = 1.3, 60
 
 
 def of_one_rotor(data: Periodogram, found: Candidate) -> Candidate:
-    """The comb of one rotor, where that found holds the lines of several at a common fraction; else the same.
+    """The comb of one rotor, where that found holds the lines of several; else the same.
 
     Parameters
     ----------
@@ -45,41 +46,108 @@ def of_one_rotor(data: Periodogram, found: Candidate) -> Candidate:
     found : Candidate
         The comb found in it.
     """
-    # lines that come back from the other end of the span lie between a comb's own
-    if data.one_channel or may_come_back(max(found.high, -found.low), found.spacing):
+    low, high = COARSER * found.spacing, spacing_limits(data.pulses, data.prf_hz)[1]
+    if data.one_channel or low >= high:
         return found
-    there, _ = _lines_there(data, found)
-    highest = spacing_limits(data.pulses, data.prf_hz)[1]
-    multiples = np.array([multiple for multiple in MULTIPLES if multiple * found.spacing <= highest])
-    if there > FEW_THERE or not len(multiples):
+    own = _told_by_presence(data, found)
+    if own.there > FEW_THERE or own.mean_there < LOUD_NATS:
         return found
-    steps = factors_about(data.pulses, OFF_BINS * FINE_STEPS, FINE_STEPS)
+    # the outermost line within the span moves by half a bin from one to the next
+    spacings = np.geomspace(low, high, int(np.ceil(np.log(high / low) * data.pulses)))
     # such a comb may count about any of its lines, or about a place at rest where none is seen
     centres = np.array(sorted({found.centre, *data.strong.centres}))
-    tried = np.tile(found.spacing * multiples[:, None] * steps, (len(centres), 1))
-    about = np.repeat(centres, len(multiples))
-    spacings, (scores, lows, highs) = loudest_of_each(data, tried, about)
-    each = zip(*(values.tolist() for values in (spacings, about, lows, highs, scores)), strict=True)
-    whole = [one for one in starmap(Candidate, each) if _is_whole(data, one)]
-    best = max((_with_its_flashes(data, one) for one in whole), key=lambda one: one.score, default=found)
-    return best if best.score > WHOLE_SHARE * found.score else found
+    about, tried = np.repeat(centres, len(spacings)), np.tile(spacings, len(centres))
+    loudest = np.argsort(-heights(data.contrast, tried, about), kind="stable")[:LOUDEST]
+    steps = factors_about(data.pulses, FINE_STEPS, 2 * FINE_STEPS)
+    spacings, (scores, lows, highs) = loudest_of_each(data, tried[loudest, None] * steps, about[loudest])
+    each = zip(*(values.tolist() for values in (spacings, about[loudest], lows, highs, scores)), strict=True)
+    # all of its lines may lie to one side
+    sides = (_told_by_presence(data, side) for side in (replace(found, low=0), replace(found, high=0)))
+    told = max(one.told for one in (own, *sides))
+    coarser = [_with_its_flashes(data, one) for one in starmap(Candidate, each)]
+    believed = [one for one in coarser if _is_rotors(data, one, found, told)]
+    return max(believed, key=lambda one: one.score, default=found)
 
 
-def _lines_there(data: Periodogram, comb: Candidate) -> tuple[float, float]:
-    """Share of a comb's lines, of those that can be seen, that are there; and what one speaks for on average [nats]."""
+def _is_rotors(data: Periodogram, comb: Candidate, found: Candidate, found_told: float) -> bool:
+    """Whether a coarser comb is one rotor's and the one found holds the lines of several."""
+    there, mean, _, told = _told_by_presence(data, comb)
+    multiple = comb.spacing / found.spacing
+    if abs(multiple / round(multiple) - 1) * data.pulses <= OFF_BINS:
+        # lines that come back from the other end of the span lie between a comb's own
+        comes_back = may_come_back(max(found.high, -found.low), found.spacing)
+        is_whole = there > WHOLE_THERE and mean > WHOLE_MEAN_NATS
+        return is_whole and not comes_back and comb.score > WHOLE_SHARE * found.score
+    if there < MOST_THERE or mean < LEAST_MEAN_NATS or told < max(LEAST_TOLD, MORE_TOLD * found_told):
+        return False
+    reaches = _reach(comb) > SHARE_OF_REACH * min(_reach(found), 0.5)
+    return reaches and told * comb.score > SHARE_OF_BOTH * found_told * found.score
+
+
+def _reach(comb: Candidate) -> float:
+    """How far lines reach from the centre [cycles a sample]."""
+    return max(comb.high, -comb.low) * comb.spacing
+
+
+class _Presence(NamedTuple):
+    """Which of a comb's lines are there, of those that can be seen.
+
+    Parameters
+    ----------
+    there : float
+        Their share.
+    mean : float
+        What a line, there or not, speaks for the comb on average [nats].
+    mean_there : float
+        The same of those that are there.
+    told : float
+        How far the share is from chance, out to the order where that is furthest [nats], at least 0.
+    """
+
+    there: float
+    mean: float
+    mean_there: float
+    told: float
+
+
+def _told_by_presence(data: Periodogram, comb: Candidate) -> _Presence:
+    """What the lines of a comb say by being there.
+
+    By chance as many are there as of all places as near to the centre: the log likelihood ratio of so many of so many
+    against that share.
+    """
     order = np.arange(comb.low, comb.high + 1)
-    frequency = comb.centre + comb.spacing * order[order != 0]
-    nats: NDArray[np.float32] = data.contrast.rows[:, data.bins_of(frequency[data.usable(frequency)])]
+    frequency = comb.centre + comb.spacing * order
+    seen = data.usable(frequency) & (order != 0)
+    nats: NDArray[np.float32] = data.contrast.rows[:, data.bins_of(frequency[seen])]
     if not nats.size:
-        return 1.0, 0.0
-    best = nats[nats.sum(axis=1).argmax()]
-    return float((best > 0).mean()), float(best.mean())
+        return _Presence(1.0, 0.0, 0.0, 0.0)
+    loudest = int(nats.sum(axis=1).argmax())
+    row, own = data.contrast.rows[loudest], nats[loudest]
+    there = own > 0
+    last = max(comb.high, -comb.low)
+    lines, of_lines = _up_to_order(np.abs(order[seen]), there, last)
+    size = len(row)
+    away = np.arange(size) / size - comb.centre
+    turns = (away - np.rint(away)) / comb.spacing
+    near = data.seen & (turns > comb.low - 0.5) & (turns < comb.high + 0.5)
+    places, of_places = _up_to_order(np.rint(np.abs(turns[near])).astype(np.intp), row[near] > 0, last)
+    least = 0.5 / np.maximum(lines, 1)
+    share = of_lines / np.maximum(lines, 1)
+    chance = np.clip(of_places / np.maximum(places, 1), least, 1 - least)
+    some = np.clip(share, least, 1 - least)
+    told = lines * (some * np.log(some / chance) + (1 - some) * np.log((1 - some) / (1 - chance)))
+    most = float(np.where(share > chance, told, 0.0).max())
+    return _Presence(float(share[-1]), float(own.mean()), float(own[there].sum() / max(there.sum(), 1)), most)
 
 
-def _is_whole(data: Periodogram, comb: Candidate) -> bool:
-    """True where nearly all lines of a comb are there, and speak for it loudly."""
-    there, nats = _lines_there(data, comb)
-    return there > MOST_THERE and nats > LEAST_MEAN_NATS
+def _up_to_order(
+    orders: NDArray[np.intp], there: NDArray[np.bool_], last: int
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """How many of these places are of each order or a lower one, and how many of those are there, shape (last + 1,)."""
+    orders = np.minimum(orders, last)
+    count, held = (np.bincount(orders, weights, last + 1).cumsum() for weights in (None, there))
+    return count, held
 
 
 def _with_its_flashes(data: Periodogram, comb: Candidate) -> Candidate:
