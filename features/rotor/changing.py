@@ -59,7 +59,7 @@ class ChangingSeparation(Separation):
         if self.fitted_out or not self.fits:
             return False
         about = power_about(self.data, self.rest.samples, self.fits[0].centre)
-        return left_over(about, self.fits, self.reach * self.nominal)[0] > LEFT_WANDERING
+        return left_over(about, self.fits, self.reach * self.nominal).share > LEFT_WANDERING
 
     def in_turn(self, sought: list[Sought]) -> Iterator[Sought]:
         """These."""

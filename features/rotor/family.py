@@ -22,7 +22,7 @@ from .past_edge import told_no_further
 from .periodogram import Level, Periodogram, prepared_again
 from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
 from .turning import DEGREES, bend, is_sure
-from .unresolved import judged, not_all
+from .unresolved import judged, left_over, not_all, power_about
 from .weak_lines import by_rotation, without_weak_lines
 
 #: What the lines tell of the rate grows by so much once its change is taken out, where several rotors were found that
@@ -38,6 +38,10 @@ TWIN_BINS = 1.5
 
 #: Gauss-Newton steps at most for both combs of a helicopter, whose change is known from one of them.
 GEARED_STEPS = 4
+
+#: Rates that change leave so much where they are fitted as steady ones, in its deviations: steady ones near the noise
+#: leave 0 to 3 of these, and of those below -7 dB none is told so that was not before.
+CHANGE_LEAVES = 2.0
 
 #: Where the edge of the lines fitted and that of all about the orders differ by so many deviations, the fit of outer
 #: lines went astray.
@@ -318,6 +322,8 @@ def _changing(data: Periodogram, family: Family, edge: float) -> Family:
         left = ahead_left(data, known.fits, known.rest)
         if not is_sure(*left):
             return replace(family, ahead=left)
+    elif left_over(power_about(data, known.rest, known.fits[0].centre), known.fits, edge).deviations < CHANGE_LEAVES:
+        return family
     unsure = replace(family, rotors=not_all(known, data)) if known.resolved else family
     reach = max(round(edge / comb.chopping), 1)
     fills_span = family.fills_span or comb.fit.is_folded

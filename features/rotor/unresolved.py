@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,10 +142,26 @@ def power_about(data: Periodogram, rest: NDArray[np.complex128], centre: float) 
     return np.abs(away - np.rint(away)), power, seen
 
 
-def left_over(about: _About, fits: Sequence[CombFit], edge: float) -> tuple[float, bool]:
-    """What is left within the band: its share of the lines' power, and whether it may be a rotor.
+class Left(NamedTuple):
+    """What combs leave within their band.
 
-    The share is 0 where that is not clearly more than the noise beyond the band.
+    Parameters
+    ----------
+    share : float
+        Of the lines' power, 0 where it is not clearly more than the noise beyond the band.
+    may_hide : bool
+        Whether it may be a rotor.
+    deviations : float
+        How far it is from noise, in its own deviations; infinite where too little of the band is seen to tell.
+    """
+
+    share: float
+    may_hide: bool
+    deviations: float
+
+
+def left_over(about: _About, fits: Sequence[CombFit], edge: float) -> Left:
+    """What is left within the band.
 
     Fitted lines take noise out with them: each as much as it was let free, those that lie in one another only once.
     """
@@ -154,7 +171,7 @@ def left_over(about: _About, fits: Sequence[CombFit], edge: float) -> tuple[floa
     within = usable & (away < high) & (away > low)
     beyond = usable & (away > 1.1 * edge)
     if within.sum() < LEAST_BINS:
-        return 0.0, False
+        return Left(0.0, False, np.inf)
     # where lines come back from the other end of the span, or leave too little of it, the floor tells the noise
     nothing_beyond = edge > 0.5 or beyond.sum() < LEAST_BINS
     noise = 1.0 if nothing_beyond else float(power[beyond].mean())
@@ -170,8 +187,9 @@ def left_over(about: _About, fits: Sequence[CombFit], edge: float) -> tuple[floa
         apart = np.minimum(1.0, (1 + order[inside] * range_bins) / len(fits))
         taken += float((apart * fit.snr[inside] / (1 + fit.snr[inside])).sum())
     deviation = noise * float(np.sqrt(1 / within.sum() + 1 / max(beyond.sum(), LEAST_BINS)))
-    most = over + noise * taken / within.sum() + HIDDEN_DEVIATIONS * deviation
-    return share, most * within.sum() > held
+    all_over = over + noise * taken / float(within.sum())
+    may_hide = (all_over + HIDDEN_DEVIATIONS * deviation) * float(within.sum()) > held
+    return Left(share, may_hide, all_over / deviation)
 
 
 def _stands_past(about: _About, fits: Sequence[CombFit], edge: float) -> bool:
@@ -251,7 +269,7 @@ def judged(
         How far out lines were fitted [cycles a sample from the body], where that may not be as far as they reach.
     """
     about = power_about(data, rotors.rest, rotors.fits[0].centre)
-    share, hidden = left_over(about, rotors.fits, edge)
+    share, hidden, _ = left_over(about, rotors.fits, edge)
     any_rate = 2 * RATE_SPREAD * float(rotors.rates.mean())  # of one airframe
     if share > LEFT_WANDERING:
         rotors = replace(rotors, unseen=any_rate)

@@ -275,3 +275,24 @@ def test_lines_that_lie_in_one_another_are_held_back_however_strong():
     assert alone == pytest.approx(1.0, rel=0.01)
     assert strong < 2e-6
     assert shared == pytest.approx(1e-4, rel=0.02)
+
+
+def test_steady_rotors_near_the_noise_are_seldom_sought_among_changes(monkeypatch):
+    # they are not told apart, and most leave nothing that a change of their rates would explain; to seek it is dear
+    class SoughtError(Exception):
+        pass
+
+    def sought(*_):
+        raise SoughtError
+
+    monkeypatch.setattr(family_module, "ChangingSeparation", sought)
+
+    def is_sought(seed, change, snr_db):
+        try:
+            family_of(several(seed, 4, change, snr_db=snr_db)[0])
+        except SoughtError:
+            return True
+        return False
+
+    assert sum(is_sought(seed, 0.0, -8) for seed in range(16)) <= 6
+    assert all(is_sought(seed, 0.02, 10) for seed in range(4))
