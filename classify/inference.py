@@ -292,7 +292,7 @@ class Classifier:
         outside = self.envelope.reason(carrier_hz, prf_hz, records.shape[-1])
         largest = largest_part(records)
         live = largest >= LEAST_PART
-        if outside is None and live.all():
+        if outside is None and np.count_nonzero(live) == live.size:
             told = self._told(records, None, carrier_hz, prf_hz)
             labels, why = self.decide(told[:, :-1])
             return told, labels, np.array(why, dtype=np.str_)

@@ -47,7 +47,7 @@ def by_the_papers_rules(rendering: Rendering, threshold_db: float) -> PaperMeasu
     mean_amplitude = np.sqrt(spectrum.relative_power[quiet]).mean()
     low, high = threshold_band_hz(spectrum, float(20 * np.log10(mean_amplitude)) + threshold_db)
     body = body_line(spectrum)
-    chopping = cepstral_chopping(spectrum, notch_mask(spectrum, body))
+    chopping = cepstral_chopping(spectrum, notch_mask(spectrum, body.index))
     shift = -2 * float(body.velocity_mps) / radar.wavelength_m
     return PaperMeasures(float(high - low), first_lines_hz(rendering), float(chopping.frequency_hz), shift)
 

@@ -188,6 +188,7 @@ def comb_levels_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     plan = comb_plan(spectrum.bins, spectrum.pulses, spectrum.carrier_hz, spectrum.prf_hz, spectrum.window)
     if plan is not None:
         heights = comb_heights(spectrum.relative_power[..., plan.band], weights(mask[..., plan.band]), plan)
+        # which of several below 0 is taken is no matter: none shows
         loudest = np.maximum.reduceat(as_ordered(_loudest_sums(heights, plan)), plan.spans[0], axis=-1)
         out[..., 0, ::-1][..., plan.seen] = to_db(loudest.view(np.float32), 0.0)
     return out
@@ -225,11 +226,10 @@ def comb_heights(power: NDArray[np.floating], kept: NDArray[np.floating], plan: 
 
 
 def _loudest_sums(heights: NDArray[np.float32], plan: CombPlan) -> NDArray[np.float32]:
-    """The largest of the sums of each spacing over its deviation in noise, not below 0, shape (..., spacings)."""
+    """The largest of the sums of each spacing over its deviation in noise, shape (..., spacings)."""
     first = plan.lags[1, 0]
     total = heights.take(plan.lags[0], axis=-1, mode="wrap")
     best = total * plan.per_deviation[0]
-    np.maximum(best, np.float32(0), out=best)
     ended = 1
     for number in range(2, ENDS[-1] + 1):
         held = plan.held[number - 1]  # longer periods have no such multiple

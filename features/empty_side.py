@@ -18,6 +18,8 @@ EMPTY_SHARE = np.float32(10 ** (LOWEST_DB / 10))
 #: Of the noise, which is the same for all records of so many pulses.
 _SEED = 20
 
+_NONE = np.empty(0, np.intp)
+
 
 @lru_cache(maxsize=16)
 def side_noise(pulses: int) -> NDArray[np.complex64]:
@@ -60,8 +62,9 @@ def filled_sides(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray
         Theirs.
     """
     empty = empty_sides(spectrum)
-    if np.count_nonzero(empty):
-        empty &= spectrum.noise_shows[:, None]
+    if not np.count_nonzero(empty):  # as most are
+        return _NONE, iq[:0]
+    empty &= spectrum.noise_shows[:, None]
     rows = np.flatnonzero(empty[:, 0] | empty[:, 1])
     if not len(rows):
         return rows, iq[:0]

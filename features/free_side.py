@@ -43,4 +43,4 @@ def with_free_side(spectrum: Spectrum) -> Spectrum:
     if not (comes_down or holds_lines):
         return spectrum
     floor = np.float32(max(low / high, float(LEAST_FLOOR * power.mean())))
-    return replace(spectrum, relative_power=power / floor, floor=np.asarray(spectrum.floor * floor))
+    return replace(spectrum, relative_power=power / floor, transform_floor=np.asarray(spectrum.transform_floor * floor))

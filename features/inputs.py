@@ -12,7 +12,7 @@ from .change import change_db, parts_db
 from .comb_levels import comb_levels_db
 from .empty_side import filled_sides
 from .joint import joint_vector, stft_image
-from .notch import Body, body_line, notch_mask
+from .notch import Body, body_line, notch_mask, strongest_bin, weights
 from .one_channel import made_analytic
 from .schema import AXIS_BINS, INPUT_SHAPES
 from .spectrum import as_complex, doppler_spectrum
@@ -130,20 +130,28 @@ class Dwells:
         return {name: getattr(self, f"_{name}") for name in sorted(names, key=lambda name: (name == "features", name))}
 
     @cached_property
+    def _strongest(self) -> NDArray[np.intp]:
+        return strongest_bin(self._spectrum_of_dwell)
+
+    @cached_property
     def _body(self) -> Body:
-        return body_line(self._spectrum_of_dwell)
+        return body_line(self._spectrum_of_dwell, self._strongest)
 
     @cached_property
     def _mask(self) -> NDArray[np.bool_]:
-        return notch_mask(self._spectrum_of_dwell, self._body)
+        return notch_mask(self._spectrum_of_dwell, self._strongest)
+
+    @cached_property
+    def _kept(self) -> NDArray[np.float32]:
+        return weights(self._mask)
 
     @cached_property
     def _cadence(self) -> NDArray[np.float32]:
-        return cadence_db(self._spectrum_of_dwell, self._mask)
+        return cadence_db(self._spectrum_of_dwell, self._kept)
 
     @cached_property
     def _combs(self) -> NDArray[np.float32]:
-        return comb_levels_db(self._spectrum_of_dwell, self._mask)
+        return comb_levels_db(self._spectrum_of_dwell, self._kept)
 
     @cached_property
     def _pool(self) -> Pooling:

@@ -90,7 +90,7 @@ def joint_vector(image: NDArray[np.float32], spectrum: Spectrum) -> NDArray[np.f
         columns[f"joint_mean_{low:g}_{high:g}_db"] = band.mean(axis=-1)
         columns[f"joint_swing_{low:g}_{high:g}_db"] = band.std(axis=-1)
         columns[f"joint_peak_{low:g}_{high:g}_db"] = band.max(axis=-1)
-    return lay_out(columns, JOINT_FEATURES, spectrum.floor.shape)
+    return lay_out(columns, JOINT_FEATURES, spectrum.transform_floor.shape)
 
 
 def _flashes(fast: NDArray[np.float32], spectrum: Spectrum) -> tuple[NDArray, NDArray, NDArray]:

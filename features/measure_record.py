@@ -85,7 +85,7 @@ def measure_record(
         return out | {"reason": "no signal"}
     iq, data, spectrum, family, why = _found(iq, data, spectrum, blades)
     body = body_line(spectrum)
-    mask = notch_mask(spectrum, body)
+    mask = notch_mask(spectrum, body.index)
     low, high = threshold_band_hz(spectrum, PAPER_THRESHOLD_DB)
     out["threshold_bandwidth_hz"] = float(high - low)
     out["notch_residual_db"] = float(notch_residual_db(spectrum, mask))

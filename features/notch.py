@@ -51,7 +51,13 @@ class Body:
         return Body(self.index[rows], self.velocity_mps[rows], self.level_db[rows])
 
 
-def body_line(spectrum: Spectrum) -> Body:
+def strongest_bin(spectrum: Spectrum) -> NDArray[np.intp]:
+    """The strongest bin of each spectrum, the first of like ones, shape (...)."""
+    power = spectrum.relative_power
+    return (power >= np.maximum.reduce(power, axis=-1, keepdims=True) * EQUAL_SHARE).argmax(axis=-1)
+
+
+def body_line(spectrum: Spectrum, index: NDArray[np.intp] | None = None) -> Body:
     """Find the strongest line of each spectrum, refined by a parabola through three levels in dB.
 
     The window's main lobe is close to a Gaussian, of which the logarithm is a parabola: the error stays below 2 % of a
@@ -61,13 +67,15 @@ def body_line(spectrum: Spectrum) -> Body:
     ----------
     spectrum : Spectrum
         Spectra, shape (..., bins).
+    index : ndarray of int, shape (...), optional
+        From `strongest_bin`, where it is known.
 
     Returns
     -------
     Body
     """
     power, bins = spectrum.relative_power, spectrum.bins
-    index = (power >= np.maximum.reduce(power, axis=-1, keepdims=True) * EQUAL_SHARE).argmax(axis=-1)
+    index = strongest_bin(spectrum) if index is None else index
     around = (index + _AROUND.reshape(-1, *([1] * index.ndim))) % bins
     around += np.arange(0, index.size * bins, bins).reshape(index.shape)  # each spectrum's first: one behind the other
     left, middle, right = to_db(power.reshape(-1)[around])
@@ -86,7 +94,7 @@ def parabola_offset(
     return np.minimum(np.maximum(offset, np.float32(-0.5)), np.float32(0.5))
 
 
-def notch_mask(spectrum: Spectrum, body: Body) -> NDArray[np.bool_]:
+def notch_mask(spectrum: Spectrum, index: NDArray[np.intp]) -> NDArray[np.bool_]:
     """True outside the notches about the body line and about velocity zero, shape (..., bins).
 
     They reach `NOTCH_MPS` to each side. Distances are taken around the circle of the unambiguous velocities. The bin at
@@ -97,15 +105,15 @@ def notch_mask(spectrum: Spectrum, body: Body) -> NDArray[np.bool_]:
     ----------
     spectrum : Spectrum
         Spectra, shape (..., bins).
-    body : Body
-        Their strongest lines.
+    index : ndarray of int, shape (...)
+        Bin of their strongest lines.
 
     Returns
     -------
     ndarray of bool, shape (..., bins)
     """
     keep, away = notches(spectrum.bins, half_width_bins(spectrum))
-    return away[spectrum.bins - body.index] & keep
+    return away[spectrum.bins - index] & keep
 
 
 def half_width_bins(spectrum: Spectrum) -> int:

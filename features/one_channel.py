@@ -29,16 +29,16 @@ def made_analytic(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
 
     What holds no noise at all was never recorded: two equal blades at rest give such a record, of which I is all.
     """
-    first = iq[..., :1]
+    first = iq[..., 0]
     real, imaginary = np.abs(first.real), np.abs(first.imag)
     # few records are looked at further than their first pulse
-    one = np.asarray(((real == imaginary) | (real == 0) | (imaginary == 0)).any(axis=-1))
-    if one.any():
+    one = np.asarray((real == imaginary) | (real == 0) | (imaginary == 0))
+    if np.count_nonzero(one):
         one[one] = one_channel(iq[one])
-    if one.any():
+    if np.count_nonzero(one):
         # whatever the radar is
         one[one] = doppler_spectrum(iq[one, :NOISE_PULSES], carrier_hz=1.0, prf_hz=1.0).noise_shows
-    if not one.any():
+    if not np.count_nonzero(one):
         return iq
     made, some = iq.copy(), iq[one]
     channel = np.where(some.real.any(axis=-1, keepdims=True), some.real, some.imag)

@@ -38,7 +38,7 @@ FLOOR_BLOCKS, EMPTY_RATIO = 64, np.array(4, np.float32)
 
 
 #: What a spectrum holds of each record.
-_OF_RECORDS = ("relative_power", "floor", "scale", "transform", "side_floors")
+_OF_RECORDS = ("relative_power", "transform_floor", "scale", "transform", "side_floors")
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,9 +51,8 @@ class Spectrum:
         Power over the noise floor [1], centred (fftshift): noise alone has mean 1 within 3 % from 700 pulses on; of
         shorter dwells the floor is too high, through Kaiser's window by 0.2 dB at 128 to 500 pulses, 0.4 at 64, 1 at 32
         and 1.7 at 16, through Hann's by 0.6 times that.
-    floor : ndarray of float64, shape (...)
-        Noise power a sample, in the square of the input's unit; 0 for an all-zero record. float64, because the square
-        of a sample may leave float32.
+    transform_floor : ndarray of float32, shape (...)
+        Noise power of a bin of `transform`; 0 for an all-zero record.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz].
     pulses : int
@@ -69,7 +68,7 @@ class Spectrum:
     """
 
     relative_power: NDArray[np.float32]
-    floor: NDArray[np.float64]
+    transform_floor: NDArray[np.float32]
     carrier_hz: float
     prf_hz: float
     pulses: int
@@ -96,15 +95,18 @@ class Spectrum:
         return self.relative_power.shape[-1]
 
     @property
-    def transform_floor(self) -> NDArray[np.float32]:
-        """Noise power of a bin of `transform`, shape (...)."""
-        return (self.floor * np.square(self.scale[..., 0], dtype=np.float64)).astype(np.float32)
+    def floor(self) -> NDArray[np.float64]:
+        """Noise power a sample, in the square of the input's unit, shape (...).
+
+        float64, because the square of a sample may leave float32.
+        """
+        return np.asarray(self.transform_floor / np.square(self.scale[..., 0], dtype=np.float64), np.float64)
 
     @property
     def noise_shows(self) -> NDArray[np.bool_]:
         """Whether there is noise between the lines, more than `LEAST_FLOOR`, shape (...)."""
         shows = means(self.relative_power) * LEAST_FLOOR < SHOWN_SHARE
-        return np.asarray(shows & (self.floor > 0), np.bool_)
+        return np.asarray(shows & (self.transform_floor > 0), np.bool_)
 
     @property
     def wavelength_m(self) -> float:
@@ -469,6 +471,5 @@ def doppler_spectrum(iq: ArrayLike, *, carrier_hz: float, prf_hz: float, window:
     power = power_of(transform)
     sides = _side_floors(power, window)
     floor = np.maximum(_floor_of(sides), _least_floor(power))
-    natural = floor / np.square(scale[..., 0], dtype=np.float64)
     relative = np.multiply(power, per_floor(floor)[..., None], out=power)
-    return Spectrum(relative, natural, carrier_hz, prf_hz, samples.shape[-1], scale, transform, window, sides)
+    return Spectrum(relative, floor, carrier_hz, prf_hz, samples.shape[-1], scale, transform, window, sides)

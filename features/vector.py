@@ -167,4 +167,4 @@ def feature_vector(
     }
     for names, levels in zip(BANDS, band_levels_db(axis_db), strict=True):
         columns.update(zip(names, levels.reshape(-1, len(names)).T, strict=True))
-    return lay_out(columns, FEATURES, spectrum.floor.shape)
+    return lay_out(columns, FEATURES, spectrum.transform_floor.shape)

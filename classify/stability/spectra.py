@@ -11,7 +11,7 @@ from bladewing.features.cadence import CLIP, LEAST_MEAN, cadence_db, cadence_pla
 from bladewing.features.chopping import CLIP_DB, cepstrum, noise_shape
 from bladewing.features.comb_levels import comb_heights, comb_plan
 from bladewing.features.inputs import model_inputs
-from bladewing.features.notch import body_line, notch_mask, residual
+from bladewing.features.notch import notch_mask, residual, strongest_bin
 from bladewing.features.schema import INPUT_SHAPES
 from bladewing.features.spectrum import (
     LEAST_FLOOR,
@@ -162,7 +162,7 @@ def _long(spectrum: Spectrum) -> Spectrum:
 def _notched(iq: NDArray[np.complex64]) -> tuple[Spectrum, NDArray[np.bool_]]:
     """A record's spectrum, and where it counts."""
     spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ, window=HANN)
-    return spectrum, notch_mask(spectrum, body_line(spectrum))
+    return spectrum, notch_mask(spectrum, strongest_bin(spectrum))
 
 
 def _exact_cepstrum(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.longdouble]:

@@ -5,7 +5,7 @@ import pytest
 from bladewing.features import doppler_spectrum, model_inputs
 from bladewing.features.axis import UNSEEN_DB
 from bladewing.features.cadence import cadence_db, cadence_edges_hz, cadence_plan, power_over_time
-from bladewing.features.notch import body_line, notch_mask
+from bladewing.features.notch import notch_mask, strongest_bin
 from bladewing.features.schema import CADENCE_BINS, FEATURES
 from bladewing.features.window import HANN
 from hypothesis import given, settings
@@ -95,7 +95,7 @@ def test_it_is_what_its_definition_says():
     """Every step again in float64, sample by sample and line by line."""
     iq = rotors([58.6, 61.0], velocity_mps=4.0) + 0.7 * white(np.random.default_rng(5), PULSES)
     spectrum = doppler_spectrum(iq, **RADAR, window=HANN)
-    mask = notch_mask(spectrum, body_line(spectrum))
+    mask = notch_mask(spectrum, strongest_bin(spectrum))
     plan = cadence_plan(PULSES, PRF_HZ, HANN)
     window = HANN.taper(PULSES)
     kept = np.fft.ifftshift(mask) * np.fft.fft(np.asarray(iq, np.complex64) * window, spectrum.bins)

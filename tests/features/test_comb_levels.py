@@ -17,7 +17,7 @@ from bladewing.features.comb_levels import (
     line_nats,
 )
 from bladewing.features.evidence import LINE_CAP, MISSING_SHARE
-from bladewing.features.notch import body_line, notch_mask
+from bladewing.features.notch import notch_mask, strongest_bin
 from bladewing.features.schema import COMB_BINS, FEATURES
 from bladewing.features.spectrum import centred_power
 from bladewing.features.window import HANN
@@ -145,7 +145,7 @@ def test_it_is_what_its_definition_says(pulses):
     """Every step again in float64, spacing by spacing."""
     iq = 0.5 * rotors([58.6, 61.0], velocity_mps=4.0)[:pulses] + white(np.random.default_rng(5), pulses)
     spectrum = doppler_spectrum(iq, **RADAR, window=HANN)
-    mask = notch_mask(spectrum, body_line(spectrum))
+    mask = notch_mask(spectrum, strongest_bin(spectrum))
     plan = plan_of(pulses)
     assert np.abs(spectrum.velocity_mps[plan.band]).max() <= REACH_MPS
     np.testing.assert_allclose(spectrum.velocity_mps[plan.band].sum(), 0, atol=1e-6)  # as far to both sides

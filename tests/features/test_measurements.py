@@ -5,7 +5,7 @@ import pytest
 from bladewing.features import doppler_spectrum
 from bladewing.features.bandwidth import energy_band_mps, threshold_band_hz
 from bladewing.features.chopping import cepstral_chopping, noise_shape
-from bladewing.features.notch import LOBE_BINS, body_line, notch_mask, notch_residual_db, residual
+from bladewing.features.notch import LOBE_BINS, body_line, notch_mask, notch_residual_db, residual, strongest_bin
 from bladewing.features.smearing import smearing_index
 from bladewing.features.window import HANN, KAISER
 from hypothesis import given, settings
@@ -17,7 +17,7 @@ from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, WAVELENGTH_M, rotors, to
 def measured(iq):
     spectrum = doppler_spectrum(iq, **RADAR)
     body = body_line(spectrum)
-    mask = notch_mask(spectrum, body)
+    mask = notch_mask(spectrum, body.index)
     return spectrum, body, mask
 
 
@@ -45,7 +45,7 @@ def test_noise_and_a_lone_line_have_no_comb():
 def test_no_range_to_search_gives_nan():
     iq = white(np.random.default_rng(0), 2, 16)
     spectrum = doppler_spectrum(iq, carrier_hz=CARRIER_HZ, prf_hz=2e3)
-    found = cepstral_chopping(spectrum, notch_mask(spectrum, body_line(spectrum)))
+    found = cepstral_chopping(spectrum, notch_mask(spectrum, strongest_bin(spectrum)))
     assert np.isnan(found.frequency_hz).all()
     assert not found.strength.any()
 
@@ -125,7 +125,7 @@ def test_the_notch_takes_the_body_and_rest_and_nothing_else():
 def test_the_notch_is_as_wide_as_the_main_lobe_at_coarse_resolution():
     iq = white(np.random.default_rng(0), 128)
     spectrum = doppler_spectrum(iq, carrier_hz=3e9, prf_hz=20e3)
-    mask = notch_mask(spectrum, body_line(spectrum))
+    mask = notch_mask(spectrum, strongest_bin(spectrum))
     centre = spectrum.bins // 2
     assert not mask[centre - LOBE_BINS : centre + LOBE_BINS + 1].any()
 
