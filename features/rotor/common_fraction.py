@@ -27,8 +27,10 @@ FEW_THERE, LOUD_NATS = 0.75, 1.6
 #: loud as the louder one, and outer lines by chance are a far smaller share. Unlike blades leave the comb as it is.
 OFF_BINS, WHOLE_THERE, WHOLE_MEAN_NATS, WHOLE_SHARE = 4, 0.85, 2.5, 0.65
 
-#: Any other is where this holds, where lines reach this share as far, and where their being there says so much [nats],
-#: so many times as much as it does of the comb found, and times what they speak for this share.
+#: Any other, or a multiple of more times than this, near which one in twenty lies by chance, is where this holds, where
+#: lines reach this share as far, and where their being there says so much [nats], so many times as much as it does of
+#: the comb found, and times what they speak for this share.
+FEW_TIMES = 4
 MOST_THERE, LEAST_MEAN_NATS = 0.78, 2.0
 SHARE_OF_REACH, LEAST_TOLD, MORE_TOLD, SHARE_OF_BOTH = 0.75, 10.0, 1.08, 0.6
 
@@ -77,7 +79,10 @@ def _is_rotors(data: Periodogram, comb: Candidate, found: Candidate, found_told:
         # lines that come back from the other end of the span lie between a comb's own
         comes_back = may_come_back(max(found.high, -found.low), found.spacing)
         is_whole = there > WHOLE_THERE and mean > WHOLE_MEAN_NATS
-        return is_whole and not comes_back and comb.score > WHOLE_SHARE * found.score
+        if is_whole and not comes_back and comb.score > WHOLE_SHARE * found.score:
+            return True
+        if round(multiple) <= FEW_TIMES:
+            return False
     if there < MOST_THERE or mean < LEAST_MEAN_NATS or told < max(LEAST_TOLD, MORE_TOLD * found_told):
         return False
     reaches = _reach(comb) > SHARE_OF_REACH * min(_reach(found), 0.5)
