@@ -5,8 +5,8 @@ that holds the lines of both, more than those of either; and any fine one meets 
 rotor's comb nearly all lines are there, far more than of the places between them, and of such a one few are.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
-from itertools import starmap
 from typing import NamedTuple
 
 import numpy as np
@@ -63,12 +63,25 @@ def of_one_rotor(data: Periodogram, found: Candidate) -> Candidate:
     steps = factors_about(data.pulses, FINE_STEPS, 2 * FINE_STEPS)
     spacings, (scores, lows, highs) = loudest_of_each(data, tried[loudest, None] * steps, about[loudest])
     each = zip(*(values.tolist() for values in (spacings, about[loudest], lows, highs, scores)), strict=True)
+    coarser = _apart((Candidate(*values) for values in each), OFF_BINS / data.pulses)
     # all of its lines may lie to one side
     sides = (_told_by_presence(data, side) for side in (replace(found, low=0), replace(found, high=0)))
     told = max(one.told for one in (own, *sides))
-    coarser = [_with_its_flashes(data, one) for one in starmap(Candidate, each)]
-    believed = [one for one in coarser if _is_rotors(data, one, found, told)]
-    return max(believed, key=lambda one: one.score, default=found)
+    rotors = (_with_its_flashes(data, one) for one in coarser)
+    return max((one for one in rotors if _is_rotors(data, one, found, told)), key=_score, default=found)
+
+
+def _score(comb: Candidate) -> float:
+    return comb.score
+
+
+def _apart(combs: Iterable[Candidate], least: float) -> list[Candidate]:
+    """The loudest combs, each further from louder ones than so much, relative: of many alike one is whole by chance."""
+    taken: list[Candidate] = []
+    for comb in sorted(combs, key=_score, reverse=True):
+        if all(abs(comb.spacing / other.spacing - 1) > least for other in taken):
+            taken.append(comb)
+    return taken
 
 
 def _is_rotors(data: Periodogram, comb: Candidate, found: Candidate, found_told: float) -> bool:

@@ -39,8 +39,8 @@ TWIN_BINS = 1.5
 #: Gauss-Newton steps at most for both combs of a helicopter, whose change is known from one of them.
 GEARED_STEPS = 4
 
-#: Rates that change leave so much where they are fitted as steady ones, in its deviations: steady ones near the noise
-#: leave 0 to 3 of these, and of those below -7 dB none is told so that was not before.
+#: Rates that change leave so much where they are fitted as steady ones, in its deviations, or so much less than what
+#: is beyond, where their lines go on: steady ones near the noise leave 0 to 3, and below this none was ever told.
 CHANGE_LEAVES = 2.0
 
 #: Where the edge of the lines fitted and that of all about the orders differ by so many deviations, the fit of outer
@@ -322,8 +322,10 @@ def _changing(data: Periodogram, family: Family, edge: float) -> Family:
         left = ahead_left(data, known.fits, known.rest)
         if not is_sure(*left):
             return replace(family, ahead=left)
-    elif left_over(power_about(data, known.rest, known.fits[0].centre), known.fits, edge).deviations < CHANGE_LEAVES:
-        return family
+    else:
+        about = power_about(data, known.rest, known.fits[0].centre)
+        if abs(left_over(about, known.fits, edge).deviations) < CHANGE_LEAVES:
+            return family
     unsure = replace(family, rotors=not_all(known, data)) if known.resolved else family
     reach = max(round(edge / comb.chopping), 1)
     fills_span = family.fills_span or comb.fit.is_folded
