@@ -313,10 +313,11 @@ def _changing(data: Periodogram, family: Family, edge: float) -> Family:
 
     Rotors that were told apart as steady ones, and are not, must be told apart as such that change. Where one side of
     the body lies in the other, lines cross and speak for anything; so do those that come back from the other end of the
-    span, which are not sought.
+    span, which are not sought. Nor are any where steady ones come to a single comb: one record in a hundred of several
+    that change smoothly; and of rates that wander, sought for a third of all the time, one in 276 was ever told.
     """
     known, comb = family.rotors, family.comb
-    if family.gear is not None or (known.resolved and len(known.rates) == 1):
+    if family.gear is not None or len(known.rates) == 1:
         return family
     if known.resolved:
         left = ahead_left(data, known.fits, known.rest)
