@@ -314,7 +314,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
         return None, f"no comb: fewer than {LEAST_LINES} lines"
     fit = fitted[0][0]
-    reach = max(start.high, -start.low) * fit.spacing
+    reach = start.last * fit.spacing
     reach_mps = reach * data.span_mps
     if reach_mps < LEAST_REACH_MPS:
         reason = f"no rotor: lines reach {reach_mps:.1f} m/s, rotors {LEAST_REACH_MPS:.0f} m/s and more"
@@ -338,6 +338,5 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     for number in sorted({1, per_turn}):
         if of_mains(fit, data, start.score, number):
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"
-    last = max(start.high, -start.low)
-    is_sure = per_turn > 1 and not may_come_back(last, fit.spacing)  # further lines fall on every so many-th
-    return Comb(fit, fitted[1], last, per_turn, open_orders * fit.spacing, has_line, per_turn, is_sure), ""
+    is_sure = per_turn > 1 and not may_come_back(start.last, fit.spacing)  # further lines fall on every so many-th
+    return Comb(fit, fitted[1], start.last, per_turn, open_orders * fit.spacing, has_line, per_turn, is_sure), ""

@@ -91,9 +91,19 @@ class Candidate:
     score: float
 
     @property
+    def last(self) -> int:
+        """Outermost order of either side."""
+        return max(self.high, -self.low)
+
+    @property
+    def reach(self) -> float:
+        """How far its lines reach from the centre [cycles a sample]."""
+        return self.last * self.spacing
+
+    @property
     def is_folded(self) -> bool:
         """Whether its outer lines come back from the other end of the span."""
-        return bool(comes_back(max(self.high, -self.low), self.spacing))
+        return bool(comes_back(self.last, self.spacing))
 
 
 @dataclass(frozen=True)
@@ -452,7 +462,7 @@ def _folded(
         The one chosen of them.
     """
     is_loud = most > REFINED_FROM
-    ends_within = max(found.high, -found.low) * found.spacing < FILLS_SPAN
+    ends_within = found.reach < FILLS_SPAN
     if fastest_tip(data) <= 0.5 or (is_loud and ends_within):
         return None
     # outer lines are some spans away: they tell the spacing so much finer than lines within the span do

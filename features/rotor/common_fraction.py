@@ -7,6 +7,7 @@ rotor's comb nearly all lines are there, far more than of the places between the
 
 from collections.abc import Iterable
 from dataclasses import replace
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -68,17 +69,13 @@ def of_one_rotor(data: Periodogram, found: Candidate) -> Candidate:
     sides = (_told_by_presence(data, side) for side in (replace(found, low=0), replace(found, high=0)))
     told = max(one.told for one in (own, *sides))
     rotors = (_with_its_flashes(data, one) for one in coarser)
-    return max((one for one in rotors if _is_rotors(data, one, found, told)), key=_score, default=found)
-
-
-def _score(comb: Candidate) -> float:
-    return comb.score
+    return max((one for one in rotors if _is_rotors(data, one, found, told)), key=attrgetter("score"), default=found)
 
 
 def _apart(combs: Iterable[Candidate], least: float) -> list[Candidate]:
     """The loudest combs, each further from louder ones than so much, relative: of many alike one is whole by chance."""
     taken: list[Candidate] = []
-    for comb in sorted(combs, key=_score, reverse=True):
+    for comb in sorted(combs, key=attrgetter("score"), reverse=True):
         if all(abs(comb.spacing / other.spacing - 1) > least for other in taken):
             taken.append(comb)
     return taken
@@ -90,7 +87,7 @@ def _is_rotors(data: Periodogram, comb: Candidate, found: Candidate, found_told:
     multiple = comb.spacing / found.spacing
     if abs(multiple / round(multiple) - 1) * data.pulses <= OFF_BINS:
         # lines that come back from the other end of the span lie between a comb's own
-        comes_back = may_come_back(max(found.high, -found.low), found.spacing)
+        comes_back = may_come_back(found.last, found.spacing)
         is_whole = there > WHOLE_THERE and mean > WHOLE_MEAN_NATS
         if is_whole and not comes_back and comb.score > WHOLE_SHARE * found.score:
             return True
@@ -98,13 +95,8 @@ def _is_rotors(data: Periodogram, comb: Candidate, found: Candidate, found_told:
             return False
     if there < MOST_THERE or mean < LEAST_MEAN_NATS or told < max(LEAST_TOLD, MORE_TOLD * found_told):
         return False
-    reaches = _reach(comb) > SHARE_OF_REACH * min(_reach(found), 0.5)
+    reaches = comb.reach > SHARE_OF_REACH * min(found.reach, 0.5)
     return reaches and told * comb.score > SHARE_OF_BOTH * found_told * found.score
-
-
-def _reach(comb: Candidate) -> float:
-    """How far lines reach from the centre [cycles a sample]."""
-    return max(comb.high, -comb.low) * comb.spacing
 
 
 class _Presence(NamedTuple):
@@ -143,13 +135,12 @@ def _told_by_presence(data: Periodogram, comb: Candidate) -> _Presence:
     loudest = int(nats.sum(axis=1).argmax())
     row, own = data.contrast.rows[loudest], nats[loudest]
     there = own > 0
-    last = max(comb.high, -comb.low)
-    lines, of_lines = _up_to_order(np.abs(order[seen]), there, last)
+    lines, of_lines = _up_to_order(np.abs(order[seen]), there, comb.last)
     size = len(row)
     away = np.arange(size) / size - comb.centre
     turns = (away - np.rint(away)) / comb.spacing
     near = data.seen & (turns > comb.low - 0.5) & (turns < comb.high + 0.5)
-    places, of_places = _up_to_order(np.rint(np.abs(turns[near])).astype(np.intp), row[near] > 0, last)
+    places, of_places = _up_to_order(np.rint(np.abs(turns[near])).astype(np.intp), row[near] > 0, comb.last)
     least = 0.5 / np.maximum(lines, 1)
     share = of_lines / np.maximum(lines, 1)
     chance = np.clip(of_places / np.maximum(places, 1), least, 1 - least)

@@ -39,7 +39,7 @@ def of_flashes(data: Periodogram, found: Candidate) -> Candidate:
     found : Candidate
         The comb found in it.
     """
-    filled = may_come_back(max(found.high, -found.low), found.spacing)
+    filled = may_come_back(found.last, found.spacing)
     if data.one_channel or not filled or not comes_round(found.spacing, data.pulses):
         return found
     highest = spacing_limits(data.pulses, data.prf_hz)[1]

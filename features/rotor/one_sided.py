@@ -44,7 +44,7 @@ class Sides:
     """
 
     def __init__(self, data: Periodogram, comb: Candidate) -> None:
-        size, reach = len(data.power), max(min(max(comb.high, -comb.low), int(0.49 / comb.spacing)), 1)
+        size, reach = len(data.power), max(min(comb.last, int(0.49 / comb.spacing)), 1)
         half = int(comb.spacing * size / 2)
         near = max(int(2 * NEAR_SHARE * half), 2)
         middles = np.rint((comb.centre + comb.spacing * np.arange(-reach, reach + 1)) * size).astype(np.intp)

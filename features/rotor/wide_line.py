@@ -38,7 +38,7 @@ def beside_line(data: Periodogram, found: Candidate) -> Candidate:
     if data.one_channel or abs(found.centre) < data.rest_half:  # a background's line has no comb beside it
         return found
     for _ in range(PASSES):
-        if min(found.high, -found.low) > EVEN_SHARE * max(found.high, -found.low):
+        if min(found.high, -found.low) > EVEN_SHARE * found.last:
             break
         found = _moved(data, found)
     return found
