@@ -134,7 +134,10 @@ def predict(
             positive(value, option)
     classifier = Classifier.load(model, budget_us=budget_us, max_false_alarm=max_false_alarm, coverage=coverage)
     if budget_us is not None:  # it follows from a timing of this moment
-        complain(f"the budget of {budget_us:g} us buys the model {classifier.name}", kind="note")
+        complain(
+            f"the budget of {budget_us:g} us buys the model {classifier.name} now: name it for the same answers again",
+            kind="note",
+        )
     if classifier.operating_point is not None:
         complain(work.terms(classifier.operating_point, by_sets=coverage is not None), kind="note")
     judge = partial(work.answer, classifier=classifier, dwell_s=dwell_s)

@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
 
-from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
+from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS, beyond_radars
 
 from .errors import BadInput
 from .samples import positive
@@ -16,6 +16,27 @@ _ROUNDING = 1e-9  # relative: 0.005 s x 25 kHz must be 125 pulses, whatever the 
 def exchanged(carrier_hz: float, prf_hz: float) -> str:
     """What is said of a carrier that is below the PRF."""
     return f"carrier {carrier_hz:g} Hz and PRF {prf_hz:g} Hz stand in each other's place: exchange them"
+
+
+def in_kilohertz(prf_hz: float) -> str:
+    """The cure of a PRF that seems to be given in kilohertz; empty where it does not."""
+    low, high = Envelope.prf_min_hz, Envelope.prf_max_hz
+    return f"give {prf_hz:g} kHz as {prf_hz:g}e3" if low <= prf_hz * 1e3 <= high and prf_hz < low else ""
+
+
+def require_hertz(name: str, carrier_hz: float, prf_hz: float) -> None:
+    """Refuse a recording whose carrier or PRF is no radar's, or stands in the other's place.
+
+    Raises
+    ------
+    BadInput
+        One is.
+    """
+    if beyond := beyond_radars(carrier_hz, prf_hz):
+        what = f"{beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3"
+        if not beyond_radars(prf_hz, carrier_hz):
+            what = exchanged(carrier_hz, prf_hz)
+        raise BadInput(f"{name}: {what}")
 
 
 @dataclass(frozen=True)
@@ -107,8 +128,7 @@ class Envelope:
                 f"{self.carrier_max_hz / 1e9:g} GHz, the bands that models are trained for: of others nothing is known"
             )
         if prf_hz < self.prf_min_hz:
-            in_khz = self.prf_min_hz <= prf_hz * 1e3 <= self.prf_max_hz
-            cure = f"give {prf_hz:g} kHz as {prf_hz:g}e3, or " if in_khz else ""
+            cure = f"{meant}, or " if (meant := in_kilohertz(prf_hz)) else ""
             return f"PRF {prf_hz:g} Hz is below {self.prf_min_hz:g} Hz: {cure}{self._raise_prf(carrier_hz)}"
         if prf_hz > self.prf_max_hz:
             step = math.ceil(prf_hz / self.prf_max_hz)

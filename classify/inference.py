@@ -277,7 +277,12 @@ class Classifier:
         if samples.ndim == 0 or samples.shape[-1] == 0:
             raise BadInput(f"iq has shape {samples.shape}: it must be (..., pulses) with one pulse or more")
         *leading, pulses = samples.shape
-        told, labels, reasons = self._answers(without_lost(samples.reshape(-1, pulses)), carrier_hz, prf_hz)
+        records = samples.reshape(-1, pulses)
+        if outside := self.envelope.reason(carrier_hz, prf_hz, pulses):  # before anything is read of so many
+            told, labels = _untold(len(records))
+            reasons = np.broadcast_to(np.array(outside), len(records))
+        else:
+            told, labels, reasons = self._answers(without_lost(records), carrier_hz, prf_hz)
         return Prediction(
             labels.reshape(leading),
             np.ascontiguousarray(told[:, :-1]).reshape(*leading, len(CLASSES)),
@@ -288,19 +293,14 @@ class Classifier:
     def _answers(
         self, records: NDArray[np.complex64], carrier_hz: float, prf_hz: float
     ) -> tuple[NDArray[np.float32], NDArray[np.str_], NDArray[np.str_]]:
-        """What is told (see `_TOLD`), labels and reasons of (records, pulses)."""
-        outside = self.envelope.reason(carrier_hz, prf_hz, records.shape[-1])
+        """What is told (see `_TOLD`), labels and reasons of (records, pulses) inside the envelope."""
         largest = largest_part(records)
         live = largest >= LEAST_PART
-        if outside is None and np.count_nonzero(live) == live.size:
+        if np.count_nonzero(live) == live.size:
             told = self._told(records, None, carrier_hz, prf_hz)
             labels, why = self.decide(told[:, :-1])
             return told, labels, np.array(why, dtype=np.str_)
-        told = np.full((len(records), _TOLD), 1 / len(CLASSES), dtype=np.float32)
-        told[:, -1] = np.nan
-        labels = np.full(len(records), UNKNOWN, dtype="<U7")
-        if outside is not None:
-            return told, labels, np.full(len(records), outside)
+        told, labels = _untold(len(records))
         reasons = np.full(len(records), "no signal: every sample is 0", dtype=object)
         reasons[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
         rows = np.flatnonzero(live)
@@ -458,6 +458,13 @@ class Cascade(Classifier):
         if len(rows):
             told[rows] = super()._answer({name: inputs[name][rows] for name in self._reads})
         return told
+
+
+def _untold(records: int) -> tuple[NDArray[np.float32], NDArray[np.str_]]:
+    """What is told of records of which nothing is (see `_TOLD`), and their labels."""
+    told = np.full((records, _TOLD), 1 / len(CLASSES), dtype=np.float32)
+    told[:, -1] = np.nan
+    return told, np.full(records, UNKNOWN, dtype="<U7")
 
 
 def _rule(max_false_alarm: object, coverage: object) -> tuple[float | None, float | None]:

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
-from bladewing.features.measure import MOST_BLADES_GIVEN, beyond_radars, measure
+from bladewing.features.measure import MOST_BLADES_GIVEN, measure
 from bladewing.features.measurements import BODY, EACH_ROTOR, Measurements
 from bladewing.features.one_channel import half_empty, made_analytic
 from bladewing.features.spectrum import centred_power, scaled, unit_scale
 from bladewing.features.window import KAISER
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
-from .envelope import Envelope, dwell_length, exchanged
+from .envelope import Envelope, dwell_length, in_kilohertz, require_hertz
 from .errors import BadInput
 from .progress import Progress
 from .recording import Recording
@@ -66,8 +66,9 @@ LEAST_COMBS, UNSTEADY = 4, 1.25
 #: And of the wingbeat and of the body's course.
 WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std", "acceleration_mps2", "acceleration_mps2_std")
 
-#: Pulses of a dwell at most, as of one that is named: to measure so many takes a quarter of a minute.
-MOST_PULSES = Envelope.pulses_max
+#: Pulses of a dwell at most, as of one that is named: to measure so many takes a quarter of a minute. And at least,
+#: where a recording is cut into several.
+MOST_PULSES, LEAST_PULSES = Envelope.pulses_max, 16
 
 #: No dwell knows the body better.
 LEAST_STD_MPS = 1e-6
@@ -149,6 +150,11 @@ class Measured:
     beat: Wingbeat | None
     remarks: tuple[str, ...]
 
+    @property
+    def has_rotor(self) -> bool:
+        """Whether more dwells hold a comb than chance alone would make hold one."""
+        return bool(np.isfinite(self.values.chopping_hz).sum() > CHANCE * len(self.iq))
+
     def json_objects(self) -> Iterator[dict[str, Any]]:
         """One object a dwell and a closing one; what has no value is null."""
         for n in range(len(self.iq)):
@@ -176,15 +182,15 @@ class Measured:
     def together(self) -> dict[str, Any]:
         """Medians over the dwells that hold a comb, or both of a helicopter's, and how many those are.
 
-        Where no comb is, or they are not one rotor's, the reason in place of their medians. Without any comb, the
-        body's velocity is that of all dwells; see `body`.
+        Where no comb is, or they are not one rotor's, the reason in place of their medians. The body's velocity is then
+        that of the other dwells, as it is where combs may be chance; see `body`.
         """
         held = np.isfinite(self.values.chopping_hz)
         reason = disagreement(self.values) if held.any() else "no comb in any dwell"
         medians: dict[str, Any] = dict.fromkeys(OF_COMBS)
         if not reason:
             medians = {name: _median(getattr(self.values, name)[held]) for name in OF_COMBS}
-        telling = held if held.any() else ~held
+        telling = held if (self.has_rotor and not reason) or held.all() else ~held
         medians |= self.body(telling) | {"body_velocity_range_mps": self.body_range(telling)}
         geared = np.isfinite(self.values.gear_ratio)
         pair = ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
@@ -225,9 +231,9 @@ class Measured:
         """
         if self.beat is None:
             return {}
-        combs = int(np.isfinite(self.values.chopping_hz).sum())
-        rotor = combs > CHANCE * len(self.iq)  # a false comb must not hide a bird
+        rotor = self.has_rotor  # a false comb must not hide a bird
         beat = {name: None if rotor else _number(getattr(self.beat, name)) for name in WINGBEAT}
+        combs = int(np.isfinite(self.values.chopping_hz).sum())
         reason = f"no wingbeat: a rotor in {combs} of {len(self.iq)} dwells" if rotor else str(self.beat.reason) or None
         return beat | {"wingbeat_reason": reason}
 
@@ -304,21 +310,24 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     Raises
     ------
     BadInput
-        The recording holds fewer than 2 pulses, a dwell more than `MOST_PULSES`, or a frequency is no radar's or stands
-        in the other's place.
+        The recording holds fewer than 2 pulses, a dwell more than `MOST_PULSES` or one of several fewer than
+        `LEAST_PULSES`, or a frequency is no radar's or stands in the other's place.
     """
     if len(recording.iq) < 2:
         raise BadInput(f"{recording.name}: 1 pulse: a measurement needs at least 2")
-    if beyond := beyond_radars(recording.carrier_hz, recording.prf_hz):
-        what = f"{beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3"
-        if not beyond_radars(recording.prf_hz, recording.carrier_hz):
-            what = exchanged(recording.carrier_hz, recording.prf_hz)
-        raise BadInput(f"{recording.name}: {what}")
+    require_hertz(recording.name, recording.carrier_hz, recording.prf_hz)
     iq = recording.dwells(settings.dwell_s, least=2)
     if iq.shape[1] > MOST_PULSES:
         raise BadInput(
             f"{recording.name}: a dwell of {settings.dwell_s:g} s takes {iq.shape[1]} pulses, more than {MOST_PULSES}: "
             f"give --dwell in seconds, {0.99 * MOST_PULSES / recording.prf_hz:.2g} at most"
+        )
+    if iq.shape[1] < LEAST_PULSES and len(iq) > 1:
+        meant = in_kilohertz(recording.prf_hz)
+        raise BadInput(
+            f"{recording.name}: a dwell of {settings.dwell_s:g} s takes {iq.shape[1]} pulses at a PRF of "
+            f"{recording.prf_hz:g} Hz, fewer than {LEAST_PULSES}: {meant + ', or ' if meant else ''}give --dwell "
+            f"{math.ceil(1e4 * LEAST_PULSES / recording.prf_hz) / 1e4:g} or more"
         )
     whole = made_analytic(recording.iq)  # as a whole: dwells made so would each have ends of their own
     if whole is not recording.iq:  # what is silent stays so
@@ -334,6 +343,8 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     beat = wingbeat(whole, **radar) if long else None
     stop_s = start_s + pulses / recording.prf_hz
     remarks = recording.remarks(settings.dwell_s, iq, measured=True)
+    if meant := in_kilohertz(recording.prf_hz):
+        remarks += (f"PRF {recording.prf_hz:g} Hz: {meant}, if that is what it is",)
     if whole is recording.iq:  # else it is told that there is one channel
         empty = sum(bool(half_empty(centred_power(scaled(dwell, unit_scale(dwell)), window=KAISER))) for dwell in iq)
         if empty > ONE_SIDED * count:

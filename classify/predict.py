@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from bladewing.features.heave import heave
 from bladewing.features.steady_comb import steady_comb
 from bladewing.features.wingbeat import wingbeat
 
+from .envelope import require_hertz
 from .errors import BadInput, one_line
 from .fusion import LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
@@ -121,6 +121,13 @@ class Answer:
         }
         yield {"file": self.name, "track": track}
 
+    def _runs(self) -> Iterator[tuple[int, int]]:
+        """Where each line of the table begins, and of how many dwells in a row it is, all refused alike if several."""
+        reasons, p = self.dwells.reasons, np.round(self.dwells.probabilities, 6)
+        goes_on = (reasons[1:] != "") & (reasons[1:] == reasons[:-1]) & (p[1:] == p[:-1]).all(axis=1)
+        ends = np.append(np.flatnonzero(~goes_on) + 1, len(reasons))
+        yield from zip(np.append(0, ends[:-1]).tolist(), np.diff(ends, prepend=0).tolist(), strict=True)
+
     def print(self, console: "Console") -> None:
         """Write a table, one line a dwell or a run of dwells refused alike, and the line of the recording."""
         from rich.table import Table
@@ -131,15 +138,14 @@ class Answer:
             table.columns[column].justify = "right"
         for column in range(6):
             table.columns[column].no_wrap = True
-        for _, alike in groupby(list(self.json_objects())[:-1], _refused_alike):
-            row, *others = alike
-            last, reason = others[-1] if others else row, row["reason"] or ""
+        for first, count in self._runs():
+            label, reason = str(self.dwells.labels[first]), str(self.dwells.reasons[first])
             table.add_row(
-                f"{row['start_s']:.3f}",
-                f"{last['stop_s']:.3f}",
-                Text(row["label"], style=_COLOURS[row["label"]]),
-                *(f"{row['probabilities'][name]:.2f}" for name in CLASSES),
-                Text(f"{len(others) + 1} dwells: {reason}" if others else reason),
+                f"{self.start_s[first]:.3f}",
+                f"{self.stop_s[first + count - 1]:.3f}",
+                Text(label, style=_COLOURS[label]),
+                *(f"{share:.2f}" for share in _named(self.dwells.probabilities[first]).values()),
+                Text(f"{count} dwells: {reason}" if count > 1 else reason),
             )
         console.print(Text(one_line(self.name), style="bold"), soft_wrap=True)
         print_table(console, table)
@@ -153,7 +159,7 @@ class Answer:
             print_words(console, Text(remark))
         for name, rate_hz in self.shown.items():
             whose, odds = ODDS[name]
-            said = f"{_SHOWN[name].format(rate_hz)}: the odds of {_WHOSE[whose]} count {odds:g} times"
+            said = f"{_SHOWN[name].format(rate_hz)}: the odds of {_WHOSE[whose]} are multiplied by {odds:g}"
             print_words(console, Text(said))
         if self.declared_s is not None:
             later = (
@@ -180,13 +186,19 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
     Raises
     ------
     BadInput
-        `dwell_s` is not above 0, or `recording` is a path or samples alone.
+        `dwell_s` is not above 0, `recording` is a path or samples alone, its carrier or PRF is no radar's, or
+        `classifier` is a name.
     """
     if not isinstance(recording, Recording):
         raise BadInput(
             f"recording is of type {type(recording).__name__}: it must be a Recording: load_recording(path, ...) reads "
             "one, Recording(name, iq, carrier_hz, prf_hz) makes one of samples"
         )
+    if isinstance(classifier, str):
+        raise BadInput(
+            f"classifier is {classifier!r}: it must be a Classifier: Classifier.load({classifier!r}) gives one"
+        )
+    require_hertz(recording.name, recording.carrier_hz, recording.prf_hz)
     dwell_s = positive(dwell_s, "dwell_s")
     iq = recording.dwells(dwell_s)
     count, wanted = iq.shape
@@ -239,11 +251,6 @@ def summary(labels: Counter[str], unreadable: int) -> str:
     if unreadable:
         parts.append(f"{unreadable} unreadable")
     return f"{labels.total() + unreadable} recordings: {', '.join(parts)}"
-
-
-def _refused_alike(row: Mapping[str, Any]) -> Any:
-    """What the dwells of one line of the table have in common: the reason and the probabilities, or the start alone."""
-    return (row["reason"], row["probabilities"]) if row["reason"] else row["start_s"]
 
 
 def _named(probabilities: np.ndarray) -> dict[str, float]:

@@ -83,8 +83,9 @@ class Recording:
         Raises
         ------
         BadInput
-            A dwell is shorter than from one pulse to the next.
+            `dwell_s` is no time above 0, or shorter than from one pulse to the next.
         """
+        dwell_s = positive(dwell_s, "dwell_s")
         if dwell_s * self.prf_hz < 0.5:
             asked = f"a dwell of {dwell_s:g} s holds no pulse at a PRF of {self.prf_hz:g} Hz"
             cure = (
@@ -233,6 +234,10 @@ def find_recording(path: str | os.PathLike[str]) -> Path:
         There is no such file, or it is of no known kind.
     """
     given = Path(path)
+    if os.fspath(path) in ("", "-"):
+        raise BadInput(
+            f"{os.fspath(path)!r} names no file: recordings are not read from standard input: give their names"
+        )
     try:
         sigmf = find_sigmf(given)
         if sigmf is not None:
@@ -245,8 +250,9 @@ def find_recording(path: str | os.PathLike[str]) -> Path:
         raise unreadable(path, error) from None
     if given.suffix.lower() not in ARRAY_SUFFIXES:
         raise BadInput(
-            f"{path}: not a kind of recording known here: give SigMF, {', '.join(ARRAY_SUFFIXES)} (raw int16 I and Q: "
-            'x = np.fromfile(path, "<i2").astype(np.float32); np.save("cell.npy", x[::2] + 1j * x[1::2]))'
+            f"{path}: not a kind of recording known here: give SigMF, {', '.join(ARRAY_SUFFIXES)} (I and Q by turns: "
+            'x = np.fromfile(path, "<i2") of int16, "<f4" of float32, np.loadtxt(path, delimiter=",").ravel() of CSV; '
+            'np.save("cell.npy", x[::2] + 1j * x[1::2]))'
         )
     return given
 

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import BadInput
 
 _COMPLEX64 = np.dtype(np.complex64)
+# Samples of a recording lie within so many decades of one another, all but a twentieth at either end.
+_LOOKED_AT, _MOST_DECADES = 1 << 16, 6.0
 
 
 def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
@@ -68,12 +70,26 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
         where = int(first[0]) if iq.ndim == 1 else tuple(int(i) for i in first)
         with np.errstate(invalid="ignore"):  # a signalling NaN is cast to be shown
             shown = str(given[first])
-        cure = "lower the gain" if np.isfinite(given[first]) else FILL_IN
+        cure = FILL_IN
+        if np.isfinite(given[first]):
+            cure = "lower the gain"
+        elif _in_other_order(given):
+            cure = "the bytes seem to be in the other order: core:datatype should say _le for _be or so, x.byteswap()"
         raise BadInput(
             f"{name}: sample {where} is {shown}: every sample must be finite in complex64 "
             f"({int(np.sum(~finite))} of {iq.size} are not): {cure}"
         )
     return iq
+
+
+def _in_other_order(samples: NDArray[np.complexfloating]) -> bool:
+    """Whether samples are read with their bytes in the wrong order: turned round, all are finite, and of alike size."""
+    some = samples.ravel()[:_LOOKED_AT]
+    decades = []
+    for one in (some, some.byteswap()):
+        size = np.abs(one.real[np.isfinite(one.real) & (one.real != 0)])
+        decades.append(float(np.ptp(np.log10(np.quantile(size, [0.05, 0.95])))) if len(size) else 0.0)
+    return bool(np.isfinite(some.byteswap()).all()) and decades[1] < _MOST_DECADES < decades[0] / 2
 
 
 def positive(value: object, name: str) -> float:

@@ -14,21 +14,10 @@ from .measurements import EACH_ROTOR, Measurements
 from .one_channel import made_analytic
 from .one_thread import one_thread
 from .rotor.rotors import MAX_ROTORS
-from .spectrum import doppler_spectrum, finite_complex
-
-#: Radars that are measured [Hz]: beyond, a frequency was given in another unit.
-CARRIER_RANGE_HZ, PRF_RANGE_HZ = (1e8, 1e12), (1.0, 1e8)
+from .spectrum import beyond_radars, doppler_spectrum, finite_complex, require_radar
 
 #: No rotor has more blades; eight is the most that fly.
 MOST_BLADES_GIVEN = 64
-
-
-def beyond_radars(carrier_hz: float, prf_hz: float) -> str:
-    """Which of both is no frequency of a radar that is measured, and the rule; empty where both are."""
-    for name, value, (low, high) in (("carrier", carrier_hz, CARRIER_RANGE_HZ), ("PRF", prf_hz, PRF_RANGE_HZ)):
-        if not low <= value <= high:
-            return f"the {name} is {value:g} Hz: it must be {low:g} to {high:g} Hz"
-    return ""
 
 
 def measure(
@@ -72,6 +61,7 @@ def measure(
         If `iq` is not complex, has fewer than 2 pulses or holds a value that is not finite, or an argument is out of
         its range.
     """
+    carrier_hz, prf_hz = require_radar(carrier_hz, prf_hz)
     if beyond := beyond_radars(carrier_hz, prf_hz):
         raise ValueError(f"{beyond}: give 9.85 GHz as 9.85e9, 20 kHz as 20e3")
     if blades is not None and not (math.isfinite(blades) and 1 <= blades == int(blades) <= MOST_BLADES_GIVEN):

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +19,9 @@ LOWEST_DB = -20.0
 
 #: Without any noise (a synthetic line) the floor is this share of the record's power, not what rounding leaves.
 LEAST_FLOOR = np.float32(1e-9)
+
+#: Of a radar [Hz]: beyond, a frequency was given in another unit.
+CARRIER_RANGE_HZ, PRF_RANGE_HZ = (1e8, 1e12), (1.0, 1e8)
 
 # Arrays without axes: to NumPy a number is one more thing to convert at every call.
 _HALF, _ONE, _NO_LIMIT = (np.array(value, np.float32) for value in (0.5, 1, np.inf))
@@ -272,6 +276,9 @@ FILL_IN = "interpolate them from their neighbours (zeros in their place, or a cu
 #: What is said of samples that are not finite.
 NOT_FINITE = f"iq holds values that are not finite: {FILL_IN}"
 
+#: What is said of samples that are finite, but not in complex64.
+TOO_LARGE = "iq holds values that are too large for complex64: lower the gain"
+
 #: A record whose largest part is below this has lost its digits among float32's denormal numbers: 9 bits are left here.
 LEAST_PART = 2.0**-140
 
@@ -412,7 +419,10 @@ def as_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
     if samples.ndim < 1 or samples.shape[-1] < least:
         pulses = f"{least} pulse{'s' * (least > 1)}"
         raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least {pulses}")
-    return samples.astype(np.complex64, copy=False)
+    if samples.dtype == np.complex64:
+        return samples
+    with np.errstate(over="ignore"):  # what overflows is not finite, and found as that
+        return samples.astype(np.complex64)
 
 
 def finite_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
@@ -425,16 +435,24 @@ def finite_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
     """
     samples = as_complex(iq, least)
     if not np.isfinite(samples).all():
-        raise ValueError(NOT_FINITE)
+        raise ValueError(NOT_FINITE if not np.isfinite(iq).all() else TOO_LARGE)
     return samples
 
 
 def require_radar(carrier_hz: float, prf_hz: float) -> tuple[float, float]:
     """Both frequencies [Hz] in float64, as phases need them; what is none is refused."""
     for name, value in (("carrier_hz", carrier_hz), ("prf_hz", prf_hz)):
-        if not (math.isfinite(value) and value > 0):
+        if not (isinstance(value, (Real, np.ndarray)) and math.isfinite(value) and value > 0):
             raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
     return float(carrier_hz), float(prf_hz)
+
+
+def beyond_radars(carrier_hz: float, prf_hz: float) -> str:
+    """Which of both is no frequency of a radar, and the rule; empty where both are."""
+    for name, value, (low, high) in (("carrier", carrier_hz, CARRIER_RANGE_HZ), ("PRF", prf_hz, PRF_RANGE_HZ)):
+        if not low <= value <= high:
+            return f"the {name} is {value:g} Hz: it must be {low:g} to {high:g} Hz"
+    return ""
 
 
 def _least_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -202,19 +202,19 @@ def ahead_left(
     Returns
     -------
     ahead, std : ndarray, shape (combs, degrees)
-        Of each of `DEGREES`, and standard deviations at the fitted amplitudes [samples], whatever velocity and even
-        acceleration the body has: one Gauss-Newton step, near to the truth where the change leaves the lines narrow.
+        By the first two of `DEGREES`, and standard deviations at the fitted amplitudes [samples], whatever velocity and
+        even acceleration the body has: one Gauss-Newton step, near to the truth where the change leaves lines narrow.
     """
     pulses, frequency = data.pulses, np.concatenate([fit.frequencies for fit in fits])
     amplitudes = np.concatenate([fit.amplitudes for fit in fits])
     leads = [2 * np.pi * fit.spacing * fit.orders for fit in fits]
-    shapes = own_polynomials(pulses)
+    shapes = own_polynomials(pulses)[:FIRST_DEGREES]
     turned = [
         sum_of_lines(pulses, fit.frequencies, 1j * lead * fit.amplitudes) for fit, lead in zip(fits, leads, strict=True)
     ]
     still = sum_of_lines(pulses, frequency, 2j * np.pi * amplitudes)
     # what the record gains by each polynomial of each rotor, and by another velocity or an acceleration of the body
-    gained = remove_bands(np.concatenate([*(shapes * one for one in turned), shapes[:2] * still]), data.strong.bands)
+    gained = remove_bands(np.concatenate([*(shapes * one for one in turned), shapes * still]), data.strong.bands)
     # what other amplitudes would make of it does not count
     seen = LinesSeen(np.concatenate([gained, rest[None]])).means(frequency).T
     products = notched_products(frequency, pulses, data.strong.bands).plain
@@ -228,5 +228,5 @@ def ahead_left(
     information, score = 2 * own[:, :-1].real / level, 2 * own[:, -1].real / level
     covariance = inverse_of(information)
     step, std = covariance @ score, np.sqrt(np.diag(covariance) * data.ends_noise)
-    each = (len(fits), len(DEGREES))
-    return step[:-2].reshape(each), std[:-2].reshape(each)
+    each = (len(fits), FIRST_DEGREES)
+    return step[:-FIRST_DEGREES].reshape(each), std[:-FIRST_DEGREES].reshape(each)

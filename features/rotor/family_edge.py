@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..lines import LineSpace
+from ..lines import LinesSeen
 from .comb import Comb
 from .comb_fit import CombFit
 from .folding import fastest_tip, outermost_orders
@@ -146,7 +146,7 @@ def edge_of_lines(
     centres = np.array([fit.centre for fit in fits])
     frequency = np.asarray(centres[:, None, None] + spacings[:, None, None] * sides, np.float64)
     fitted = np.stack([_amplitudes_at(fit, per_turn * sides) for fit in fits])
-    left = LineSpace(rest).at(frequency.ravel())[0].reshape(frequency.shape)
+    left = LinesSeen(rest[None]).means(frequency.ravel()).reshape(frequency.shape)
     usable = data.usable(frequency) & ~_covered(np.append(spacings, others), order, data.pulses)[: len(fits), None]
     power = np.abs(left + fitted) ** 2 * data.pulses
     usable &= ~_foreign(np.where(usable, power, 0.0).sum(axis=0), usable.sum(axis=0))

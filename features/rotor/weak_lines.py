@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..lines import LineSpace, squared, sum_of_lines
+from ..lines import LinesSeen, squared, sum_of_lines
 from .comb import LEAST_LINES, UNEQUAL_NATS, Comb, blade_numbers, two_means_nats
 from .comb_fit import CombFit, fit_combs
 from .comb_search import MIRROR_BINS, from_mirror_bins
@@ -50,9 +50,9 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None) -> tup
     fit, best, most, sure = comb.fit, 1, 0.0, True
     if comb.per_turn > 1 or data.one_channel:
         return data, comb
-    space, level = LineSpace(comb.rest), data.level_of(comb.rest)
+    left, level = LinesSeen(comb.rest[None]), data.level_of(comb.rest)
     last = int(np.abs(fit.orders).max())
-    image = _image_of_lines(data, fit, space, level)
+    image = _image_of_lines(data, fit, left, level)
     for parts in blade_numbers(blades):
         if fit.spacing * data.pulses < LEAST_BINS * parts:
             continue
@@ -60,7 +60,7 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None) -> tup
         own = order[np.gcd(order, parts) == 1]  # those of fewer blades may be there without them
         places = (fit.centre + fit.spacing * tried / parts for tried in (own, order + 0.5))
         seen = [place[data.usable(place)] for place in places]
-        there, beside = (squared(space.at(place)[0]) * data.pulses / level(place) for place in seen)
+        there, beside = (squared(left.means(place)[0]) * data.pulses / level(place) for place in seen)
         if min(len(there), len(beside)) < LEAST_LINES or there.max() > MOST_SHARE * there.sum():
             continue
         nats = two_means_nats(there, beside)
@@ -96,7 +96,7 @@ def _mirrored(fit: CombFit, parts: int, pulses: int) -> bool:
     return round(2 * fit.centre / part) % parts != 0 and bool(from_mirror_bins(part, fit.centre, pulses) < MIRROR_BINS)
 
 
-def _image_of_lines(data: Periodogram, fit: CombFit, space: LineSpace, level: Level) -> float:
+def _image_of_lines(data: Periodogram, fit: CombFit, rest: LinesSeen, level: Level) -> float:
     """Mean power over noise of the mirror image of a comb's lines, if it is as weak as that of the body's line.
 
     Infinite where nothing tells: one of both was taken out with what is at rest.
@@ -109,7 +109,7 @@ def _image_of_lines(data: Periodogram, fit: CombFit, space: LineSpace, level: Le
     body, mirror = line_at(fit.centre), np.array([-fit.centre])
     if not body or not (line_at(-fit.centre) or data.usable(mirror)[0]):
         return np.inf
-    left = float((squared(space.at(mirror)[0]) * data.pulses / level(mirror))[0])
+    left = float((squared(rest.means(mirror)[0]) * data.pulses / level(mirror))[0])
     return max(line_at(-fit.centre), left) / body * float(fit.snr.mean())
 
 

@@ -72,8 +72,8 @@ def test_predict_says_what_a_budget_buys(monkeypatch, sigmf_pair, capsys):
     fast = by_place("fast", account)
     for enough, name in ((int(account[fast][COST_KEY]) + 1, fast), (1000, by_place("best", account))):
         assert main(["predict", str(sigmf_pair()), "--budget-us", str(enough)]) == 0
-        said = f"bladewing: note: the budget of {enough} us buys the model {name}\n"
-        assert capsys.readouterr().err == said
+        said = f"bladewing: note: the budget of {enough} us buys the model {name} now: name it for the same answers"
+        assert capsys.readouterr().err == f"{said} again\n"
 
 
 def test_the_bare_fft_has_a_time():

@@ -244,6 +244,48 @@ def test_a_carrier_below_the_prf_is_told_as_exchanged(folder, capsys):
     assert capsys.readouterr().err.endswith(told)
 
 
+@pytest.mark.parametrize("command", ["measure", "predict"])
+def test_a_carrier_in_gigahertz_is_refused(folder, capsys, command):
+    assert main([command, str(folder / "drone.npy"), "--carrier-hz", "9.85", "--prf-hz", "35e3"]) == 2
+    captured = capsys.readouterr()
+    assert not captured.out
+    assert captured.err.endswith("must be 1e+08 to 1e+12 Hz: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3\n")
+
+
+def test_dwells_of_next_to_no_pulses_are_refused_and_kilohertz_thought_of(folder, capsys):
+    given = ["measure", str(folder / "drone.npy"), "--carrier-hz", "9.85e9"]
+    assert main([*given, "--prf-hz", "35e3", "--dwell", "0.0002"]) == 2
+    told = "7 pulses at a PRF of 35000 Hz, fewer than 16: give --dwell 0.0005 or more\n"
+    assert capsys.readouterr().err.endswith(told)
+    assert main([*given, "--prf-hz", "35e3", "--dwell", "0.0005"]) == 0
+    capsys.readouterr()
+    assert main([*given, "--prf-hz", "35"]) == 2
+    assert "fewer than 16: give 35 kHz as 35e3, or give --dwell 0.4572 or more" in capsys.readouterr().err
+    assert main([*given, "--prf-hz", "35", "--dwell", "0.5"]) == 0
+    assert "PRF 35 Hz: give 35 kHz as 35e3, if that is what it is" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize(("combs", "of_combs"), [(1, False), (3, True)])
+def test_combs_that_may_be_chance_do_not_tell_the_body(folder, combs, of_combs):
+    """Of twenty dwells at 5 m/s one or three hold a comb about a body at rest."""
+    recording = load_recording(folder / "drone.npy", carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
+    spoken = measure_recording(recording, Settings(0.0857, 2, None))
+    held, arrays = np.arange(20) < combs, {}
+    for name, value in vars(spoken.values).items():
+        if isinstance(value, np.ndarray):
+            arrays[name] = np.resize(value, (20, *value.shape[1:]))
+    values = replace(
+        replace(spoken.values, **arrays),
+        chopping_hz=np.where(held, 100.0, np.nan),
+        chopping_hz_std=np.where(held, 0.1, np.nan),
+        gear_ratio=np.full(20, np.nan),
+        body_velocity_mps=np.where(held, 0.0, 5.0),
+        body_velocity_mps_std=np.full(20, 0.01),
+    )
+    together = replace(spoken, iq=np.zeros((20, 4), np.complex64), values=values).together()
+    assert together["body_velocity_mps"] == pytest.approx(0.0 if of_combs else 5.0)
+
+
 def test_the_plot_is_svg_with_the_comb_on_it(folder, tmp_path, capsys):
     target = tmp_path / "drone.svg"
     assert main(["measure", str(folder / "drone.npy"), *RADAR, "--plot", str(target), "--json"]) == 0

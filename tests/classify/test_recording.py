@@ -109,6 +109,21 @@ def test_parts_along_an_axis_of_two_are_told_how_to_join(npy, shape, cure):
         load_recording(npy(np.ones(shape, np.float32)), **RADAR)
 
 
+def test_bytes_in_the_other_order_are_told_from_samples_that_are_missing(npy):
+    whole = noise(3000)
+    assert "bytes seem to be in the other order" in refused(npy(whole.byteswap()), **RADAR)
+    for few in (np.nan, np.inf):
+        assert "interpolate" in refused(npy(np.where(np.arange(3000) % 100 == 7, few, whole)), **RADAR)
+    assert "interpolate" in refused(npy(np.full(3000, np.nan + 0j)), **RADAR)
+    assert "lower the gain" in refused(npy(whole.astype(complex) * 1e200), **RADAR)
+
+
+@pytest.mark.parametrize("name", ["", "-"])
+def test_standard_input_is_no_recording(name):
+    with pytest.raises(BadInput, match="names no file: recordings are not read from standard input"):
+        load_recording(name, **RADAR)
+
+
 def test_a_directory_is_refused_with_the_cure(tmp_path):
     with pytest.raises(BadInput, match=r"is a directory: name the recordings in it, such as .*/\*\.sigmf-meta"):
         load_recording(tmp_path)

@@ -3,10 +3,11 @@ from functools import partial
 import bladewing.classify
 import numpy as np
 import pytest
+from bladewing.classify.errors import BadInput
 from bladewing.classify.fusion import CORRELATION, LOOKS, ODDS
 from bladewing.classify.inference import Classifier, Envelope, Prediction
 from bladewing.classify.labels import CLASSES, UNKNOWN, decide
-from bladewing.classify.predict import answer
+from bladewing.classify.predict import Answer, answer
 from bladewing.classify.recording import Recording
 from bladewing.classify.track import FITTED_DWELL_S, fuse, weights
 from bladewing.simulate import Radar, Scene, draw_records
@@ -333,7 +334,7 @@ def test_a_body_that_goes_to_and_fro_is_reported_and_counts(velocity_mps, rate_h
     said = capsys.readouterr().out
     what, whose = ("sways as a walker's", "clutter") if steps else ("heaves as a bird's", "a bird")
     odds = ODDS[name][1]
-    assert f"body {what} at {rate_hz} Hz: the odds of {whose} count {odds:g} times" in said
+    assert f"body {what} at {rate_hz} Hz: the odds of {whose} are multiplied by {odds:g}" in said
     assert (clutter / bird if steps else bird / clutter) == pytest.approx(odds, rel=1e-5)
 
 
@@ -349,7 +350,7 @@ def test_a_comb_that_stays_is_reported_and_counts(capsys):
     factor = (0.4 / 0.3) ** (given.track.used / (1 + (given.track.used - 1) * CORRELATION))
     assert uav / bird == pytest.approx(factor * ODDS["comb"][1], rel=1e-4)
     given.print(Console())
-    assert f"Hz stays: the odds of a UAV count {ODDS['comb'][1]:g} times" in capsys.readouterr().out
+    assert f"Hz stays: the odds of a UAV are multiplied by {ODDS['comb'][1]:g}" in capsys.readouterr().out
 
 
 def test_a_flapping_bird_shows_its_wingbeat_in_the_track_and_a_short_one_none():
@@ -380,3 +381,39 @@ def test_frames_with_gaps_between_them_make_a_track():
         track = bladewing.classify.fuse(p.probabilities, p.labels, rule=clf.decide, dwell_s=frames.shape[1] / 20e3)
         assert (track.label, track.declared, track.used) == (label, label, len(frames))
         assert track.probabilities.max() > p.probabilities.mean(axis=0).max()
+
+
+def test_dwells_that_are_refused_alike_share_a_line_and_those_between_them_have_their_own(capsys):
+    reasons = np.array(["no signal", "no signal", "", "no signal", "not sure", "not sure", "not sure"])
+    p = np.tile(np.float32([0.4, 0.3, 0.3]), (7, 1))
+    p[5:] = 0.5, 0.3, 0.2  # refused alike, but not as sure of it
+    labels = np.where(reasons == "", "uav", "unknown")
+    ends_s = np.arange(8) / 10
+    dwells = Prediction(labels, p, reasons, np.zeros(7))
+    Answer("x", ends_s[:-1], ends_s[1:], dwells, fuse(p, labels, rule=partial(decide, accept=ACCEPT))).print(Console())
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()[2:7]]
+    assert [row[:3] + row[6:] for row in rows] == [
+        ["0.000", "0.200", "unknown", "2", "dwells:", "no", "signal"],
+        ["0.200", "0.300", "uav"],
+        ["0.300", "0.400", "unknown", "no", "signal"],
+        ["0.400", "0.500", "unknown", "not", "sure"],
+        ["0.500", "0.700", "unknown", "2", "dwells:", "not", "sure"],
+    ]
+
+
+def test_a_recording_outside_the_envelope_is_refused_before_its_dwells_are_read(monkeypatch):
+    def read(*_):
+        raise AssertionError("dwells were read")
+
+    monkeypatch.setattr("bladewing.classify.inference.without_lost", read)
+    recording = Recording("x", np.ones(40_000, np.complex64), 9.85e9, 25.0)
+    given = answer(recording, Classifier.load())
+    assert len(given.dwells.reasons) == 20_000
+    assert set(given.dwells.reasons) == {given.dwells.reasons[0]}
+    assert "give 25 kHz as 25e3" in given.dwells.reasons[0]
+    assert given.dwells.reasons.strides == (0,)  # one text for all of them, however many
+
+
+def test_a_model_is_loaded_before_it_is_asked():
+    with pytest.raises(BadInput, match=r"classifier is 'fast': .*Classifier\.load\('fast'\)"):
+        answer(Recording("x", np.ones(400, np.complex64), 9.85e9, 25e3), "fast")

@@ -265,9 +265,14 @@ def test_bad_arguments_are_refused():
             measure(iq, **RADAR, **wrong)
     with pytest.raises(ValueError, match=r"below pi/2 \[rad\]: 30 degrees are np\.radians\(30\)$"):
         measure(iq, **RADAR, beta_rad=30)
-    for radar in ({"carrier_hz": 9.85}, {"prf_hz": 0.5}, {"carrier_hz": np.nan}):  # in GHz; in MHz; none
+    for radar in ({"carrier_hz": 9.85}, {"prf_hz": 0.5}):  # in GHz; in MHz
         with pytest.raises(ValueError, match=r"is .*: it must be .* Hz: give 9\.85 GHz as 9\.85e9"):
             measure(iq, **RADAR | radar)
+    for none in (np.nan, "9.85e9", None):
+        with pytest.raises(ValueError, match=r"carrier_hz is .*: it must be a finite number above 0 \[Hz\]"):
+            measure(iq, **RADAR | {"carrier_hz": none})
+    with pytest.raises(ValueError, match="too large for complex64: lower the gain"):
+        measure(iq.astype(complex) * 1e200, **RADAR)
     with pytest.raises(ValueError, match="not finite"):
         measure(np.where(np.arange(PULSES) == 5, np.nan, iq), **RADAR)
     with pytest.raises(ValueError, match="iq holds float64: its samples must be complex"):
