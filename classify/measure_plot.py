@@ -69,9 +69,9 @@ class _Frame:
             hz = body_hz + order * spacing_hz
             if self.low <= hz <= self.high:
                 yield (
-                    f'<path d="M{self.x(hz):.1f} {self.base:.1f}v{length}" stroke="{colour}" stroke-width="1.2"/>'
+                    f'<path d="M{self.x(hz):.1f} {self.base:.1f}v-{length}" stroke="{colour}" stroke-width="1.2"/>'
                     f'<path d="M{self.x(hz):.1f} {_TOP}V{self.base:.1f}" stroke="{colour}" stroke-width="0.5" '
-                    'opacity="0.35"/>'
+                    'opacity="0.6"/>'
                 )
 
     def axes(self, per_mps: float) -> Iterator[str]:
@@ -113,6 +113,8 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
     body_hz = -float(values.body_velocity_mps[index]) * per_mps
     chopping_hz, width_hz = float(values.chopping_hz[index]), float(values.bandwidth_hz[index])
     both_hz = [float(values.main_chopping_hz[index]), float(values.tail_chopping_hz[index])]
+    rates_hz = [float(rate_hz) for rate_hz in values.rotor_rates_hz[index] if np.isfinite(rate_hz)]
+    several = bool(values.rotors_resolved[index]) and len(rates_hz) > 1
     low, high = float(frequency[0]), float(frequency[-1])
     if np.isfinite(width_hz):  # and what is at rest
         reach_hz = _MARGIN * width_hz / 2
@@ -131,7 +133,8 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
         parts += frame.band(*notch, _LEGEND[1][0], "notch")
     if np.isfinite(chopping_hz):
         half_hz = float(values.comb_order[index]) * chopping_hz
-        parts += frame.comb(body_hz, chopping_hz, half_hz, _LEGEND[2][0], 6)
+        for rate_hz in rates_hz if several else [chopping_hz]:
+            parts += frame.comb(body_hz, rate_hz, half_hz, _LEGEND[2][0], 6)
         for other_hz in both_hz:  # a helicopter's second comb is drawn over the first, as far out
             if np.isfinite(other_hz) and abs(other_hz / chopping_hz - 1) > 0.1:
                 parts += frame.comb(body_hz, other_hz, half_hz, _LEGEND[3][0], 10)
@@ -142,7 +145,10 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
     parts += frame.axes(per_mps)
     parts += _legend((np.isfinite(width_hz), True, np.isfinite(chopping_hz), bool(np.isfinite(both_hz).all())))
     wide = "no band" if np.isnan(width_hz) else f"band {width_hz:.0f} Hz"
-    said = str(values.reason[index]) or f"comb every {chopping_hz:.2f} Hz, {wide}"
+    combs = f"comb every {chopping_hz:.2f} Hz"
+    if several:
+        combs = f"combs of {len(rates_hz)} rotors, every {rates_hz[0]:.2f} to {rates_hz[-1]:.2f} Hz"
+    said = str(values.reason[index]) or f"{combs}, {wide}"
     if np.isfinite(both_hz).all():
         said += f"; main {both_hz[0]:.2f} Hz, tail {both_hz[1]:.2f} Hz, ratio {values.gear_ratio[index]:.3f}"
     return _picture(recording.name, start_s, said, parts)
