@@ -74,7 +74,7 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
         if np.isfinite(given[first]):
             cure = "lower the gain"
         elif _in_other_order(given):
-            cure = "the bytes seem to be in the other order: core:datatype should say _le for _be or so, x.byteswap()"
+            cure = "the bytes seem to be in the other order: swap _le and _be in core:datatype, or give x.byteswap()"
         raise BadInput(
             f"{name}: sample {where} is {shown}: every sample must be finite in complex64 "
             f"({int(np.sum(~finite))} of {iq.size} are not): {cure}"

@@ -13,6 +13,7 @@ from .body_velocity import folded
 from .following import by_recording, normed
 from .one_thread import one_thread
 from .rotor.comb import OVER_BODY, find_comb
+from .rotor.even_pulses import even_pulses
 from .rotor.periodogram import prepare
 from .spectrum import SPEED_OF_LIGHT_MPS
 
@@ -88,8 +89,10 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[f
 def _rotor_hz(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> float | None:
     """Chopping frequency of a dwell whose comb is no wheel's [Hz], or None."""
     data = prepare(iq, carrier_hz=carrier_hz, prf_hz=prf_hz)
-    comb = find_comb(data)[0] if data is not None else None
-    if comb is None:
+    if data is None:
+        return None
+    comb, _ = find_comb(data)
+    if comb is None or len(even_pulses(data, comb.fit.spacing)):  # nor another radar's pulses
         return None
     per_mps = 2 * carrier_hz / SPEED_OF_LIGHT_MPS
     reach_mps = comb.last * comb.fit.spacing * prf_hz / per_mps

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 1655 of them.
-WIDTH = 1656
+#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 1657 of them.
+WIDTH = 1658
 
 #: What a steady body's acceleration is of a manoeuvring one's. Half of all bodies are steady, whatever they are: if one
 #: class alone accelerated, a line that bends would be all there is to learn of it.
@@ -153,6 +153,7 @@ LAWS: dict[str, Law] = {
     "fading_db": Law("uniform", 0.0, 12.0, "dB", "swing of glint and multipath"),
     "fading_hz": Law("log", 0.3, 25.0, "Hz", "lines decorrelate in tens to hundreds of ms (IET RSN 2022)"),
     "impulse_db": Law("uniform", 10.0, 45.0, "dB", "a spoilt pulse over noise"),
+    "impulse_pulses": Law("log", 3.0, 500.0, "1", "between two pulses that another radar spoils; its PRF is alike"),
     "high_pass_hz": Law("log", 3.0, 150.0, "Hz", "capacitor-coupled audio front ends"),
     "canceller_pulses": Law("uniform", 2.0, 3.0, "1", "moving-target indication by two or three pulses"),
     "mains_db": Law("uniform", -25.0, 15.0, "dB", "mains lines together over noise"),

@@ -19,7 +19,7 @@ from .target import Normals
 #: How often each fault is present where any may be.
 FAULT_CHANCE = {
     "fading": 0.4,
-    "impulses": 0.12,
+    "impulses": 0.2,
     "high_pass": 0.12,
     "canceller": 0.08,
     "flicker": 0.25,
@@ -38,6 +38,7 @@ EFFECT_OF = {
     "fading_db": "fading",
     "fading_hz": "fading",
     "impulse_db": "impulses",
+    "impulse_pulses": "impulses",
     "high_pass_hz": "high_pass",
     "canceller_pulses": "canceller",
     "flicker_db": "flicker",
@@ -110,6 +111,8 @@ class Receiver:
         self.bursts_of_mains = of_mains | self.burst_alike
         self.burst_hz = np.where(self.bursts_of_mains, periods * self.mains_hz, any_hz)
         faulty = ~draws.chance(FAULTLESS_CHANCE)
+        self.impulse_even = draws.chance(0.5)
+        self.impulse_pulses = draws.value("impulse_pulses")
         self.on = {name: chosen & faulty for name, chosen in on.items()}
 
     def receive(
@@ -150,7 +153,10 @@ class Receiver:
             angle *= self.phase_noise_rad[rows].astype(np.float32)[:, None]
             iq[rows] *= turned(angle)
         iq = iq + noise
-        self._strike(iq, np.flatnonzero(self.on["impulses"]))
+        self._strike(iq, np.flatnonzero(self.on["impulses"] & ~self.impulse_even))
+        rows = np.flatnonzero(self.on["impulses"] & self.impulse_even)
+        if len(rows):
+            self._interfere(iq, rows, normals_of("impulses")(rows))
         rows = np.flatnonzero(self.on["flicker"])
         if len(rows):
             # the law sets the density at 1 % of the PRF; the process has unit power, so scale by the sum of the lines
@@ -186,6 +192,19 @@ class Receiver:
             for n in range(int(self.impulse_count[row])):
                 amplitude = 10 ** (self.impulse_db[row, n] / 20) * np.exp(1j * self.impulse_phase[row, n])
                 iq[row, int(self.impulse_at[row, n] * iq.shape[-1])] += np.complex64(amplitude)
+
+    def _interfere(self, iq: NDArray[np.complex64], rows: NDArray[np.intp], normals: Normals) -> None:
+        """Single pulses of another radar, whose own come at another rate: evenly spaced, of any phase.
+
+        In time they are as short as a rotor's flashes can be and as regular, in Doppler white.
+        """
+        pulses = iq.shape[-1]
+        phases = normals(2 * pulses).view(np.complex64)
+        phases /= np.abs(phases)
+        for row, phase in zip(rows, phases, strict=True):
+            spacing = max(float(self.impulse_pulses[row]), 1.0)
+            spoilt = np.arange(self.impulse_at[row, 0] * spacing, pulses, spacing).astype(np.intp)
+            iq[row, spoilt] += np.float32(10 ** (self.impulse_db[row, 0] / 20)) * phase[spoilt]
 
     def _mains(self, radar: Radar, rows: NDArray[np.intp]) -> NDArray[np.float32]:
         """Harmonics of the mains, real and so on both sides of the spectrum alike."""

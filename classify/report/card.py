@@ -28,7 +28,7 @@ def model_card(report: Mapping[str, Any]) -> str:
     parts = [
         "# Model card",
         "",
-        f"The models of bladewing; where one is meant, it is `{name}`, the one that is used where none is named. "
+        f"The models of bladewing; where one is meant, it is `{name}`. "
         f"Figures: `{report['made']['command']}`, {report['made']['date'][:10]}, "
         f"{count(report['records']['total'])} synthetic test records of {count(report['records']['radars'])} radars.",
         "",

@@ -128,8 +128,8 @@ def test_a_hovering_body_that_accelerates_before_weaker_ground_is_steadied():
     ground = {"name": "ground", "kind": "ground", "level_db": 10.0}
     uav = {"name": "uav", "airframe": "quadcopter_12cm", "velocity_mps": -0.32, "acceleration_mps2": 8.0}
     scene = Scene.build({"radar": radar, "uav": [uav], "clutter": [ground]})
-    iq = np.stack([scene.render(seed).iq for seed in range(20)])
-    assert body_acceleration(iq, carrier_hz=CARRIER_HZ, prf_hz=25e3)[2].mean() > 0.8
+    iq = np.stack([scene.render(seed).iq for seed in range(80)])
+    assert body_acceleration(iq, carrier_hz=CARRIER_HZ, prf_hz=25e3)[2].mean() > 0.8  # 0.88 of many, 0.04 of these
 
 
 @pytest.mark.parametrize("pulses", [8, 500])

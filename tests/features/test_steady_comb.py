@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
-from bladewing.features.rotor.comb import OVER_BODY
+from bladewing.features.rotor.comb import OVER_BODY, find_comb
+from bladewing.features.rotor.periodogram import prepare
 from bladewing.features.steady_comb import DWELL_S, DWELLS, LEAST, steady_comb
 
 from .signals import white
@@ -59,6 +60,17 @@ def test_a_rotor_is_found_though_its_rate_moves_and_none_where_it_does_not_stay(
         for gain, rel in ((1e-12, 1e-6), (3.3e38 / most, 1e-6), (1e-40 / most, 1e-2)):  # 17 bits are left of the last
             alone = steady_comb((iq * gain).astype(np.complex64), **RADAR)
             assert alone.chopping_hz == pytest.approx(found.chopping_hz[row], rel=rel, nan_ok=True)
+
+
+def test_another_radars_pulses_are_no_comb_that_stays():
+    """One pulse in 60.7, 25 dB over the noise: of one phase they are a comb in every dwell."""
+    rng = np.random.default_rng(5)
+    iq = white(rng, 8 * 2000)
+    iq[np.arange(11, len(iq), 60.7).astype(int)] += 18 * np.exp(2j)
+    radar = {"carrier_hz": 9.85e9, "prf_hz": 25e3}
+    assert np.isnan(steady_comb(iq.astype(np.complex64), **radar).chopping_hz)
+    found = [find_comb(prepare(dwell, **radar))[0] for dwell in iq.astype(np.complex64).reshape(8, 2000)]
+    assert sum(comb is not None for comb in found) >= LEAST
 
 
 def test_a_wheel_has_a_comb_in_every_dwell():

@@ -672,6 +672,23 @@ def test_spoilt_pulses_have_the_level_asked_for_and_any_phase():
     assert abs(turns.mean()) < 4 / np.sqrt(2 * len(spoilt))
 
 
+def test_pulses_of_another_radar_are_evenly_spaced_of_one_level_and_any_phase():
+    values = {"impulse_db": 20.0, "impulse_pulses": 37.4}
+    iq = np.array([empty(effects=["impulses"], values=values).render(seed).iq for seed in range(20)])
+    firsts = []
+    for one in iq:
+        places = np.flatnonzero(one)
+        firsts.append(places[0])
+        np.testing.assert_allclose(np.abs(one[places]), 10.0, rtol=1e-5)
+        away = places - places[0] - 37.4 * np.arange(len(places))
+        assert np.abs(away).max() < 1
+        assert len(places) in (133, 134)
+    assert min(firsts) < 10
+    assert max(firsts) in range(27, 38)
+    turns = np.exp(1j * np.angle(iq[iq != 0]))
+    assert abs(turns.mean()) < 4 / np.sqrt(2 * len(turns))
+
+
 def test_a_shaken_airframe_turns_its_echo_at_the_rate_of_the_shaking():
     shaken = uav(rotors=[], vibration_rad=0.4, vibration_hz=75.0)
     iq = Scene.build({"radar": RADAR, "uav": [shaken], "receiver": {"noise": False}}).render(full=True).iq
