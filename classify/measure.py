@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
+from bladewing.features.inputs import MIN_PULSES
 from bladewing.features.measure import MOST_BLADES_GIVEN, measure
 from bladewing.features.measurements import BODY, EACH_ROTOR, Measurements
 from bladewing.features.one_channel import half_empty, made_analytic
@@ -66,9 +67,8 @@ LEAST_COMBS, UNSTEADY = 4, 1.25
 #: And of the wingbeat and of the body's course.
 WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std", "acceleration_mps2", "acceleration_mps2_std")
 
-#: Pulses of a dwell at most, as of one that is named: to measure so many takes a quarter of a minute. And at least,
-#: where a recording is cut into several.
-MOST_PULSES, LEAST_PULSES = Envelope.pulses_max, 16
+#: Pulses of a dwell at most, as of one that is named: to measure so many takes a quarter of a minute.
+MOST_PULSES = Envelope.pulses_max
 
 #: No dwell knows the body better.
 LEAST_STD_MPS = 1e-6
@@ -151,9 +151,14 @@ class Measured:
     remarks: tuple[str, ...]
 
     @property
+    def combs(self) -> int:
+        """How many dwells hold a comb."""
+        return int(np.isfinite(self.values.chopping_hz).sum())
+
+    @property
     def has_rotor(self) -> bool:
         """Whether more dwells hold a comb than chance alone would make hold one."""
-        return bool(np.isfinite(self.values.chopping_hz).sum() > CHANCE * len(self.iq))
+        return self.combs > CHANCE * len(self.iq)
 
     def json_objects(self) -> Iterator[dict[str, Any]]:
         """One object a dwell and a closing one; what has no value is null."""
@@ -195,7 +200,7 @@ class Measured:
         geared = np.isfinite(self.values.gear_ratio)
         pair = ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
         gear = {name: _median(getattr(self.values, name)[geared]) for name in pair}
-        counts = {"dwells": len(self.iq), "with_comb": int(held.sum()), "with_second_comb": int(geared.sum())}
+        counts = {"dwells": len(self.iq), "with_comb": self.combs, "with_second_comb": int(geared.sum())}
         beside = {"left_out_s": self.recording.left_out_s(self.iq), "remarks": list(self.remarks)}
         return {**counts, "reason": reason or None, **beside, **medians, **gear, **self.over_all()}
 
@@ -231,11 +236,11 @@ class Measured:
         """
         if self.beat is None:
             return {}
-        rotor = self.has_rotor  # a false comb must not hide a bird
-        beat = {name: None if rotor else _number(getattr(self.beat, name)) for name in WINGBEAT}
-        combs = int(np.isfinite(self.values.chopping_hz).sum())
-        reason = f"no wingbeat: a rotor in {combs} of {len(self.iq)} dwells" if rotor else str(self.beat.reason) or None
-        return beat | {"wingbeat_reason": reason}
+        if self.has_rotor:  # a false comb must not hide a bird
+            reason = f"no wingbeat: a rotor in {self.combs} of {len(self.iq)} dwells"
+            return dict.fromkeys(WINGBEAT) | {"wingbeat_reason": reason}
+        beat = {name: _number(getattr(self.beat, name)) for name in WINGBEAT}
+        return beat | {"wingbeat_reason": str(self.beat.reason) or None}
 
     def clearest(self) -> int:
         """The dwell whose comb stands highest over the noise, of those as near to the median band as half of them are.
@@ -311,7 +316,7 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     ------
     BadInput
         The recording holds fewer than 2 pulses, a dwell more than `MOST_PULSES` or one of several fewer than
-        `LEAST_PULSES`, or a frequency is no radar's or stands in the other's place.
+        `MIN_PULSES`, or a frequency is no radar's or stands in the other's place.
     """
     if len(recording.iq) < 2:
         raise BadInput(f"{recording.name}: 1 pulse: a measurement needs at least 2")
@@ -322,12 +327,12 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
             f"{recording.name}: a dwell of {settings.dwell_s:g} s takes {iq.shape[1]} pulses, more than {MOST_PULSES}: "
             f"give --dwell in seconds, {0.99 * MOST_PULSES / recording.prf_hz:.2g} at most"
         )
-    if iq.shape[1] < LEAST_PULSES and len(iq) > 1:
+    if iq.shape[1] < MIN_PULSES and len(iq) > 1:
         meant = in_kilohertz(recording.prf_hz)
         raise BadInput(
             f"{recording.name}: a dwell of {settings.dwell_s:g} s takes {iq.shape[1]} pulses at a PRF of "
-            f"{recording.prf_hz:g} Hz, fewer than {LEAST_PULSES}: {meant + ', or ' if meant else ''}give --dwell "
-            f"{math.ceil(1e4 * LEAST_PULSES / recording.prf_hz) / 1e4:g} or more"
+            f"{recording.prf_hz:g} Hz, fewer than {MIN_PULSES}: {meant + ', or ' if meant else ''}give --dwell "
+            f"{math.ceil(1e4 * MIN_PULSES / recording.prf_hz) / 1e4:g} or more"
         )
     whole = made_analytic(recording.iq)  # as a whole: dwells made so would each have ends of their own
     if whole is not recording.iq:  # what is silent stays so

@@ -114,7 +114,8 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
     chopping_hz, width_hz = float(values.chopping_hz[index]), float(values.bandwidth_hz[index])
     both_hz = [float(values.main_chopping_hz[index]), float(values.tail_chopping_hz[index])]
     rates_hz = [float(rate_hz) for rate_hz in values.rotor_rates_hz[index] if np.isfinite(rate_hz)]
-    several = bool(values.rotors_resolved[index]) and len(rates_hz) > 1
+    if len(rates_hz) < 2 or not values.rotors_resolved[index]:
+        rates_hz = [chopping_hz]
     low, high = float(frequency[0]), float(frequency[-1])
     if np.isfinite(width_hz):  # and what is at rest
         reach_hz = _MARGIN * width_hz / 2
@@ -133,7 +134,7 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
         parts += frame.band(*notch, _LEGEND[1][0], "notch")
     if np.isfinite(chopping_hz):
         half_hz = float(values.comb_order[index]) * chopping_hz
-        for rate_hz in rates_hz if several else [chopping_hz]:
+        for rate_hz in rates_hz:
             parts += frame.comb(body_hz, rate_hz, half_hz, _LEGEND[2][0], 6)
         for other_hz in both_hz:  # a helicopter's second comb is drawn over the first, as far out
             if np.isfinite(other_hz) and abs(other_hz / chopping_hz - 1) > 0.1:
@@ -146,7 +147,7 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
     parts += _legend((np.isfinite(width_hz), True, np.isfinite(chopping_hz), bool(np.isfinite(both_hz).all())))
     wide = "no band" if np.isnan(width_hz) else f"band {width_hz:.0f} Hz"
     combs = f"comb every {chopping_hz:.2f} Hz"
-    if several:
+    if len(rates_hz) > 1:
         combs = f"combs of {len(rates_hz)} rotors, every {rates_hz[0]:.2f} to {rates_hz[-1]:.2f} Hz"
     said = str(values.reason[index]) or f"{combs}, {wide}"
     if np.isfinite(both_hz).all():

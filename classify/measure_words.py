@@ -10,7 +10,7 @@ from bladewing.features.rotor.comb import OVER_BODY
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 
 from .errors import one_line
-from .measure import CHANCE, helicopter
+from .measure import helicopter
 from .terminal import counted, print_table, print_words
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def _sentence(found: "Measured") -> str:
     if not all_together["with_comb"]:
         return f"no rotor in {counted(all_together['dwells'])}{body}"
     where = f"comb in {all_together['with_comb']} of {counted(all_together['dwells'])}"
-    if all_together["with_comb"] <= CHANCE * all_together["dwells"]:
+    if not found.has_rotor:
         where += ", perhaps by chance"
     if all_together["reason"]:
         return f"{where}; {all_together['reason']}{body}{_wheel(found)}"

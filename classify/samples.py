@@ -85,11 +85,12 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
 def _in_other_order(samples: NDArray[np.complexfloating]) -> bool:
     """Whether samples are read with their bytes in the wrong order: turned round, all are finite, and of alike size."""
     some = samples.ravel()[:_LOOKED_AT]
+    turned = some.byteswap()
     decades = []
-    for one in (some, some.byteswap()):
+    for one in (some, turned):
         size = np.abs(one.real[np.isfinite(one.real) & (one.real != 0)])
         decades.append(float(np.ptp(np.log10(np.quantile(size, [0.05, 0.95])))) if len(size) else 0.0)
-    return bool(np.isfinite(some.byteswap()).all()) and decades[1] < _MOST_DECADES < decades[0] / 2
+    return bool(np.isfinite(turned).all()) and decades[1] < _MOST_DECADES < decades[0] / 2
 
 
 def positive(value: object, name: str) -> float:

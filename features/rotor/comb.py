@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..bodies import LINE_DB
 from ..chopping import CHOPPING_RANGE_HZ
-from ..lines import LinesSeen, squared
+from ..lines import squared
 from .comb_centre import centred
 from .comb_fit import CombFit, fit_combs
 from .comb_search import (
@@ -168,8 +168,7 @@ def strong_multiple(
 
 def powers_over_noise(data: Periodogram, fit: CombFit, rest: NDArray[np.complex128]) -> NDArray[np.float64]:
     """Power of each line of a comb over the noise [1], as they are beside what combs leave of the record."""
-    seen = fit.amplitudes + LinesSeen(rest[None]).means(fit.frequencies)[0]
-    return squared(seen) * data.pulses / data.level_of(rest)(fit.frequencies)
+    return squared(fit.seen_beside(rest)) * data.pulses / data.level_of(rest)(fit.frequencies)
 
 
 def two_means_nats(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..lines import sum_of_lines
+from ..lines import LinesSeen, sum_of_lines
 from .folding import comes_back, outermost_orders
 from .periodogram import LEAST_LEVEL, Level, Periodogram
 from .slow_lines import LineProducts, notched_products, parts, remove_bands, times, whole
@@ -69,6 +69,10 @@ class CombFit:
     def frequencies(self) -> NDArray[np.float64]:
         """Where its lines are [cycles a sample]."""
         return np.asarray(self.centre + self.spacing * self.orders, np.float64)
+
+    def seen_beside(self, rest: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Amplitudes of its lines, not held back, in a record of which combs leave this, shape (lines,)."""
+        return self.amplitudes + LinesSeen(rest[None]).means(self.frequencies)[0]
 
 
 def over_orders(

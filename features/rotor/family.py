@@ -82,8 +82,8 @@ class Family:
     gear_reason : str
         Why there is no second comb; empty where there is one.
     ahead : (ndarray, ndarray) or None
-        How far ahead of an even rotor each is, by the polynomials of `DEGREES`, and standard deviations, shape
-        (rotors, degrees) [samples]; None where they are not told apart.
+        How far ahead of an even rotor each is, by as many polynomials of `DEGREES` as were fitted, two at least, and
+        standard deviations, shape (rotors, degrees) [samples]; None where they are not told apart.
     may_be_turn : bool
         True where the chopping frequency may be the rotation rate of unlike blades.
     """

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..lines import LinesSeen, squared
+from ..lines import squared
 from .comb import Comb
 from .periodogram import Periodogram
 
@@ -61,7 +61,7 @@ def sideband_spacing(data: Periodogram, comb: Comb) -> float | None:
     at_least = squared(fit.amplitudes) * data.pulses / data.level_at(fit.frequencies)
     if np.count_nonzero(at_least > CLEAR) > 2 * most:
         return None
-    seen = fit.amplitudes + LinesSeen(comb.rest[None]).means(fit.frequencies)[0]
+    seen = fit.seen_beside(comb.rest)
     noise = data.level_of(comb.rest)(fit.frequencies) / data.pulses
     snr = squared(seen) / noise
     if data.strong.centres_db[nearest] - 10 * np.log10(float(snr.max())) < UNDER_DB:
