@@ -16,6 +16,7 @@ from typing import TypeVar
 
 import numpy as np
 from bladewing.features import INPUT_SHAPES, model_inputs
+from bladewing.features.one_thread import one_thread
 from bladewing.simulate import Radar, draw_records, stream
 from bladewing.simulate.dataset import RADAR_GROUP, Records
 from numpy.typing import NDArray
@@ -274,7 +275,7 @@ def in_order(work: Callable[[Task], Done], tasks: Sequence[Task], workers: int |
         return
     # spawn, not fork: a fork of a process with threads (torch, onnxruntime) may hang
     others = set(active_children())
-    pool_of = partial(ProcessPoolExecutor, mp_context=get_context("spawn"), initializer=_end_with_parent)
+    pool_of = partial(ProcessPoolExecutor, mp_context=get_context("spawn"), initializer=_begin)
     with pool_of(min(workers, len(tasks))) as pool:
         waiting: list[Future[Done]] = []
         try:
@@ -309,8 +310,13 @@ def _deaf_children() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _end_with_parent() -> None:
-    """Watch the parent: a worker whose parent was killed would wait for work for ever."""
+def _begin() -> None:
+    """Begin as a worker: on one thread, and watching the parent.
+
+    There are as many workers as processors; with threads of their own besides they draw two thirds as many records. A
+    worker whose parent was killed would wait for work for ever.
+    """
+    one_thread.__enter__()
     parent = parent_process()
     if parent is not None:
 

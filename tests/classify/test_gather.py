@@ -1,3 +1,4 @@
+import operator
 import os
 import signal
 import subprocess
@@ -12,6 +13,7 @@ from bladewing.classify.errors import BadInput
 from bladewing.classify.gather import gather, inputs_digest
 from bladewing.classify.parts import Parts
 from bladewing.features import INPUT_SHAPES
+from threadpoolctl import threadpool_info
 
 
 def test_inputs_do_not_depend_on_the_workers(monkeypatch):
@@ -24,6 +26,14 @@ def test_inputs_do_not_depend_on_the_workers(monkeypatch):
         np.testing.assert_array_equal(one.inputs[name], two.inputs[name])
     np.testing.assert_array_equal(one.labels, np.arange(60) % 3)
     np.testing.assert_array_equal(one.truth["kind"], two.truth["kind"])
+
+
+@pytest.mark.skipif(gather_module.workers_at_hand() == 1, reason="on one processor nothing has more threads")
+def test_a_worker_computes_on_one_thread():
+    for libraries in gather_module.in_order(operator.call, [threadpool_info] * 2, workers=2):
+        threads = [library["num_threads"] for library in libraries if library["user_api"] == "blas"]
+        assert threads
+        assert set(threads) == {1}
 
 
 def test_other_measurements_have_another_digest(monkeypatch):
