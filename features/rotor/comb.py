@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +65,10 @@ UNEQUAL_FACTOR = 4.0
 
 #: Among the outer half of the lines alone, they must be by this.
 OUTER_FACTOR = 2.5
+
+#: Several rotors' lines run into one another there. Of combs of so many orders the inner half alone tells as well, by
+#: this: of blades that reflect at their tips the lines of one parity may be stronger, but not over so many orders.
+MANY_ORDERS, INNER_FACTOR = 30, 8.0
 
 #: And so much must speak for two kinds of lines [nats]: near the noise every other one is strong by chance.
 UNEQUAL_NATS = 8.0
@@ -145,23 +150,24 @@ def strong_multiple(
     factor : float
         By which the strong ones are stronger in power.
     """
-    best = 1
-    outer = np.abs(orders) > np.median(np.abs(orders))
-    for multiple in tried:
-        strong = orders % multiple == 0
+    best, away = 1, np.abs(orders)
+    outer = away > np.median(away)
+    parts = [np.ones(len(orders), bool)] + ([~outer] if len(away) and away.max() >= MANY_ORDERS else [])
+    for multiple, part in product(tried, parts):
+        strong, weak = part & (orders % multiple == 0), part & (orders % multiple != 0)
         # the outermost lines are edges; four of each kind tell them apart
-        if strong.sum() < 4 or (~strong).sum() < 4:
+        if strong.sum() < 4 or weak.sum() < 4:
             continue
-        means = np.maximum([power[strong].mean(), power[~strong].mean()], 1e-9)
+        means = np.maximum([power[strong].mean(), power[weak].mean()], 1e-9)
         ratio = _contrast(means[0], means[1])
-        if ratio <= factor:
+        if ratio <= max(factor, 0.0 if part.all() else INNER_FACTOR):
             continue
         # several rotors' lines lie in one another at the low orders and may cancel at some; further out they part
-        if outer[strong].any() and outer[~strong].any():
-            parted = _contrast(power[outer & strong].mean(), power[outer & ~strong].mean())
+        if (outer & strong).any() and (outer & weak).any():
+            parted = _contrast(power[outer & strong].mean(), power[outer & weak].mean())
             if parted <= OUTER_FACTOR:
                 continue
-        if two_means_nats(power[strong], power[~strong]) > UNEQUAL_NATS:
+        if two_means_nats(power[strong], power[weak]) > UNEQUAL_NATS:
             best, factor = multiple, ratio
     return best
 

@@ -5,6 +5,7 @@ import pytest
 from bladewing.features.rotor.comb import find_comb, strong_multiple
 from bladewing.features.rotor.octaves import coarsest, over_neighbours
 from bladewing.features.rotor.periodogram import prepare
+from scipy import special
 
 from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors_by_chance, white
 
@@ -64,3 +65,23 @@ def test_lines_that_cancel_at_the_low_orders_only_make_no_unequal_blades():
     orders = np.arange(-20, 21)
     power = np.where((orders % 2 == 0) | (np.abs(orders) > 12), 100.0, 2.0)
     assert strong_multiple(orders, power, range(2, 5)) == 1
+
+
+def test_of_many_lines_the_inner_half_tells_unlike_blades_of_rotors_whose_outer_lines_run_into_one_another():
+    rng = np.random.default_rng(0)
+    orders = np.arange(-60, 61)
+    inner = np.abs(orders) <= 30
+    for strong in (2, 3):
+        mean = np.where(inner, np.where(orders % strong == 0, 40.0, 2.0), 6.0)
+        found = [strong_multiple(orders, mean * rng.exponential(size=121), range(2, 5)) for _ in range(50)]
+        assert np.mean(np.array(found) == strong) >= 0.9
+        assert set(found) <= {1, strong}
+
+
+def test_the_parity_of_a_tip_s_lines_makes_no_unlike_blades():
+    """Their powers are Bessel functions squared, which near order zero favour even or odd orders by the argument."""
+    rng = np.random.default_rng(1)
+    for reach in np.linspace(31.5, 120, 300):
+        orders = np.arange(-int(reach), int(reach) + 1)
+        power = 1e4 * special.jv(orders, reach) ** 2 + rng.exponential(size=len(orders))
+        assert strong_multiple(orders, power, range(2, 5)) == 1
