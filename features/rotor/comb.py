@@ -150,17 +150,19 @@ def strong_multiple(
     factor : float
         By which the strong ones are stronger in power.
     """
-    best, away = 1, np.abs(orders)
+    best, best_ratio, away = 1, factor, np.abs(orders)
     outer = away > np.median(away)
-    parts = [np.ones(len(orders), bool)] + ([~outer] if len(away) and away.max() >= MANY_ORDERS else [])
-    for multiple, part in product(tried, parts):
+    parts = [(np.ones(len(orders), bool), factor)]  # which lines tell it, and by what
+    if away.max(initial=0) >= MANY_ORDERS:
+        parts.append((~outer, INNER_FACTOR))
+    for multiple, (part, least) in product(tried, parts):
         strong, weak = part & (orders % multiple == 0), part & (orders % multiple != 0)
         # the outermost lines are edges; four of each kind tell them apart
         if strong.sum() < 4 or weak.sum() < 4:
             continue
         means = np.maximum([power[strong].mean(), power[weak].mean()], 1e-9)
         ratio = _contrast(means[0], means[1])
-        if ratio <= max(factor, 0.0 if part.all() else INNER_FACTOR):
+        if ratio <= max(least, best_ratio):
             continue
         # several rotors' lines lie in one another at the low orders and may cancel at some; further out they part
         if (outer & strong).any() and (outer & weak).any():
@@ -168,7 +170,7 @@ def strong_multiple(
             if parted <= OUTER_FACTOR:
                 continue
         if two_means_nats(power[strong], power[weak]) > UNEQUAL_NATS:
-            best, factor = multiple, ratio
+            best, best_ratio = multiple, ratio
     return best
 
 
