@@ -7,7 +7,7 @@ periodogram, clicks, strong_lines, slow_lines
 comb_search, comb_sums, flashes, octaves, folding, common_fraction, flash_rate, wide_line, one_sided, comb_centre, comb
     Where a comb may be, which of its multiples and fractions it is, which line is the body's, how wide that is, whether
     all lines lie on one side of it; or why there is no comb.
-comb_fit, weak_lines, turning, drift, changing, changing_fit
+comb_fit, weak_lines, turning, turning_lines, drift, changing, changing_fit
     Combs fitted below the bin: steady ones, of blades not quite alike, of rates that change within the dwell.
 gain, rotors, unresolved, points, left_flashes, like_lines, flash_count, helicopter
     A gain that all lines share; single rotors told apart, whether these are all, or blades are rows of a few points,

@@ -1,12 +1,11 @@
 """Combs whose rates change within the dwell, each in its own way: fitted to the record as it is, all together.
 
 A line turns with its rotor, whatever way that turns. Inner products of such lines have no closed form: each step forms
-them, for ten times what one of `fit_combs` takes.
+them.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from .comb_fit import ENOUGH, NOTCH_RIDGE, CombFit, lines_at_one_place, orders_w
 from .periodogram import LEAST_LEVEL, Level, Periodogram
 from .slow_lines import band_basis, remove_bands
 from .turning import inverse_of, other_rate, own_polynomials
+from .turning_lines import TurningLines
 
 #: A step takes lines^2 x pulses multiplications and holds several times lines x pulses samples, no more than these.
 MOST_PRODUCTS, MOST_SAMPLES = 3_000_000_000, 8_000_000
@@ -60,49 +60,6 @@ class ChangingFit(CombFit):
     ahead_std: NDArray[np.float64]
 
 
-def turning_lines(
-    body: NDArray[np.float64], rate: float, ahead: NDArray[np.float64], orders: NDArray[np.intp], pulses: int
-) -> NDArray[np.complex64]:
-    """Unit lines that turn with a rotor, shape (lines, pulses); their phases count from the middle of the record.
-
-    Parameters
-    ----------
-    body : ndarray, shape (pulses,)
-        Turns of the body's line.
-    rate : float
-        From order to order [cycles a sample].
-    ahead : ndarray, shape (degrees,)
-        As of `ChangingFit`.
-    orders : ndarray of int, shape (lines,)
-        Orders.
-    pulses : int
-        Pulses of the record.
-    """
-    time = middle_times(pulses)
-    turn = 2 * np.pi * rate * (time + ahead @ own_polynomials(pulses))
-    powers = np.empty((int(np.abs(orders).max()) + 1, pulses), np.complex64)
-    powers[0] = 1
-    powers[1:2] = np.exp(1j * turn)
-    for order in range(2, len(powers)):  # of two halves: errors grow with the logarithm of the order
-        np.multiply(powers[order // 2], powers[order - order // 2], out=powers[order])
-    out = powers[np.abs(orders)]
-    np.conjugate(out, out=out, where=(orders < 0)[:, None])
-    out *= np.exp(2j * np.pi * body).astype(np.complex64)
-    return out
-
-
-def _products(lines: NDArray[np.complex64], basis: NDArray[np.complex64]) -> NDArray[np.complex128]:
-    """Mean products of lines that what a basis spans was taken from; the upper triangle."""
-    from scipy.linalg import blas  # here, because predicting needs no such import
-
-    share = 1 / lines.shape[1]
-    out = blas.cherk(share, lines.T, trans=2)
-    if not len(basis):
-        return np.asarray(out, np.complex128)
-    held = lines @ basis.conj().T
-    return np.asarray(blas.cherk(-share, held.T, beta=1.0, c=out, trans=2, overwrite_c=True), np.complex128)
-
-
 def _factored(
     products: NDArray[np.complex128], held_back: NDArray[np.float64]
 ) -> tuple[tuple[NDArray[np.complex128], bool], NDArray[np.float64]] | None:
@@ -140,23 +97,19 @@ class _Turning:
         """Of each line on average [cycles a sample]."""
         return np.asarray(self.centre + self.rates[self.comb] * self.order, np.float64)
 
-    def lines(self) -> NDArray[np.complex64]:
-        """All of them, shape (lines, pulses)."""
+    def lines(self) -> TurningLines:
+        """All of them."""
         body = self.centre * self.time + self.pull * self.shapes[1]
-        each = zip(self.rates, self.ahead, self.orders, strict=True)
-        return np.concatenate([turning_lines(body, *rotor, self.pulses) for rotor in each])
+        return TurningLines(body, list(zip(self.rates, self.ahead, strict=True)), self.comb, self.order)
 
-    def gained(self, lines: NDArray[np.complex64], counted: NDArray[np.complex64]) -> NDArray[np.complex128]:
+    def gained(self, lines: TurningLines, counted: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """What a record gains by another velocity or an acceleration of the body and by each polynomial of each rotor.
 
         Shape (2 + rotors x degrees, pulses), where lines have such amplitudes.
         """
-        out = list(2j * np.pi * (counted @ lines) * self.shapes[:2])
-        leads = (counted * self.order).astype(np.complex64)
-        ends = np.searchsorted(self.comb, np.arange(self.count + 1))
-        for rate, (first, last) in zip(self.rates, pairwise(ends), strict=True):
-            out += list(2j * np.pi * rate * (leads[first:last] @ lines[first:last]) * self.shapes)
-        return np.array(out)
+        leads = np.where(self.comb == np.arange(self.count)[:, None], counted * self.order * self.rates[self.comb], 0)
+        turned = 2j * np.pi * lines.sums(np.concatenate([counted[None], leads]))
+        return np.concatenate([turned[:1] * self.shapes[:2], *(one * self.shapes for one in turned[1:])])
 
     def take(self, step: NDArray[np.float64]) -> None:
         """Go on by a step in what `gained` names."""
@@ -227,26 +180,26 @@ def fit_changing(
     if min(np.bincount(turning.comb[turning.used], minlength=turning.count)) < 3:
         return None
     smooth = over_orders(turning.comb, turning.order)
-    basis = band_basis(pulses, data.strong.bands).astype(np.complex64)
+    basis = band_basis(pulses, data.strong.bands)
     least = LEAST_LEVEL if turning.count == 1 else 1.0
-    samples, level = data.samples.astype(np.complex64), level_about
+    level = level_about
     snr = np.full(len(turning.order), np.inf)
     for number in range(steps):
         frequency, lines = turning.frequency, turning.lines()
         noise = np.maximum(level(frequency), least)
-        seen = (lines @ samples.conj()).conj() / pulses
+        seen = lines.means(data.samples[None])[:, 0]
         together = lines_at_one_place(frequency, pulses)
         snr = np.minimum(snr, np.maximum((smooth(squared(seen) * pulses / noise) - 1) / together, 1e-3))
-        factored = _factored(_products(lines, basis), ridges(snr, together))
+        factored = _factored(lines.products(basis), ridges(snr, together))
         if factored is None:
             return None
         factor, held_back = factored
         amplitudes = cho_solve(factor, seen, check_finite=False)
         snr = np.maximum(smooth(squared(amplitudes * (1 + held_back)) * pulses / noise) - 1, 1e-3)
-        rest = remove_bands(data.samples - amplitudes.astype(np.complex64) @ lines, data.strong.bands)
-        counted = np.where(turning.used, amplitudes, 0).astype(np.complex64)
+        rest = remove_bands(data.samples - lines.sums(amplitudes[None])[0], data.strong.bands)
+        counted = amplitudes * turning.used
         columns = remove_bands(turning.gained(lines, counted), data.strong.bands)
-        leaked = (lines @ columns.conj().T).conj() / pulses
+        leaked = lines.means(columns)
         kept = leaked.conj().T @ cho_solve(factor, leaked, check_finite=False)
         counts = squared(counted * turning.order) + 1e-30
         mean_noise = float(np.average(noise, weights=counts))

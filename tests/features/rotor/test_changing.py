@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from bladewing.features import measure
 from bladewing.features.lines import middle_times
-from bladewing.features.rotor.changing_fit import ChangingFit, Start, fit_changing, turning_lines
+from bladewing.features.rotor.changing_fit import ChangingFit, Start, fit_changing
 from bladewing.features.rotor.comb_fit import ridges
 from bladewing.features.rotor.periodogram import prepared
-from bladewing.features.rotor.slow_lines import remove_bands
+from bladewing.features.rotor.slow_lines import band_basis, remove_bands
 from bladewing.features.rotor.turning import DEGREES, even_change, polynomials
+from bladewing.features.rotor.turning_lines import TurningLines
 from bladewing.features.spectrum import doppler_spectrum
 
 from ...benchmarks import records
@@ -45,13 +46,29 @@ def helicopter(
     return (iq + white(rng, PULSES)).astype(np.complex64), main_hz, signed
 
 
-def test_lines_that_turn_with_a_rotor_are_the_closed_form():
+def lines_of(body, rotors, orders):
+    """Lines of each rotor, one after the other."""
+    comb = np.repeat(np.arange(len(rotors)), [len(own) for own in orders])
+    return TurningLines(body, rotors, comb, np.concatenate(orders))
+
+
+@pytest.mark.parametrize("bands", [(), ((0.0, 9.5), (0.07, 3.0))])
+def test_lines_that_turn_with_rotors_are_the_closed_form(bands):
+    """What they add up to, what they see, and their products without what bands hold."""
     rng = np.random.default_rng(2)
-    ahead, orders, rate = rng.normal(0, 2, len(DEGREES)), np.arange(-70, 71), 1 / 300
+    orders = [np.arange(-70, 71), np.concatenate([np.arange(-12, -2), np.arange(5, 31)])]
+    rotors = [(1 / 300, rng.normal(0, 2, len(DEGREES))), (1 / 190, rng.normal(0, 2, len(DEGREES)))]
     body = 0.07 * TIME + 1e-6 * TIME**2
-    turned = rate * (TIME + ahead @ polynomials(TIME, PULSES))
-    exact = np.exp(2j * np.pi * (orders[:, None] * turned + body))
-    np.testing.assert_allclose(turning_lines(body, rate, ahead, orders, PULSES), exact, atol=3e-5)
+    exact = [
+        np.exp(2j * np.pi * (own[:, None] * rate * (TIME + ahead @ polynomials(TIME, PULSES)) + body))
+        for own, (rate, ahead) in zip(orders, rotors, strict=True)
+    ]
+    exact, lines = np.concatenate(exact), lines_of(body, rotors, orders)
+    np.testing.assert_allclose(lines.sums(np.eye(len(exact))), exact, atol=3e-5)
+    records = white(rng, 3, PULSES)
+    np.testing.assert_allclose(lines.means(records), exact.conj() @ records.T / PULSES, atol=1e-6)
+    left = remove_bands(exact, bands)
+    np.testing.assert_allclose(lines.products(band_basis(PULSES, bands)), left.conj() @ left.T / PULSES, atol=3e-6)
 
 
 @pytest.mark.parametrize("bands", [(), ((0.05, 4.0),), ((0.0, 9.5), (0.004, 3.0), (-0.2, 4.0))])
@@ -71,7 +88,7 @@ def test_combs_are_fitted_whatever_way_each_changes():
     samples, body = 1e-2 * white(rng, PULSES), centre * TIME + 0.15 * polynomials(TIME, PULSES)[1]
     for rate_hz, ahead in zip(rates_hz, truth, strict=True):
         own = white(rng, len(orders))
-        samples = samples + own @ turning_lines(body, rate_hz / records.PRF_HZ, ahead, orders, PULSES)
+        samples = samples + lines_of(body, [(rate_hz / records.PRF_HZ, ahead)], [orders]).sums(own[None])[0]
     data, _ = family_of(white(rng, PULSES).astype(np.complex64))
     data = replace(data, samples=samples * 100, strong=replace(data.strong, bands=()))
     starts = [
