@@ -18,8 +18,8 @@ from .chopping import CHOPPING_RANGE_HZ, MIN_SPACING_BINS
 from .evidence import line_log_ratio
 from .notch import Mask, weights
 from .schema import COMB_BINS
-from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, as_ordered, bins_alike, sums, to_db
-from .window import Window
+from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, as_ordered, bins_alike, per_floor, power_of, sums, to_db
+from .window import BROAD_HANN, NEIGHBOUR_SHARE
 
 #: Lines are looked for up to this speed [m/s]: beyond it lie the ends of few rotors' bands, and noise.
 REACH_MPS = 80.0
@@ -35,6 +35,9 @@ ENDS = (1, 2, 4, 6)
 
 #: What is alike over this much of the spectrum is no comb [Hz], nor over so few bins.
 BLOCK_HZ, BLOCK_BINS = 800.0, 64
+
+#: Noise power of a bin that both beside it are added to, over its own through Hann's window.
+NOISE_GAIN = np.float32(23 / 48)
 
 #: Laguerre coefficients of the evidence that tell how alike it is in neighbouring bins.
 _TERMS = 24
@@ -103,9 +106,9 @@ def _covariance_series() -> NDArray[np.float64]:
     return np.array([float(held @ laguerre.lagval(power, np.eye(_TERMS + 1)[k])) ** 2 for k in range(1, _TERMS + 1)])
 
 
-def _noise_rms(pulses: int, bins: int, length: int, window: Window) -> NDArray[np.float64]:
+def _noise_rms(pulses: int, bins: int, length: int) -> NDArray[np.float64]:
     """Root mean square of the transform of the evidence of white noise, of a single bin, shape (length // 2 + 1,)."""
-    alike = bins_alike(pulses, bins, window)[: bins // 2]
+    alike = bins_alike(pulses, bins, BROAD_HANN)[: bins // 2]
     covariance = np.polynomial.polynomial.polyval(alike, np.concatenate([[0], _covariance_series()]))
     near = np.arange(1, min(len(covariance), 64))
     turn = 2 * np.pi * np.arange(length // 2 + 1) / length
@@ -114,7 +117,7 @@ def _noise_rms(pulses: int, bins: int, length: int, window: Window) -> NDArray[n
 
 
 @lru_cache(maxsize=64)
-def comb_plan(bins: int, pulses: int, carrier_hz: float, prf_hz: float, window: Window) -> CombPlan | None:
+def comb_plan(bins: int, pulses: int, carrier_hz: float, prf_hz: float) -> CombPlan | None:
     """Plan for a dwell; None where it holds no range to search.
 
     Parameters
@@ -123,8 +126,6 @@ def comb_plan(bins: int, pulses: int, carrier_hz: float, prf_hz: float, window: 
         Bins of the spectrum, pulses of the dwell.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz].
-    window : Window
-        Of the spectrum.
     """
     step_mps = prf_hz / bins * SPEED_OF_LIGHT_MPS / carrier_hz / 2
     most = 2 * min(int(REACH_MPS / step_mps), (bins - 1) // 2) + 1
@@ -157,7 +158,7 @@ def comb_plan(bins: int, pulses: int, carrier_hz: float, prf_hz: float, window: 
         slice(first, first + count),
         blocks,
         length,
-        (1 / _noise_rms(pulses, bins, length, window)).astype(np.float32),
+        (1 / _noise_rms(pulses, bins, length)).astype(np.float32),
         lags,
         tuple(within.sum(axis=1).tolist()),
         (1 / (HEIGHT_DEVIATION * np.sqrt(summed))).astype(np.float32),
@@ -172,7 +173,7 @@ def comb_levels_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     Parameters
     ----------
     spectrum : Spectrum
-        Spectra, shape (..., bins).
+        Spectra, shape (..., bins), through Hann's window.
     mask : ndarray of bool or float32, shape (..., bins)
         From `notch_mask`, or its `weights`: the body line is no comb.
 
@@ -185,13 +186,42 @@ def comb_levels_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
         frequency too.
     """
     out = np.full((*spectrum.relative_power.shape[:-1], 1, COMB_BINS), UNSEEN_DB, np.float32)
-    plan = comb_plan(spectrum.bins, spectrum.pulses, spectrum.carrier_hz, spectrum.prf_hz, spectrum.window)
+    plan = comb_plan(spectrum.bins, spectrum.pulses, spectrum.carrier_hz, spectrum.prf_hz)
     if plan is not None:
-        heights = comb_heights(spectrum.relative_power[..., plan.band], weights(mask[..., plan.band]), plan)
+        heights = comb_heights(broad_power(spectrum, plan.band), weights(mask[..., plan.band]), plan)
         # which of several below 0 is taken is no matter: none shows
         loudest = np.maximum.reduceat(as_ordered(_loudest_sums(heights, plan)), plan.spans[0], axis=-1)
         out[..., 0, ::-1][..., plan.seen] = to_db(loudest.view(np.float32), 0.0)
     return out
+
+
+def broad_power(spectrum: Spectrum, band: slice) -> NDArray[np.float32]:
+    """Power over the floor of spectra through Hann's window, as it is through `BROAD_HANN`.
+
+    A window times a cosine of one turn a dwell adds to each bin of the transform the two beside it.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Spectra, shape (..., bins).
+    band : slice
+        Bins that are wanted.
+
+    Returns
+    -------
+    ndarray of float32, shape (..., bins of the band)
+    """
+    lines = np.ascontiguousarray(spectrum.transform)
+    if band.start and band.stop < spectrum.bins:
+        beside = lines[..., band.start - 1 : band.stop - 1] + lines[..., band.start + 1 : band.stop + 1]
+    else:  # beyond an end lies the other
+        beside = (np.roll(lines, 1, axis=-1) + np.roll(lines, -1, axis=-1))[..., band]
+    parts = beside.view(np.float32)  # part by part, for half the price of a complex product
+    parts *= np.float32(NEIGHBOUR_SHARE)
+    beside += lines[..., band]
+    power = power_of(beside)
+    power *= per_floor(spectrum.transform_floor * NOISE_GAIN)[..., None]
+    return power
 
 
 def comb_heights(power: NDArray[np.floating], kept: NDArray[np.floating], plan: CombPlan) -> NDArray[np.floating]:

@@ -23,6 +23,7 @@ CHAIN = (
     "phase_noise",
     "impulses",
     "flicker",
+    "spurs",
     "mains",
     "bursts",
     "colour",
@@ -107,7 +108,7 @@ class ReceiverBounds:
         reaches = self._missed * float(np.prod([self.gain(name) for name in before], initial=1.0))
         if effect in ("fading", "phase_noise"):
             spread = self._multiplier(effect)
-        elif effect in ("dc", "impulses", "flicker", "mains", "bursts"):
+        elif effect in ("dc", "impulses", "flicker", "spurs", "mains", "bursts"):
             spread = 0.0
         else:
             spread = 1 + self.gain(effect)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 1657 of them.
-WIDTH = 1658
+#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 1662 of them.
+WIDTH = 1663
 
 #: What a steady body's acceleration is of a manoeuvring one's. Half of all bodies are steady, whatever they are: if one
 #: class alone accelerated, a line that bends would be all there is to learn of it.
@@ -152,8 +152,15 @@ LAWS: dict[str, Law] = {
     "flicker_db": Law("uniform", -20.0, 30.0, "dB", "1/f noise at 1 % of the PRF over the thermal floor"),
     "fading_db": Law("uniform", 0.0, 12.0, "dB", "swing of glint and multipath"),
     "fading_hz": Law("log", 0.3, 25.0, "Hz", "lines decorrelate in tens to hundreds of ms (IET RSN 2022)"),
-    "impulse_db": Law("uniform", 10.0, 45.0, "dB", "a spoilt pulse over noise"),
+    "impulse_db": Law("uniform", 6.0, 50.0, "dB", "a spoilt pulse over noise"),
+    "impulse_count": Law("log", 1.0, 100.0, "1", "spoilt stretches at any time; of single pulses a few percent"),
     "impulse_pulses": Law("log", 3.0, 500.0, "1", "between two pulses that another radar spoils; its PRF is alike"),
+    "impulse_lasts": Law("log", 0.02, 100.0, "1", "pulses in a row that a packet or a chirp spoils; one, if below 1.5"),
+    "impulse_turns": Law("uniform", -0.5, 0.5, "1", "turns a pulse of its phase when it begins"),
+    "impulse_sweep": Law("log", 0.01, 1.0, "1", "by how much those rise or fall until it ends"),
+    "spur_db": Law("uniform", -30.0, 25.0, "dB", "a steady line of the receiver's own over noise"),
+    "spur_turns": Law("uniform", -0.5, 0.5, "1", "turns a pulse of its phase"),
+    "spur_count": Law("uniform", 0.5, 3.5, "1", "such lines"),
     "high_pass_hz": Law("log", 3.0, 150.0, "Hz", "capacitor-coupled audio front ends"),
     "canceller_pulses": Law("uniform", 2.0, 3.0, "1", "moving-target indication by two or three pulses"),
     "mains_db": Law("uniform", -25.0, 15.0, "dB", "mains lines together over noise"),

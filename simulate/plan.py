@@ -43,6 +43,7 @@ WORDS = {
     "phase_noise": ("phase noise", "a clean oscillator"),
     "impulses": ("spoilt pulses", "none"),
     "flicker": ("1/f noise", "white noise alone"),
+    "spurs": ("steady lines of the receiver's own", "none"),
     "mains": ("mains lines", "none"),
     "bursts": ("bursts of noise", "none"),
     "colour": ("a band that is not flat", "a flat band"),

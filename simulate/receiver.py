@@ -31,6 +31,7 @@ FAULT_CHANCE = {
     "real_only": 0.03,
     "analytic": 0.14,
     "converter": 0.4,
+    "spurs": 0.04,
 }
 
 #: Whose effect each parameter of a receiver is.
@@ -39,6 +40,13 @@ EFFECT_OF = {
     "fading_hz": "fading",
     "impulse_db": "impulses",
     "impulse_pulses": "impulses",
+    "impulse_lasts": "impulses",
+    "impulse_turns": "impulses",
+    "impulse_sweep": "impulses",
+    "impulse_count": "impulses",
+    "spur_db": "spurs",
+    "spur_turns": "spurs",
+    "spur_count": "spurs",
     "high_pass_hz": "high_pass",
     "canceller_pulses": "canceller",
     "flicker_db": "flicker",
@@ -62,8 +70,11 @@ FAULTLESS_CHANCE = 0.5
 #: Humps of a band that is not flat.
 HUMPS = 2
 
-#: Most spoilt pulses of a record.
-MAX_IMPULSES = 4
+#: Spoilt stretches take at most so much of a record, those at any time together, even ones each of what is between two.
+SPOILT_SHARE = 0.25
+
+#: Most steady lines of a receiver's own.
+SPURS = 3
 
 
 class Receiver:
@@ -80,10 +91,16 @@ class Receiver:
         self.fading_db = draws.value("fading_db")
         self.fading_hz = draws.value("fading_hz", 2)
         self.fading_phase = draws.value("phase_rad", 2)
-        self.impulse_db = draws.value("impulse_db", MAX_IMPULSES)
-        self.impulse_at = draws.uniform(MAX_IMPULSES)
-        self.impulse_phase = draws.value("phase_rad", MAX_IMPULSES)
-        self.impulse_count = 1 + np.floor(MAX_IMPULSES * draws.uniform())
+        self.impulse_db = draws.value("impulse_db")
+        self.impulse_at = draws.uniform()
+        self.impulse_lasts = draws.value("impulse_lasts")
+        self.impulse_turns = draws.value("impulse_turns")
+        self.impulse_sweep = draws.value("impulse_sweep") * draws.sign()
+        self.impulse_count = np.rint(draws.value("impulse_count"))
+        self.spur_db = draws.value("spur_db", SPURS)
+        self.spur_turns = draws.value("spur_turns", SPURS)
+        self.spur_phase = draws.value("phase_rad", SPURS)
+        self.spur_count = np.rint(draws.value("spur_count"))
         self.high_pass_hz = draws.value("high_pass_hz")
         self.canceller_pulses = np.rint(draws.value("canceller_pulses"))
         self.flicker_db = draws.value("flicker_db")
@@ -153,10 +170,9 @@ class Receiver:
             angle *= self.phase_noise_rad[rows].astype(np.float32)[:, None]
             iq[rows] *= turned(angle)
         iq = iq + noise
-        self._strike(iq, np.flatnonzero(self.on["impulses"] & ~self.impulse_even))
-        rows = np.flatnonzero(self.on["impulses"] & self.impulse_even)
+        rows = np.flatnonzero(self.on["impulses"])
         if len(rows):
-            self._interfere(iq, rows, normals_of("impulses")(rows))
+            self._spoil(iq, rows, normals_of("impulses")(rows))
         rows = np.flatnonzero(self.on["flicker"])
         if len(rows):
             # the law sets the density at 1 % of the PRF; the process has unit power, so scale by the sum of the lines
@@ -165,6 +181,9 @@ class Receiver:
             iq[rows] += np.sqrt(power).astype(np.float32)[:, None] * shaped_noise(
                 normals_of("flicker")(rows), radar, colour[None], v
             )
+        rows = np.flatnonzero(self.on["spurs"])
+        if len(rows):
+            iq[rows] += self._spurs(radar, rows)
         rows = np.flatnonzero(self.on["mains"])
         if len(rows):
             iq[rows] += self._mains(radar, rows)
@@ -186,25 +205,44 @@ class Receiver:
         gain = PulseGrid(radar).sines(Sine(swing, self.fading_hz[rows], self.fading_phase[rows]))
         return np.exp(gain, out=gain)
 
-    def _strike(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:
-        """Single pulses spoilt by another emitter: broadband like a flash, but not periodic."""
-        for row in rows:
-            for n in range(int(self.impulse_count[row])):
-                amplitude = 10 ** (self.impulse_db[row, n] / 20) * np.exp(1j * self.impulse_phase[row, n])
-                iq[row, int(self.impulse_at[row, n] * iq.shape[-1])] += np.complex64(amplitude)
+    def _spoil(self, iq: NDArray[np.complex64], rows: NDArray[np.intp], normals: Normals) -> None:
+        """Pulses spoilt by another emitter, single or a stretch of them, at any time or, as by another radar, evenly.
 
-    def _interfere(self, iq: NDArray[np.complex64], rows: NDArray[np.intp], normals: Normals) -> None:
-        """Single pulses of another radar, whose own come at another rate: evenly spaced, of any phase.
-
-        In time they are as short as a rotor's flashes can be and as regular, in Doppler white.
+        Single ones are as short in time as a rotor's flashes can be, even ones as regular; in Doppler they are white. A
+        stretch is a tone that sweeps, hardly or through the whole band: a packet, another radar's chirp. Even ones of
+        one phase would be ticks, which at any rate cost drones their name (docs/ablation.md).
         """
         pulses = iq.shape[-1]
-        phases = normals(2 * pulses).view(np.complex64)
+        phases = normals(4 * pulses).view(np.complex64)
         phases /= np.abs(phases)
-        for row, phase in zip(rows, phases, strict=True):
-            spacing = max(float(self.impulse_pulses[row]), 1.0)
-            spoilt = np.arange(self.impulse_at[row, 0] * spacing, pulses, spacing).astype(np.intp)
-            iq[row, spoilt] += np.float32(10 ** (self.impulse_db[row, 0] / 20)) * phase[spoilt]
+        for row, (phase, other) in zip(rows, phases.reshape(len(rows), 2, pulses), strict=True):
+            lasts = max(1, round(float(self.impulse_lasts[row])))
+            if self.impulse_even[row]:
+                spacing = max(float(self.impulse_pulses[row]), 1.0)
+                lasts = max(1, min(lasts, int(spacing * SPOILT_SHARE)))
+                first = np.arange(self.impulse_at[row] * spacing, pulses, spacing).astype(np.intp)
+            else:
+                lasts = max(1, min(lasts, int(pulses * SPOILT_SHARE)))
+                count = max(1, min(int(self.impulse_count[row]), int(pulses * SPOILT_SHARE / lasts)))
+                first = ((np.angle(other[:count]) / TWO_PI + 0.5) * pulses).astype(np.intp) % pulses
+            within = np.arange(lasts)
+            turns = within * (self.impulse_turns[row] + self.impulse_sweep[row] * within / (2 * lasts))
+            tone = turned((TWO_PI * turns).astype(np.float32))
+            stretch = np.float32(10 ** (self.impulse_db[row] / 20)) * phase[: len(first), None] * tone
+            spoilt = first[:, None] + within
+            heard = spoilt < pulses
+            # two may fall on one pulse
+            np.add.at(iq[row], spoilt[heard], np.broadcast_to(stretch, spoilt.shape)[heard])
+
+    def _spurs(self, radar: Radar, rows: NDArray[np.intp]) -> NDArray[np.complex64]:
+        """Steady lines of the receiver's own, or of another mover: any number is no rotor's comb."""
+        out = np.zeros((len(rows), radar.pulses), np.complex64)
+        for n in range(SPURS):
+            level = np.where(n < self.spur_count[rows], 10 ** (self.spur_db[rows, n] / 20), 0.0).astype(np.float32)
+            turns = self.spur_turns[rows, n, None] * np.arange(radar.pulses) % 1  # thousands: more than float32 holds
+            angle = (TWO_PI * turns + self.spur_phase[rows, n, None]).astype(np.float32)
+            out += level[:, None] * turned(angle)
+        return out
 
     def _mains(self, radar: Radar, rows: NDArray[np.intp]) -> NDArray[np.float32]:
         """Harmonics of the mains, real and so on both sides of the spectrum alike."""

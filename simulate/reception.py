@@ -112,8 +112,9 @@ class Reception:
             self.drawn.mains_hz = np.array([part.mains_hz])
         if "burst_hz" in part.values:  # in training records most bursts come at their receiver's mains' rate
             self.drawn.burst_hz = np.array([part.values["burst_hz"]])
-        if "impulse_pulses" in part.values:  # in training records half of the spoilt pulses come at any time
-            self.drawn.impulse_even = np.array([True])
+        # in training records half of the spoilt pulses come evenly, the others at any time
+        if "impulse_pulses" in part.values or "impulse_count" in part.values:
+            self.drawn.impulse_even = np.array(["impulse_pulses" in part.values])
         #: Names of the effects that are on; "dc" is the offset.
         self.effects = {name for name in part.effects if name not in scene.off}
         if part.dc_db is not None:

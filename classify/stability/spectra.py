@@ -9,7 +9,7 @@ from bladewing.features import measure
 from bladewing.features.bandwidth import energy_band_mps, noise_threshold_db, threshold_band_hz
 from bladewing.features.cadence import CLIP, LEAST_MEAN, cadence_db, cadence_plan
 from bladewing.features.chopping import CLIP_DB, cepstrum, noise_shape
-from bladewing.features.comb_levels import comb_heights, comb_plan
+from bladewing.features.comb_levels import broad_power, comb_heights, comb_plan
 from bladewing.features.inputs import model_inputs
 from bladewing.features.notch import notch_mask, residual, strongest_bin
 from bladewing.features.schema import INPUT_SHAPES
@@ -195,10 +195,10 @@ def _cadence_error(iq: NDArray[np.complex64]) -> float:
 def _comb_heights_error(iq: NDArray[np.complex64]) -> float:
     """`comb_heights` against long double, of the same powers; the deviation of noise is about a half."""
     spectrum, mask = _notched(iq)
-    plan = comb_plan(spectrum.bins, spectrum.pulses, _CARRIER_HZ, _PRF_HZ, spectrum.window)
+    plan = comb_plan(spectrum.bins, spectrum.pulses, _CARRIER_HZ, _PRF_HZ)
     if plan is None:
         return 0.0
-    kept, power = mask[plan.band], spectrum.relative_power[plan.band]
+    kept, power = mask[plan.band], broad_power(spectrum, plan.band)
     exact = comb_heights(power.astype(np.longdouble), kept.astype(np.longdouble), plan)
     return float(np.abs(comb_heights(power, kept.astype(np.float32), plan) - exact).max() / max(1.0, exact.max()))
 

@@ -7,8 +7,9 @@ from ..axis import UNSEEN_DB
 from ..evidence import LINE_CAP, MISSING_SHARE
 from ..schema import COMB_BINS
 from ..spectrum import Spectrum
+from ..window import NEIGHBOUR_SHARE
 from .operators import Value
-from .spectrum import dft_power, spans_of, to_db
+from .spectrum import dft_power, power_of, spans_of, to_db
 
 
 def line_nats(relative_power: Value) -> Value:
@@ -19,17 +20,27 @@ def line_nats(relative_power: Value) -> Value:
     return seen.apply("Log").at_most(LINE_CAP)
 
 
-def comb_levels_db(radar: Spectrum, relative_power: Value, kept: Value) -> Value:
-    """As `comb_levels.comb_levels_db`."""
-    graph = relative_power.graph
-    plan = definition.comb_plan(radar.bins, radar.pulses, radar.carrier_hz, radar.prf_hz, radar.window)
+def broad_power(radar: Spectrum, transform: Value, floor: Value, band: slice) -> Value:
+    """As `comb_levels.broad_power`: from parts (n, 2, bins) and the floor to power (n, bins of the band)."""
+    bins = radar.bins
+    around = transform.graph.concat(transform.slice(bins - 1, bins), transform, transform.slice(0, 1))
+    first, stop = band.start + 1, band.stop + 1
+    beside = around.slice(first - 1, stop - 1) + around.slice(first + 1, stop + 1)
+    lines = around.slice(first, stop) + beside * NEIGHBOUR_SHARE
+    return power_of(lines, stop - first) / (floor * float(definition.NOISE_GAIN))
+
+
+def comb_levels_db(radar: Spectrum, transform: Value, floor: Value, kept: Value) -> Value:
+    """As `comb_levels.comb_levels_db`: from the transform's parts, its floor (above 0) and the notches' weights."""
+    graph = transform.graph
+    plan = definition.comb_plan(radar.bins, radar.pulses, radar.carrier_hz, radar.prf_hz)
     if plan is None:
         nothing = np.full((1, 1, COMB_BINS), UNSEEN_DB, np.float32)
-        return relative_power.slice(0, 1).reshape(-1, 1, 1) * 0.0 + nothing
+        return kept.slice(0, 1).reshape(-1, 1, 1) * 0.0 + nothing
     first, stop = plan.band.start, plan.band.stop
     size = (stop - first) // plan.blocks
     counts = kept.slice(first, stop).reshape(-1, plan.blocks, size)
-    nats = line_nats(relative_power.slice(first, stop)).reshape(-1, plan.blocks, size)
+    nats = line_nats(broad_power(radar, transform, floor, plan.band)).reshape(-1, plan.blocks, size)
     mean = (nats * counts).sum() / counts.sum().at_least(1.0)
     line = ((nats - mean) * counts).reshape(-1, stop - first).pad(0, plan.length - (stop - first))
     # one coefficient more than there are: what lies beyond the last counts as the mean

@@ -117,7 +117,7 @@ def input_graph(
     if "cadence" in names:
         out["cadence"] = cadence_db(radar, transform, floor, kept)
     if "combs" in names:
-        out["combs"] = comb_levels_db(radar, relative_power, kept)
+        out["combs"] = comb_levels_db(radar, transform, floor, kept)
     if "spectrum" in names or "features" in names:
         length = part_length(pulses)
         starts, _ = frame_starts(pulses, length, PARTS)

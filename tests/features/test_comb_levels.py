@@ -11,6 +11,7 @@ from bladewing.features.comb_levels import (
     REACH_MPS,
     WEAK_SNR,
     _covariance_series,
+    broad_power,
     comb_edges_hz,
     comb_levels_db,
     comb_plan,
@@ -20,7 +21,7 @@ from bladewing.features.evidence import LINE_CAP, MISSING_SHARE
 from bladewing.features.notch import notch_mask, strongest_bin
 from bladewing.features.schema import COMB_BINS, FEATURES
 from bladewing.features.spectrum import centred_power
-from bladewing.features.window import HANN
+from bladewing.features.window import BROAD_HANN, HANN
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate, special
@@ -40,7 +41,7 @@ def cell_of(rate_hz):
 
 def plan_of(pulses, carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ):
     bins = doppler_spectrum(np.zeros(pulses, np.complex64), carrier_hz=carrier_hz, prf_hz=prf_hz).bins
-    return comb_plan(bins, pulses, carrier_hz, prf_hz, HANN)
+    return comb_plan(bins, pulses, carrier_hz, prf_hz)
 
 
 def test_evidence_is_the_likelihood_ratio_of_a_line_that_may_be_missing():
@@ -77,13 +78,26 @@ def test_noise_is_alike_at_all_spacings_that_lie_apart(pulses):
     records = 400
     plan = plan_of(pulses)
     iq = white(np.random.default_rng(0), records, pulses)
-    nats = line_nats(centred_power(iq.astype(np.complex64), window=HANN)[:, plan.band])
+    nats = line_nats(centred_power(iq.astype(np.complex64), window=BROAD_HANN)[:, plan.band])
     heights = np.abs(np.fft.rfft(nats - nats.mean(), plan.length)) * plan.per_noise / np.sqrt(nats.shape[1])
     apart = heights[:, plan.lags[0, 0] :: 3]
     assert np.mean(apart) == pytest.approx(MEAN_HEIGHT, rel=0.03)
     assert np.std(apart) == pytest.approx(HEIGHT_DEVIATION, rel=0.05)
     each = np.abs(apart.mean(axis=0) - MEAN_HEIGHT)
     assert np.mean(each < 4 * HEIGHT_DEVIATION / np.sqrt(records)) > 0.97
+
+
+@pytest.mark.parametrize("pulses", [16, 64, 700, 1023, 2047, 2048])
+def test_bins_with_those_beside_them_are_the_spectrum_through_the_broad_window(pulses):
+    """To a thousandth of the noise; where zeros make a dwell one that transforms fast, to a percent of it."""
+    iq = white(np.random.default_rng(8), 50, pulses).astype(np.complex64)
+    spectrum = doppler_spectrum(iq, **RADAR, window=HANN)
+    for band in (slice(None, None), slice(1, spectrum.bins - 1), slice(5, spectrum.bins // 2)):
+        whole = slice(*band.indices(spectrum.bins)[:2])
+        wanted = centred_power(iq, window=BROAD_HANN)[:, whole] / spectrum.transform_floor[:, None]
+        found = broad_power(spectrum, whole)
+        away = np.sqrt(np.mean((found - wanted) ** 2) / np.mean(wanted**2))
+        assert away < (2.5 + 4 * (spectrum.bins - pulses)) / pulses
 
 
 @pytest.mark.parametrize("rate_hz", [47.0, 58.6, 91.0])
@@ -149,7 +163,9 @@ def test_it_is_what_its_definition_says(pulses):
     plan = plan_of(pulses)
     assert np.abs(spectrum.velocity_mps[plan.band]).max() <= REACH_MPS
     np.testing.assert_allclose(spectrum.velocity_mps[plan.band].sum(), 0, atol=1e-6)  # as far to both sides
-    nats = line_nats(spectrum.relative_power[plan.band].astype(float))
+    taper = HANN.taper(pulses) * (1 + np.cos(2 * np.pi * np.arange(pulses) / spectrum.bins) / 2)
+    broad = np.fft.fftshift(np.fft.fft(taper / np.sqrt(np.sum(taper**2)) * iq.astype(np.complex64), spectrum.bins))
+    nats = line_nats(np.abs(broad[plan.band]) ** 2 / float(spectrum.transform_floor))
     kept = mask[plan.band]
     for block in np.split(np.arange(len(nats)), plan.blocks):
         nats[block] = np.where(kept[block], nats[block] - nats[block][kept[block]].mean(), 0)

@@ -283,7 +283,7 @@ def changed_by(scene: Scene, seed: int, effect: str) -> float:
 @pytest.mark.parametrize("others", [[], ["fading", "colour", "image"]], ids=["alone", "among others"])
 def test_every_bound_of_a_receiver_holds_and_is_not_idle(effect, others):
     ratios = []
-    for seed in range(8):
+    for seed in range(40):
         rng = np.random.default_rng(seed)
         more = {
             "jitter": {"jitter_s": log_uniform(rng, 1e-9, 1e-6)},
@@ -297,7 +297,7 @@ def test_every_bound_of_a_receiver_holds_and_is_not_idle(effect, others):
         assert true <= bound * (1 + 1e-4) + 1e-12 * whole, (seed, true, bound)
         if true > 1e-10 * whole:
             ratios.append(bound / true)
-    assert len(ratios) >= 5
+    assert len(ratios) >= 25
     assert np.median(ratios) <= 10
 
 

@@ -630,8 +630,13 @@ def received(effects: list[str], **values: float) -> Rendering:
 
 @pytest.mark.parametrize("name", EFFECT_OF)
 def test_a_value_of_a_receiver_changes_its_effect_alone_and_is_warned_of_without_it(name):
-    effect, (low, high) = EFFECT_OF[name], (LAWS[name].low, LAWS[name].high)
-    with_it, other = received([effect], **{name: low}), received([effect], **{name: high})
+    effect, low = EFFECT_OF[name], LAWS[name].low
+    high = low + 0.9 * (LAWS[name].high - low)  # both ends of a turn are one
+    several = {
+        "impulse_turns": {"impulse_lasts": 20.0},  # one pulse has but a phase
+        "impulse_sweep": {"impulse_lasts": 20.0},
+    }.get(name, {})
+    with_it, other = received([effect], **several, **{name: low}), received([effect], **several, **{name: high})
     assert not with_it.warnings
     assert not np.array_equal(with_it.iq, other.iq)
     others = [one for one in FAULT_CHANCE if one != effect]
@@ -664,7 +669,8 @@ def test_flicker_has_its_density_at_a_hundredth_of_the_prf_and_falls_with_the_fr
 
 
 def test_spoilt_pulses_have_the_level_asked_for_and_any_phase():
-    iq = np.array([empty(effects=["impulses"], values={"impulse_db": 20.0}).render(seed).iq for seed in range(60)])
+    values = {"impulse_db": 20.0, "impulse_lasts": 1.0}
+    iq = np.array([empty(effects=["impulses"], values=values).render(seed).iq for seed in range(60)])
     spoilt = iq[iq != 0]
     assert len(spoilt) > 100
     assert np.mean(np.isclose(np.abs(spoilt), 10.0, rtol=1e-5)) > 0.98  # two may fall on one pulse
@@ -673,7 +679,7 @@ def test_spoilt_pulses_have_the_level_asked_for_and_any_phase():
 
 
 def test_pulses_of_another_radar_are_evenly_spaced_of_one_level_and_any_phase():
-    values = {"impulse_db": 20.0, "impulse_pulses": 37.4}
+    values = {"impulse_db": 20.0, "impulse_pulses": 37.4, "impulse_lasts": 1.0}
     iq = np.array([empty(effects=["impulses"], values=values).render(seed).iq for seed in range(20)])
     firsts = []
     for one in iq:
@@ -687,6 +693,45 @@ def test_pulses_of_another_radar_are_evenly_spaced_of_one_level_and_any_phase():
     assert max(firsts) in range(27, 38)
     turns = np.exp(1j * np.angle(iq[iq != 0]))
     assert abs(turns.mean()) < 4 / np.sqrt(2 * len(turns))
+
+
+def test_so_many_pulses_are_spoilt_as_asked_for_and_anywhere_in_the_record():
+    values = {"impulse_lasts": 1.0, "impulse_count": 40.0}
+    places = [np.flatnonzero(empty(effects=["impulses"], values=values).render(seed).iq) for seed in range(30)]
+    assert max(map(len, places)) == 40
+    assert min(map(len, places)) >= 38  # two may fall on one pulse
+    share = np.sort(np.concatenate(places)) / 5000
+    away = np.abs(share - (np.arange(len(share)) + 0.5) / len(share)).max()
+    assert away < 1.95 / np.sqrt(len(share))  # Kolmogorov-Smirnov, 0.1 %
+
+
+def test_a_spur_is_a_steady_line_of_the_level_asked_for():
+    values = {"spur_db": 20.0, "spur_turns": 0.1, "spur_count": 1.0}
+    for seed in range(5):
+        iq = empty(effects=["spurs"], values=values).render(seed).iq
+        np.testing.assert_allclose(np.abs(iq), 10.0, rtol=1e-5)
+        np.testing.assert_allclose(np.angle(iq[1:] * iq[:-1].conj()), 0.2 * np.pi, atol=1e-5)
+    values = {"spur_db": 20.0, "spur_count": 3.0}
+    powers = [np.mean(np.abs(empty(effects=["spurs"], values=values).render(seed).iq) ** 2) for seed in range(40)]
+    assert np.mean(powers) == pytest.approx(300.0, rel=0.03)
+
+
+def test_a_spoilt_stretch_is_a_tone_of_one_level_that_sweeps_either_way_and_leaves_pauses():
+    values = {"impulse_db": 20.0, "impulse_lasts": 12.0, "impulse_turns": 0.1, "impulse_sweep": 0.24}
+    ways = []
+    for seed in range(20):
+        iq = empty(effects=["impulses"], values={**values, "impulse_pulses": 300.0}).render(seed).iq
+        places = np.flatnonzero(iq)
+        stretches = [run for run in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if len(run) == 12]
+        assert len(stretches) in (16, 17)
+        for run in stretches:
+            np.testing.assert_allclose(np.abs(iq[run]), 10.0, rtol=1e-5)
+            turns = np.angle(iq[run][1:] * iq[run][:-1].conj()) / (2 * np.pi)
+            ways.append(np.sign(turns[-1] - turns[0]))
+            np.testing.assert_allclose(turns, 0.1 + ways[-1] * 0.24 * (np.arange(11) + 0.5) / 12, atol=1e-4)
+    assert set(ways) == {-1.0, 1.0}
+    dense = empty(effects=["impulses"], values={**values, "impulse_pulses": 20.0}).render(1).iq
+    assert np.mean(dense != 0) == pytest.approx(5 / 20, abs=0.01)
 
 
 def test_a_shaken_airframe_turns_its_echo_at_the_rate_of_the_shaking():
