@@ -37,9 +37,10 @@ SURE_DEVIATIONS = 5.0
 #: hovering body 15 dB over ground does.
 LEAST_OVER_BESIDE_AT_REST_DB = 22.0
 
-#: A line that is smeared over more bins than these rises by so much when the smear is taken out [dB]; what does not is
-#: no line. (Over three bins a line alone loses 2.4 dB.)
-SHOWN_STEPS, LEAST_RISE_DB = 3.2, 2.0
+#: A line that is smeared over more bins than these rises at least by this power of their number when the smear is taken
+#: out; what does not is no line. (One alone rises by 2.4 dB from three bins, 4.2 from four and 8.8 from eleven; blades'
+#: lines that fall together by chance by 2 to 3 dB from six to eleven.)
+SHOWN_STEPS, RISE_EXPONENT = 3.2, 0.4
 
 #: Pulses that a line's smear can be told from, at least.
 LEAST_PULSES = 32
@@ -115,7 +116,7 @@ def body_acceleration(
             curve = 2 * middle - left - right
             at += share * (np.clip((right - left) / (2 * curve), -1, 1) if curve > 0 else 0.0)
         beside = _beside(one, at * step, wavelength_m, prf_hz, size)
-        risen = height > float(steady.max()) * 10 ** (LEAST_RISE_DB / 10)
+        risen = height > float(steady.max()) * abs(at) ** RISE_EXPONENT
         if height < beside * 10 ** (LEAST_OVER_BESIDE_DB / 10) or (abs(at) > SHOWN_STEPS and not risen):
             continue
         value[index] = at * step
