@@ -36,8 +36,11 @@ ENDS = (1, 2, 4, 6)
 #: What is alike over this much of the spectrum is no comb [Hz], nor over so few bins.
 BLOCK_HZ, BLOCK_BINS = 800.0, 64
 
+_HANN_BINS = (-0.25, 0.5, -0.25)  # what Hann's window holds of a line
+_BROAD_BINS = np.convolve(_HANN_BINS, (NEIGHBOUR_SHARE, 1.0, NEIGHBOUR_SHARE))
+
 #: Noise power of a bin that both beside it are added to, over its own through Hann's window.
-NOISE_GAIN = np.float32(23 / 48)
+NOISE_GAIN = np.float32(np.sum(_BROAD_BINS**2) / np.sum(np.square(_HANN_BINS)))
 
 #: Laguerre coefficients of the evidence that tell how alike it is in neighbouring bins.
 _TERMS = 24
