@@ -15,6 +15,9 @@ _SHAPE = 2.3 * TAPS
 #: These bins, from the one below the line.
 TAP = np.arange(1 - TAPS // 2, 1 + TAPS // 2)
 
+#: Products of lines worked out at once: they must stay in the cache.
+PRODUCTS_AT_ONCE = 2**15
+
 
 def squared(amplitude: NDArray[np.complexfloating]) -> NDArray[np.floating]:
     """Power of amplitudes, in their own precision."""
@@ -138,28 +141,37 @@ def line_products(
     With D the Dirichlet kernel of the frequencies' difference: D, D' / 2 pi and -D'' / 4 pi^2. The second is the mean
     of conj(line k) x time x line l without its factor -j; it is antisymmetric.
     """
-    top_sine, top_cosine = _differences(np.pi * pulses * frequency, 1 / pulses, 0.5)
-    low_sine, low_cosine = _differences(np.pi * frequency, 1.0, 1.0)
-    near = np.flatnonzero(np.abs(low_sine) < 1e-5 / pulses)
-    np.put(low_sine, near, 1.0)
-    over = np.divide(1, low_sine, out=low_sine)
-    plain = np.multiply(top_sine, over, out=top_sine)
-    np.put(plain, near, 1.0)
-    ratio = np.multiply(low_cosine, over, out=low_cosine)
-    first = np.multiply(top_cosine, over, out=top_cosine)
-    second = plain / 2
-    first -= second * ratio
-    np.put(first, near, 0.0)
-    second *= (pulses**2 - 1) / 2
-    second += np.multiply(ratio, first, out=ratio)
-    np.put(second, near, (pulses**2 - 1) / 12)
+    (top_rows, top_sines, top_cosines), (low_rows, low_sines, low_cosines) = (
+        _of_differences(angle) for angle in (np.pi * pulses * frequency, np.pi * frequency)
+    )
+    top_sines /= pulses
+    top_cosines /= 2
+    count = len(frequency)
+    plain, first, second = np.empty((3, count, count))
+    for begin in range(0, count, rows := max(1, PRODUCTS_AT_ONCE // max(count, 1))):
+        some = slice(begin, begin + rows)
+        low_sine, low_cosine = low_rows[some] @ low_sines, low_rows[some] @ low_cosines
+        near = np.abs(low_sine) < 1e-5 / pulses
+        low_sine[near] = 1.0
+        over = np.divide(1, low_sine, out=low_sine)
+        ratio = np.multiply(low_cosine, over, out=low_cosine)
+        own = np.matmul(top_rows[some], top_sines, out=plain[some])
+        own *= over
+        own[near] = 1.0
+        timed = np.matmul(top_rows[some], top_cosines, out=first[some])
+        timed *= over
+        timed_twice = np.multiply(own, 0.5, out=second[some])
+        timed -= np.multiply(timed_twice, ratio, out=over)
+        timed[near] = 0.0
+        timed_twice *= (pulses**2 - 1) / 2
+        timed_twice += np.multiply(ratio, timed, out=ratio)
+        timed_twice[near] = (pulses**2 - 1) / 12
     return plain, first, second
 
 
-def _differences(
-    angle: NDArray[np.floating], sine_scale: float, cosine_scale: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Scaled sines and cosines of the angles' differences, column less row: products of rank two."""
+def _of_differences(
+    angle: NDArray[np.floating],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Rows, columns of sines and columns of cosines: products of these are those of differences, column less row."""
     sine, cosine = np.sin(angle), np.cos(angle)
-    rows = np.stack([cosine, sine], axis=1)
-    return rows @ (sine_scale * np.stack([sine, -cosine])), rows @ (cosine_scale * np.stack([cosine, sine]))
+    return np.stack([cosine, sine], axis=1), np.stack([sine, -cosine]), np.stack([cosine, sine])

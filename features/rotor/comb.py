@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,27 +149,30 @@ def strong_multiple(
     factor : float
         By which the strong ones are stronger in power.
     """
-    best, best_ratio, away = 1, factor, np.abs(orders)
+    multiples, away = np.array(tuple(tried), np.intp), np.abs(orders)
+    if not len(multiples) or not len(orders):
+        return 1
     outer = away > np.median(away)
-    parts = [(np.ones(len(orders), bool), factor)]  # which lines tell it, and by what
-    if away.max(initial=0) >= MANY_ORDERS:
-        parts.append((~outer, INNER_FACTOR))
-    for multiple, (part, least) in product(tried, parts):
-        strong, weak = part & (orders % multiple == 0), part & (orders % multiple != 0)
-        # the outermost lines are edges; four of each kind tell them apart
-        if strong.sum() < 4 or weak.sum() < 4:
+    parts, least = np.ones((1, len(orders)), bool), np.array([factor])  # which lines tell it, and by what
+    if away.max() >= MANY_ORDERS:
+        parts, least = np.stack([parts[0], ~outer]), np.array([factor, INNER_FACTOR])
+    is_strong = orders % multiples[:, None] == 0
+    number, total = (is_strong.astype(float) @ (parts * each).T for each in (1.0, power))
+    weak_number, weak_total = parts.sum(axis=1) - number, parts @ power - total
+    ratio = _contrast(total / np.maximum(number, 1), weak_total / np.maximum(weak_number, 1))
+    # the outermost lines are edges; four of each kind tell them apart
+    tells = (np.minimum(number, weak_number) >= 4) & (ratio > least)
+    best, best_ratio = 1, factor
+    for place, part in np.argwhere(tells):
+        if ratio[place, part] <= best_ratio * (1 + 1e-9):  # or of the very same lines
             continue
-        means = np.maximum([power[strong].mean(), power[weak].mean()], 1e-9)
-        ratio = _contrast(means[0], means[1])
-        if ratio <= max(least, best_ratio):
-            continue
+        strong, weak = parts[part] & is_strong[place], parts[part] & ~is_strong[place]
         # several rotors' lines lie in one another at the low orders and may cancel at some; further out they part
-        if (outer & strong).any() and (outer & weak).any():
-            parted = _contrast(power[outer & strong].mean(), power[outer & weak].mean())
-            if parted <= OUTER_FACTOR:
-                continue
+        far = power[outer & strong], power[outer & weak]
+        if min(map(len, far)) and _contrast(far[0].mean(), far[1].mean()) <= OUTER_FACTOR:
+            continue
         if two_means_nats(power[strong], power[weak]) > UNEQUAL_NATS:
-            best, best_ratio = multiple, ratio
+            best, best_ratio = int(multiples[place]), float(ratio[place, part])
     return best
 
 
@@ -186,9 +188,9 @@ def two_means_nats(one: NDArray[np.float64], other: NDArray[np.float64]) -> floa
     return (len(one) + len(other)) * both - len(one) * first - len(other) * second
 
 
-def _contrast(strong: float, weak: float) -> float:
-    """Ratio of two mean powers without their noise."""
-    return max(strong - 1, 0) / max(weak - 1, 0.1)
+def _contrast(strong: NDArray[np.floating], weak: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Ratios of two mean powers without their noise."""
+    return np.asarray(np.maximum(strong - 1, 0) / np.maximum(weak - 1, 0.1), np.float64)
 
 
 def of_mains(fit: CombFit, data: Periodogram, score: float, per_turn: int = 1) -> bool:
