@@ -114,6 +114,8 @@ def _require_whole(file: IO[bytes], name: str, size: int) -> None:
         raise BadInput(f"{name}: not an .npy file, whatever its name says: save the samples with numpy.save")
     file.seek(0)
     version = np.lib.format.read_magic(file)
+    if version == (3, 0):  # for names of fields, which samples have none of
+        raise BadInput(f"{name}: version 3.0 of the .npy format: save the samples with numpy.save, which writes 1.0")
     if version not in _HEADERS:
         raise ValueError(f"version {version} of the format")
     read_header, width = _HEADERS[version]
@@ -212,7 +214,8 @@ def _choose(arrays: Mapping[str, NDArray[np.generic]], variable: str | None, pat
     if len(candidates) == 1:
         return arrays[candidates[0]]
     if candidates:
-        raise BadInput(f"{path}: {len(candidates)} complex arrays, {_listed(arrays)}: say which with --variable NAME")
+        complex_ones = _listed({name: arrays[name] for name in candidates})
+        raise BadInput(f"{path}: {len(candidates)} complex arrays, {complex_ones}: say which with --variable NAME")
     cure = "IQ must be complex, I + jQ (complex64)"
     named = {name.lower(): name for name in arrays}
     for real, imaginary in _PARTS:

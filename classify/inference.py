@@ -11,7 +11,7 @@ from typing import NoReturn
 
 import numpy as np
 from bladewing.features.allocator import keep_freed
-from bladewing.features.dropouts import without_lost
+from bladewing.features.dropouts import mended
 from bladewing.features.inputs import dwells_of
 from bladewing.features.spectrum import LEAST_PART, largest_part
 from bladewing.models import KIND_SCORES
@@ -247,7 +247,8 @@ class Classifier:
         iq
             Shape (..., pulses), complex: one range cell, one sample a pulse. Leading axes are a batch, and every
             record is answered as if it were alone. The gain does not matter. Pulses that were lost, which are exactly
-            0, are filled in by what those beside them tell of them; one channel, I without Q, is made analytic.
+            0, are filled in by what those beside them tell of them; of a record that more of these in a row break than
+            that is done for, the longest stretch is judged. One channel, I without Q, is made analytic.
         carrier_hz
             Carrier [Hz].
         prf_hz
@@ -282,7 +283,11 @@ class Classifier:
             told, labels = _untold(len(records))
             reasons = np.broadcast_to(np.array(outside), len(records))
         else:
-            told, labels, reasons = self._answers(without_lost(records), carrier_hz, prf_hz)
+            records, stretches = mended(records)
+            told, labels, reasons = self._answers(records, carrier_hz, prf_hz)
+            for row, stretch in stretches.items():
+                told[row], labels[row], why = self._of_stretch(records[row][stretch], carrier_hz, prf_hz)
+                reasons = _with(reasons, row, why)
         return Prediction(
             labels.reshape(leading),
             np.ascontiguousarray(told[:, :-1]).reshape(*leading, len(CLASSES)),
@@ -307,6 +312,16 @@ class Classifier:
         told[rows] = self._told(records, rows, carrier_hz, prf_hz)
         labels[rows], reasons[rows] = self.decide(told[rows, :-1])
         return told, labels, reasons.astype(np.str_)
+
+    def _of_stretch(
+        self, stretch: NDArray[np.complex64], carrier_hz: float, prf_hz: float
+    ) -> tuple[NDArray[np.float32], str, str]:
+        """What is told of the longest stretch of a record that a silence breaks, its label and the reason."""
+        if outside := self.envelope.reason(carrier_hz, prf_hz, len(stretch)):
+            told, labels = _untold(1)
+            return told[0], labels[0], f"silence: no more than {len(stretch)} pulses in a row are not 0: {outside}"
+        told, labels, reasons = self._answers(stretch[None], carrier_hz, prf_hz)
+        return told[0], labels[0], reasons[0]
 
     def _told(
         self, records: NDArray[np.complex64], rows: NDArray[np.intp] | None, carrier_hz: float, prf_hz: float
@@ -465,6 +480,13 @@ def _untold(records: int) -> tuple[NDArray[np.float32], NDArray[np.str_]]:
     told = np.full((records, _TOLD), 1 / len(CLASSES), dtype=np.float32)
     told[:, -1] = np.nan
     return told, np.full(records, UNKNOWN, dtype="<U7")
+
+
+def _with(reasons: NDArray[np.str_], row: tuple[int, ...], reason: str) -> NDArray[np.str_]:
+    """Reasons, one of them another, however long that is."""
+    longer = np.array(reasons, dtype=f"<U{max(reasons.dtype.itemsize // 4, len(reason), 1)}")
+    longer[row] = reason
+    return longer
 
 
 def _rule(max_false_alarm: object, coverage: object) -> tuple[float | None, float | None]:

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 from bladewing.features.dropouts import filled, longest_silence, lost_pulses
-from bladewing.features.one_channel import one_channel
+from bladewing.features.one_channel import one_channel, varies
 from numpy.typing import NDArray
 
 from .arrays import ARRAY_SUFFIXES, read_array
@@ -149,11 +149,12 @@ class Recording:
         if silent:
             said.append(
                 f"silence: {silent} pulses in a row are exactly 0 from {self.start_s + start / self.prf_hz:.6g} s on, "
-                "too many to be filled in: what is said of dwells in which they lie is of less than a dwell"
+                "too many to be filled in: of a dwell that they break its longest stretch is judged"
             )
         if one_channel(self.iq):
-            none = [name for name, part in (("I", self.iq.real), ("Q", self.iq.imag)) if not part.any()]
-            what = f"{none[0]} is 0 in every pulse" if none else "I and Q are the same but for a sign"
+            still = [(name, part) for name, part in (("I", self.iq.real), ("Q", self.iq.imag)) if not varies(part)]
+            told = [f"{name} is {part[0] + 0:g} in every pulse" for name, part in still]
+            what = told[0] if told else "I and Q are the same but for a sign"
             said.append(f"one channel: {what}, so that both sides of the spectrum are one and {one_channel_so}")
         return tuple(sentence for sentence in said if sentence)
 

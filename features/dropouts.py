@@ -12,7 +12,7 @@ NEAR_STEPS, NEAR_SHARE = 2.1, 0.5
 #: such places: one 0 among them is a lost pulse, but for one at an end, where a window or a beginning may be 0.
 LEAST_LOST, CHANCE, PLACES, PLACES_OF_ONE, ALIKE, ENOUGH = 3, 1e-4, 25, 5, 0.01, 100
 
-#: More zeros in a row are silence, which is no comb, and too long to be filled in.
+#: More zeros in a row are silence, too long to be filled in: it would break every line.
 MOST_IN_A_ROW = 32
 
 #: A pulse is told from so many before and after it at most, by laws fitted to so many at a time and those beside them,
@@ -78,24 +78,34 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     return lost if no_chance else none
 
 
-def without_lost(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
-    """Records with the pulses that each has lost filled in, same shape; those that are there are returned as they are.
+def mended(iq: NDArray[np.complex64]) -> tuple[NDArray[np.complex64], dict[tuple[int, ...], slice]]:
+    """Records with the pulses that each has lost filled in, and of those that a silence still breaks what is whole.
 
     Parameters
     ----------
     iq
         Records, shape (..., pulses), finite.
+
+    Returns
+    -------
+    records : ndarray of complex64, same shape
+        Those that are there are returned as they are.
+    stretches : dict of tuple of int to slice
+        Of each broken record, by its index, the longest stretch that is not (see `unbroken`).
     """
-    zeros = _zeros(iq)
+    zeros, out = _zeros(iq), iq
+    stretches: dict[tuple[int, ...], slice] = {}
     if not np.count_nonzero(zeros):
-        return iq
-    out = iq
+        return out, stretches
     for index in map(tuple, np.argwhere(zeros.any(axis=-1))):
         lost = lost_pulses(iq[index])
         if lost.any():
             out = iq.copy() if out is iq else out
             out[index] = filled(iq[index], lost)
-    return out
+        stretch = unbroken(out[index])
+        if stretch != slice(0, iq.shape[-1]):
+            stretches[index] = stretch
+    return out, stretches
 
 
 def _chance(zeros: int, near: int, share: float) -> float:
@@ -122,15 +132,43 @@ def _runs(zero: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return edges[::2], np.diff(edges)[::2]
 
 
+def _silences(iq: NDArray[np.complex64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Where each run of zeros begins that is too long to be filled in, and its pulses; none of what is 0 throughout."""
+    starts, lengths = _runs(_zeros(iq))
+    long = lengths > MOST_IN_A_ROW
+    if lengths.max(initial=0) == len(iq) or (long.any() and len(np.unique(_sizes(iq))) <= LEAST_DISTINCT):
+        long[:] = False  # what hardly steps is often 0
+    return starts[long], lengths[long]
+
+
 def longest_silence(iq: NDArray[np.complex64]) -> tuple[int, int]:
     """Where the longest run of zeros begins that is too long to be filled in, and its pulses; 0 where there is none."""
-    starts, lengths = _runs(_zeros(iq))
-    if not len(lengths) or lengths.max() <= MOST_IN_A_ROW or lengths.max() == len(iq):
-        return 0, 0
-    if len(np.unique(_sizes(iq))) <= LEAST_DISTINCT:  # what hardly steps is often 0
+    starts, lengths = _silences(iq)
+    if not len(lengths):
         return 0, 0
     longest = int(lengths.argmax())
     return int(starts[longest]), int(lengths[longest])
+
+
+def unbroken(iq: NDArray[np.complex64]) -> slice:
+    """The longest stretch of a record that no silence breaks which is too long to be filled in.
+
+    What begins or ends within a record widens all of its lines, and regular silences draw a comb beside each.
+
+    Parameters
+    ----------
+    iq
+        Samples of one record, shape (pulses,), finite.
+
+    Returns
+    -------
+    slice
+        All of it where there is no such silence, or nothing else.
+    """
+    starts, lengths = _silences(iq)
+    begin, end = np.append(0, starts + lengths), np.append(starts, len(iq))
+    longest = int((end - begin).argmax())
+    return slice(int(begin[longest]), int(end[longest]))
 
 
 def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.complex64]:

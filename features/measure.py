@@ -3,12 +3,13 @@
 import math
 from collections.abc import Callable
 from dataclasses import fields
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .allocator import keep_freed
-from .dropouts import without_lost
+from .dropouts import mended
 from .measure_record import measure_record
 from .measurements import EACH_ROTOR, Measurements
 from .one_channel import made_analytic
@@ -18,6 +19,9 @@ from .spectrum import beyond_radars, doppler_spectrum, finite_complex, require_r
 
 #: No rotor has more blades; eight is the most that fly.
 MOST_BLADES_GIVEN = 64
+
+#: What is larger than pi/2 was given in degrees, and not just beyond it, from so much on.
+LEAST_DEGREES = 2.0
 
 
 def measure(
@@ -36,7 +40,8 @@ def measure(
     iq : array_like of complex, shape (..., pulses)
         Slow-time samples of one range cell, any gain. Of one channel, I without Q, that holds noise, what both sides of
         the spectrum share is measured, and no band. Pulses that were lost, which are exactly 0, are filled in by what
-        those beside them tell of them.
+        those beside them tell of them; of a record that more of these in a row break than that is done for, the longest
+        stretch is measured.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz], within `CARRIER_RANGE_HZ` and `PRF_RANGE_HZ`.
     blades : int, optional
@@ -64,13 +69,15 @@ def measure(
     carrier_hz, prf_hz = require_radar(carrier_hz, prf_hz)
     if beyond := beyond_radars(carrier_hz, prf_hz):
         raise ValueError(f"{beyond}: give 9.85 GHz as 9.85e9, 20 kHz as 20e3")
-    if blades is not None and not (math.isfinite(blades) and 1 <= blades == int(blades) <= MOST_BLADES_GIVEN):
+    if blades is not None and not (_is_number(blades) and 1 <= blades == int(blades) <= MOST_BLADES_GIVEN):
         raise ValueError(f"blades is {blades!r}: it must be a whole number of 1 to {MOST_BLADES_GIVEN}")
-    if beta_rad is not None and not 0 <= beta_rad < np.pi / 2:
-        cure = f": {beta_rad:g} degrees are np.radians({beta_rad:g})" if 0 < beta_rad < 90 else ""
+    if beta_rad is not None and not (_is_number(beta_rad) and 0 <= beta_rad < np.pi / 2):
+        in_degrees = _is_number(beta_rad) and LEAST_DEGREES <= beta_rad < 90
+        cure = f": {beta_rad:g} degrees are np.radians({beta_rad:g})" if in_degrees else ""
         raise ValueError(f"beta_rad is {beta_rad!r}: it must be at least 0 and below pi/2 [rad]{cure}")
     blades = None if blades is None else int(blades)
-    samples = made_analytic(without_lost(finite_complex(iq, least=2)))
+    given, stretches = mended(finite_complex(iq, least=2))
+    samples = made_analytic(given)
     shape = samples.shape[:-1]
     some = samples if samples.size else np.zeros((1, *samples.shape[-1:]), np.complex64)  # of none, fields of no length
     spectrum = doppler_spectrum(some, carrier_hz=carrier_hz, prf_hz=prf_hz)
@@ -78,7 +85,11 @@ def measure(
     keep_freed()
     with one_thread:
         for index in np.ndindex(some.shape[:-1]):
-            rows.append(measure_record(some[index], spectrum.rows(index), blades, beta_rad))
+            record, own = some[index], spectrum.rows(index)
+            if index in stretches:
+                record = made_analytic(given[index][stretches[index]])
+                own = doppler_spectrum(record, carrier_hz=carrier_hz, prf_hz=prf_hz)
+            rows.append(measure_record(record, own, blades, beta_rad))
             if on_record and samples.size:
                 on_record(len(rows))
     columns = {}
@@ -88,3 +99,8 @@ def measure(
             extra = (MAX_ROTORS,) if field.name in EACH_ROTOR else ()
             columns[field.name] = values.reshape((*shape, *extra))
     return Measurements(**columns, length_is_lower_bound=beta_rad is None)
+
+
+def _is_number(value: object) -> bool:
+    """Whether a value is a finite number, and no truth value."""
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)

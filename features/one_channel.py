@@ -14,14 +14,20 @@ NOISE_PULSES = 65_536
 
 
 def one_channel(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
-    """True where I or Q is 0 in every pulse, or both are the same but for a sign: of (..., pulses), shape (...).
+    """True where I or Q is the same in every pulse, or both are but for a sign: of (..., pulses), shape (...).
 
-    To the bit: two equal blades at rest without any noise are a straight line in I and Q as well, of any direction.
+    To the bit: two equal blades at rest without any noise are a straight line in I and Q as well, of any direction. A
+    channel without a signal is 0, or what its converter is off by.
     """
     real, imaginary = iq.real, iq.imag
     alike = (real == imaginary).all(axis=-1) | (real == -imaginary).all(axis=-1)
-    one, other = real.any(axis=-1), imaginary.any(axis=-1)
+    one, other = varies(real), varies(imaginary)
     return np.asarray(np.where(alike, one, one != other), np.bool_)
+
+
+def varies(part: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Whether I or Q is not the same in every pulse, of (..., pulses), shape (...)."""
+    return np.asarray((part != part[..., :1]).any(axis=-1), np.bool_)
 
 
 def made_analytic(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
@@ -29,10 +35,9 @@ def made_analytic(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
 
     What holds no noise at all was never recorded: two equal blades at rest give such a record, of which I is all.
     """
-    first = iq[..., 0]
-    real, imaginary = np.abs(first.real), np.abs(first.imag)
-    # few records are looked at further than their first pulse
-    one = np.asarray((real == imaginary) | (real == 0) | (imaginary == 0))
+    first, last = iq[..., 0], iq[..., -1]
+    # few records are looked at further than these two pulses
+    one = np.asarray((np.abs(first.real) == np.abs(first.imag)) | (first.real == last.real) | (first.imag == last.imag))
     if np.count_nonzero(one):
         one[one] = one_channel(iq[one])
     if np.count_nonzero(one):
@@ -41,7 +46,7 @@ def made_analytic(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
     if not np.count_nonzero(one):
         return iq
     made, some = iq.copy(), iq[one]
-    channel = np.where(some.real.any(axis=-1, keepdims=True), some.real, some.imag)
+    channel = np.where(varies(some.real)[:, None], some.real, some.imag)
     made.real[one], made.imag[one] = channel, _quadrature(channel)
     return made
 

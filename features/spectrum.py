@@ -413,7 +413,10 @@ def as_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
     """
     if np.ma.is_masked(iq):
         raise ValueError(f"iq holds masked samples: {FILL_IN}")
-    samples = np.asarray(iq)
+    try:
+        samples = np.asarray(iq)
+    except ValueError:
+        raise ValueError("iq holds rows of unequal length: every record must have as many pulses") from None
     if samples.dtype.kind != "c":
         raise ValueError(f"iq holds {samples.dtype}: its samples must be complex, I + jQ")
     if samples.ndim < 1 or samples.shape[-1] < least:
@@ -442,7 +445,8 @@ def finite_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
 def require_radar(carrier_hz: float, prf_hz: float) -> tuple[float, float]:
     """Both frequencies [Hz] in float64, as phases need them; what is none is refused."""
     for name, value in (("carrier_hz", carrier_hz), ("prf_hz", prf_hz)):
-        if not (isinstance(value, (Real, np.ndarray)) and math.isfinite(value) and value > 0):
+        is_one = isinstance(value, Real) or (isinstance(value, np.ndarray) and value.ndim == 0)
+        if not (is_one and math.isfinite(value) and value > 0):
             raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
     return float(carrier_hz), float(prf_hz)
 

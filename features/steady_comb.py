@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .body_velocity import folded
+from .dropouts import unbroken
 from .following import by_recording, normed
 from .one_thread import one_thread
 from .rotor.comb import OVER_BODY, find_comb
@@ -88,7 +89,7 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[f
 
 def _rotor_hz(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> float | None:
     """Chopping frequency of a dwell whose comb is no wheel's [Hz], or None."""
-    data = prepare(iq, carrier_hz=carrier_hz, prf_hz=prf_hz)
+    data = prepare(iq[unbroken(iq)], carrier_hz=carrier_hz, prf_hz=prf_hz)
     if data is None:
         return None
     comb, _ = find_comb(data)

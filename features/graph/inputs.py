@@ -6,7 +6,7 @@ import numpy as np
 
 from ..axis import pooling
 from ..change import PARTS, frame_starts, part_length
-from ..dropouts import LEAST_LOST
+from ..dropouts import LEAST_DISTINCT, LEAST_LOST, MOST_IN_A_ROW
 from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
 from ..spectrum import LEAST_PART, Spectrum, doppler_spectrum
 from ..vector import BANDS, SIGNIFICANT, radar_columns
@@ -105,7 +105,7 @@ def input_graph(
     packed, transform = filled_sides(packed, transform, power, pulses, radar.bins, radar.window)
     power = power_of(transform, radar.bins)
     floor = noise_floor(power, side_floors(power, radar.bins, radar.window))
-    live = live & (_two_channels(size) | noise_shows(power, floor).apply("Not"))
+    live = live & (_two_channels(of_pulses) | noise_shows(power, floor).apply("Not"))
     relative_power = power / floor
     pool = pooling(radar.bins, radar.carrier_hz, radar.prf_hz, AXIS_BINS)
     levels = pooled(relative_power, radar.bins, pool)
@@ -138,29 +138,41 @@ def input_graph(
 
 
 def _none_lost(graph: Graph, size: Value, pulses: int) -> Value:
-    """Whether no pulses were lost, much as `dropouts.lost_pulses` tells them, shape (records, 1).
+    """Whether no pulses were lost, much as `dropouts` tells them, nor a silence breaks a record, shape (records, 1).
 
-    Fewer than three zeros are never enough, and those within a run do not count, so that one silence is none. A
-    converter that gives so many has as many samples of its least step: there are eight such places for one that is 0.
-    Of what hardly reaches that step this does not hold, and such a record counts as one of lost pulses.
+    Fewer than three zeros are never enough, and those within a run do not count, unless it is a silence, which a
+    converter that hardly steps gives often. One that gives so many has as many samples of its least step: there are
+    eight such places for one that is 0. Of what hardly reaches that step this does not hold, and such a record counts
+    as one of lost pulses.
     """
     is_there = size > 0.0
     there = is_there.to(np.float32)
     beside = graph.op("MaxPool", there.reshape(-1, 1, pulses), kernel_shape=[3], pads=[1, 1]).reshape(-1, pulses)
     zeros = (beside - there).sum()
     others = graph.where(is_there, size, float(np.finfo(np.float32).max))
-    of_a_step = others <= others.min() * (1 + _OF_A_STEP)
-    return (zeros < float(LEAST_LOST)) | (zeros < of_a_step.count())
+    least = others.min()
+    steps = (others <= least * (1 + _OF_A_STEP)).count()
+    whole = (zeros < float(LEAST_LOST)) | (zeros < steps)
+    if pulses <= MOST_IN_A_ROW:
+        return whole
+    # three pulses in a row at every third place are all of them
+    thirds = beside.slice(1, pulses - 1).reshape(-1, 1, pulses - 2)
+    in_a_row = graph.op("MaxPool", thirds, kernel_shape=[(MOST_IN_A_ROW + 1) // 3], dilations=[3])
+    silent = in_a_row.reshape(-1, pulses - MOST_IN_A_ROW).min() <= 0.0
+    hardly_steps = (size.max() <= least * LEAST_DISTINCT) & (there.sum() <= steps.to(np.float32) * LEAST_DISTINCT)
+    return whole & (silent.apply("Not") | hardly_steps)
 
 
-def _two_channels(size: Value) -> Value:
+def _two_channels(of_pulses: Value) -> Value:
     """Whether there are two, much as `one_channel.one_channel` tells them, shape (records, 1).
 
-    I and Q come as sizes, shape (records, pulses, 2).
+    I and Q of the pulses have shape (records, pulses, 2).
     """
-    real, imaginary = size.slice(0, 1), size.slice(1, 2)
-    apart = (real - imaginary).apply("Abs")
-    return size.graph.concat(real, imaginary, apart).max(axis=-2, keep=False).min() > 0.0
+    real, imaginary = of_pulses.slice(0, 1), of_pulses.slice(1, 2)
+    apart = (real.apply("Abs") - imaginary.apply("Abs")).apply("Abs")
+    highest, lowest = of_pulses.max(axis=-2, keep=False), -((-of_pulses).max(axis=-2, keep=False))
+    spans = of_pulses.graph.concat(highest - lowest, apart.max(axis=-2, keep=False))
+    return spans.min() > 0.0
 
 
 def _feature_vector(

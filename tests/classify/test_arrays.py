@@ -91,6 +91,7 @@ def test_one_of_several_is_named(put, suffix, write):
         (".npy", b"not numpy at all", None, "not an .npy file, whatever its name says"),
         (".npz", npy(IQ), None, "damaged or cut short"),
         (".npy", npz(iq=IQ), None, "not an .npy file, whatever its name says"),
+        (".npy", npy(IQ).replace(b"NUMPY\x01", b"NUMPY\x03"), None, "version 3.0 of the .npy format: save the samples"),
         (".npy", pickle.dumps(IQ), None, "not an .npy file, whatever its name says"),
         (".mat", b"\x89HDF\r\n\x1a\n" + bytes(600), None, r"a MATLAB 7.3 file \(HDF5\): save it with version 7"),
         (".npy", npy(IQ), "iq", "variable 'iq' given, but a .npy file holds one array"),

@@ -41,6 +41,8 @@ def test_a_recording_tells_of_a_channel_that_is_missing() -> None:
         assert said.startswith(f"one channel: {name} is 0 in every pulse")
         (said,) = recording.remarks(0.1, recording.dwells(0.1), measured=True)
         assert said.endswith("neither tips nor the sign of a velocity can be believed: record I and Q")
+    stuck = Recording("walk", iq.real + np.complex64(12j), 24e9, 1e4)
+    assert stuck.remarks(0.1, stuck.dwells(0.1))[0].startswith("one channel: Q is 12 in every pulse")
     alike = Recording("walk", (iq.real * (1 - 1j)).astype(np.complex64), 24e9, 1e4)
     assert alike.remarks(0.1, alike.dwells(0.1))[0].startswith("one channel: I and Q are the same but for a sign")
     assert not Recording("walk", iq, 24e9, 1e4).remarks(0.1, iq.reshape(2, -1))
@@ -96,3 +98,33 @@ def test_of_a_recording_that_clips_no_comb_that_stays_is_counted(tmp_path) -> No
     assert "may pass for a rotor, and no comb that stays is counted" in given.remarks[0]
     recording = load_recording(tmp_path / "clipped.npy", carrier_hz=9.85e9, prf_hz=25e3)
     assert "tips may come out too fast" in recording.remarks(0.08, recording.dwells(0.08), measured=True)[0]
+
+
+def test_a_record_that_a_silence_breaks_is_judged_by_its_longest_stretch() -> None:
+    """Blanked at a steady rate, ground was once a UAV, surely, with a comb that stays."""
+    radar = {"carrier_hz": 9.85e9, "prf_hz": 25e3}
+    ground = (10 + noise(np.random.default_rng(11), len(PULSES))).astype(np.complex64)
+    ground[PULSES % 400 < 60] = 0
+    records, classifier = ground.reshape(10, 2000), Classifier.load()
+    given, alone = classifier.predict(records, **radar), classifier.predict(records[:, 60:400], **radar)
+    np.testing.assert_array_equal(given.probabilities, alone.probabilities)
+    assert list(given.labels) == list(alone.labels)
+    assert list(given.reasons) == list(alone.reasons)
+    assert given.noise.tolist() == alone.noise.tolist()
+    track = answer(Recording("ground", ground, **radar), classifier)
+    assert track.track.label != "uav"
+    assert track.shown == {}
+    assert "of a dwell that they break its longest stretch is judged" in track.remarks[0]
+
+
+def test_a_stretch_that_holds_no_decision_is_unknown_with_the_reason() -> None:
+    records = 10 + noise(np.random.default_rng(12), 3 * 2000).reshape(3, 2000)
+    records[1, 50:] = 0
+    records[2, PULSES[:2000] % 400 < 300] = 0
+    given = Classifier.load().predict(records, carrier_hz=9.85e9, prf_hz=25e3)
+    assert given.labels[1:].tolist() == ["unknown"] * 2
+    for number, pulses in ((1, 50), (2, 100)):
+        start = f"silence: no more than {pulses} pulses in a row are not 0: "
+        assert given.reasons[number].startswith(start)
+        assert given.reasons[number].endswith(", 0.005 s, or more (dwell = pulses / PRF)")
+        np.testing.assert_allclose(given.probabilities[number], 1 / 3)

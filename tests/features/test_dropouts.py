@@ -1,9 +1,13 @@
 """Lost pulses: zeros where a receiver gives none."""
 
+import re
+
 import numpy as np
 import pytest
 from bladewing.features import measure
-from bladewing.features.dropouts import filled, lost_pulses
+from bladewing.features.dropouts import LEAST_DISTINCT, MOST_IN_A_ROW, filled, lost_pulses, mended, unbroken
+from hypothesis import given
+from hypothesis import strategies as st
 
 from .signals import CARRIER_HZ, PRF_HZ, rotors
 
@@ -94,6 +98,38 @@ def test_a_silence_is_no_lost_pulses() -> None:
     assert not lost_pulses(iq).any()
     iq[10:20] = 0
     assert np.flatnonzero(lost_pulses(iq)).tolist() == list(range(10, 20))
+
+
+@given(st.lists(st.tuples(st.integers(0, 300), st.integers(1, 200)), max_size=6), st.integers(0, 300))
+def test_what_is_left_is_the_longest_stretch_without_a_silence(pieces: list[tuple[int, int]], rest: int) -> None:
+    """Against looking at all stretches: pieces are so many samples and then so many zeros."""
+    there = np.concatenate([np.repeat([True, False], pair) for pair in [*pieces, (rest, 0)]])
+    iq = np.where(there, noise(np.random.default_rng(1), len(there)), 0)
+    found = unbroken(iq)
+    # from its first zero on each silence breaks: what is left between holds none
+    runs = "".join("x" if one else "." for one in there)
+    stretches = re.split(rf"\.{{{MOST_IN_A_ROW + 1},}}", runs)
+    few = there.sum() < LEAST_DISTINCT  # a converter that hardly steps
+    assert found.stop - found.start == (len(iq) if few else max(map(len, stretches)))
+    assert few or runs[found] in stretches
+    if not lost_pulses(iq).any():  # or they would be filled in first
+        _, stretches = mended(np.stack([iq, noise(np.random.default_rng(2), len(iq))]))
+        assert stretches == ({} if found == slice(0, len(iq)) else {(0,): found})
+
+
+def test_a_record_that_a_silence_breaks_is_measured_by_its_longest_stretch() -> None:
+    """Of one rotor, zeros at the end made two that were told apart, and regular silences of ground a comb."""
+    radar, rng = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}, np.random.default_rng(3)
+    whole = (3 * rotors([58.61], velocity_mps=7.3, body=10.0) + noise(rng, 3000)).astype("c8")
+    padded = np.where(np.arange(3000) < 2300, whole, 0)
+    found, alone = (measure(iq, **radar) for iq in (np.stack([padded, whole]), whole[:2300]))
+    for name in ("chopping_hz", "chopping_hz_std", "bandwidth_hz", "rotor_count", "body_velocity_mps"):
+        assert getattr(found, name)[0] == getattr(alone, name)
+    assert found.rotor_count.tolist() == [1, 1]
+    blanked = np.where(np.arange(3000) % 256 < MOST_IN_A_ROW + 1, 0, 10 + noise(rng, 3000))
+    assert np.isnan(measure(blanked, **radar).chopping_hz)
+    one = np.where(np.arange(3000) < 2300, whole.real, 0).astype("c8")
+    assert measure(one, **radar).chopping_hz == measure(one[:2300], **radar).chopping_hz
 
 
 PATTERNS = {

@@ -260,17 +260,20 @@ def test_strong_lines_of_unequal_blades():
 
 def test_bad_arguments_are_refused():
     iq = drone([58.0])
-    for wrong in ({"blades": 0}, {"blades": 1.5}, {"beta_rad": np.pi / 2}, {"beta_rad": -0.1}):
-        with pytest.raises(ValueError, match="must be"):
-            measure(iq, **RADAR, **wrong)
+    wrong = {"blades": (0, 1.5, "2", [2], True), "beta_rad": (np.pi / 2, -0.1, "a", True)}
+    for name, value in [(name, value) for name, values in wrong.items() for value in values]:
+        with pytest.raises(ValueError, match=rf"{name} is .* must be [^:]*$"):
+            measure(iq, **RADAR, **{name: value})
     with pytest.raises(ValueError, match=r"below pi/2 \[rad\]: 30 degrees are np\.radians\(30\)$"):
         measure(iq, **RADAR, beta_rad=30)
     for radar in ({"carrier_hz": 9.85}, {"prf_hz": 0.5}):  # in GHz; in MHz
         with pytest.raises(ValueError, match=r"is .*: it must be .* Hz: give 9\.85 GHz as 9\.85e9"):
             measure(iq, **RADAR | radar)
-    for none in (np.nan, "9.85e9", None):
+    for none in (np.nan, "9.85e9", None, np.array([9.85e9])):
         with pytest.raises(ValueError, match=r"carrier_hz is .*: it must be a finite number above 0 \[Hz\]"):
             measure(iq, **RADAR | {"carrier_hz": none})
+    with pytest.raises(ValueError, match="rows of unequal length: every record must have as many pulses"):
+        measure([[1j, 2j, 3j], [1j, 2j]], **RADAR)
     with pytest.raises(ValueError, match="too large for complex64: lower the gain"):
         measure(iq.astype(complex) * 1e200, **RADAR)
     with pytest.raises(ValueError, match="not finite"):

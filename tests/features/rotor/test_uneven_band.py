@@ -79,6 +79,17 @@ def test_one_channel_is_measured_as_if_made_analytic(velocity_mps, channel, gain
     assert found.chopping_hz[0] == pytest.approx(float(made.chopping_hz), rel=1e-4)
 
 
+@pytest.mark.parametrize("offset", [3j, -1e-3j])
+def test_a_channel_that_its_converter_holds_off_zero_is_none(offset):
+    """Its sides alike, a rotor came out as four that were not told apart, with a blade a quarter too long."""
+    both = 3 * rotors([57.3], velocity_mps=5.0) + white(np.random.default_rng(3), PULSES)
+    given = np.stack([both.real + offset, both.real + 0j, 1j * both.real - offset.imag]).astype(np.complex64)
+    assert one_channel(given).all()
+    found = measure(given, **RADAR, blades=2)
+    assert found.band_reason.tolist() == [ONE_CHANNEL] * 3
+    np.testing.assert_array_equal(found.chopping_hz, found.chopping_hz[1])
+
+
 @pytest.mark.parametrize("body_db", [26.0, 50.0, 60.0])
 def test_a_strong_body_leaves_one_channel_its_comb(body_db):
     """What jumps from a record's end to its beginning hid all lines: a comb in 4 of 24 at 60 dB."""
