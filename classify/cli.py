@@ -271,7 +271,7 @@ def export(
 
     if max_false_alarm is not None:
         positive(max_false_alarm, "--max-false-alarm")
-    name = chosen_name(model, single=True)
+    name = chosen_name(model)
     worst = export_raw_iq(
         out, carrier_hz=carrier_hz, prf_hz=prf_hz, pulses=pulses, model=name, max_false_alarm=max_false_alarm
     )

@@ -79,7 +79,7 @@ def export_raw_iq(
         raise BadInput(f"{os.fspath(out)}: a graph's name ends in .onnx: give it such a name")
     if not _replaceable(Path(out)):
         raise BadInput(f"{os.fspath(out)} is there and is no exported graph: it is not written over: give another file")
-    name = chosen_name(model, single=True)
+    name = chosen_name(model)
     if name == CASCADE:
         raise BadInput(
             f"{CASCADE}: two models, of which each is asked about other records: give one of them as --model"

@@ -87,8 +87,8 @@ def front(account: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, float]]:
 
 
 def by_place(place: str, account: Mapping[str, Mapping[str, Any]]) -> str:
-    """Name of the model at one of `PLACES`."""
-    models = front(account)
+    """Name of the model at one of `PLACES`: of one file, as prediction sets and exported graphs are; no cascade."""
+    models = front({name: model for name, model in account.items() if name != CASCADE})
     names = [name for name, _ in models]
     accuracy = [float(account[name]["test"]["balanced_accuracy"]) for name in names]
     halfway = next(name for name, value in zip(names, accuracy, strict=True) if 2 * value >= accuracy[0] + accuracy[-1])

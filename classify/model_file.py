@@ -73,12 +73,12 @@ def chosen_name(
     if budget_us is None and given not in PLACES:
         return given
     account = shipped_account()
-    if single:
-        account.pop(CASCADE, None)
     if budget_us is None:
         return by_place(given, account)
     if name_or_path is not None:
         raise BadInput(f"model {given!r} and a budget of {budget_us:g} us: give one of them")
+    if single:
+        account.pop(CASCADE, None)
     return by_budget(positive(budget_us, "budget_us"), account, measured_fft_us())
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from bladewing.classify import BadInput, Classifier, model_file
 from bladewing.classify.inference import SURE, Cascade
-from bladewing.classify.ladder import CASCADE, STAGES_KEY, shipped_account
+from bladewing.classify.ladder import CASCADE, PLACES, STAGES_KEY, shipped_account
 from bladewing.classify.model_file import CURVE_KEY, model_names
 from bladewing.features import model_inputs
 from bladewing.models.operating import OperatingCurve
@@ -123,12 +123,19 @@ def test_what_a_cascade_cannot_do_is_told_in_one_line(tmp_path, monkeypatch):
         Classifier.load(CASCADE)
 
 
-def test_places_lead_to_the_cascade_but_not_to_export_it(monkeypatch):
+def test_budgets_lead_to_the_cascade_but_not_to_export_it_and_places_to_models_of_one_file(monkeypatch):
     test = {"cheap": (5, 0.5), "dear": (9, 0.6), CASCADE: (7, 0.7)}
     accounts = {name: {"cost_ffts": cost, "test": {"balanced_accuracy": value}} for name, (cost, value) in test.items()}
     monkeypatch.setattr(model_file, "shipped_account", lambda: dict(accounts))
-    assert model_file.chosen_name("best") == CASCADE
-    assert model_file.chosen_name("best", single=True) == "dear"
+    monkeypatch.setattr(model_file, "measured_fft_us", lambda: 1.0)
+    assert model_file.chosen_name(budget_us=10) == CASCADE
+    assert model_file.chosen_name(budget_us=10, single=True) == "dear"
+    assert model_file.chosen_name("best") == model_file.chosen_name("best", single=True) == "dear"
+
+
+def test_a_place_is_the_same_model_with_prediction_sets():
+    for place in PLACES:
+        assert Classifier.load(place, coverage=0.9).name == Classifier.load(place).name != CASCADE
 
 
 def test_the_shipped_account_tells_of_the_cascade_what_holds():
