@@ -9,7 +9,7 @@ from bladewing.classify.inference import Classifier, Envelope, Prediction
 from bladewing.classify.labels import CLASSES, UNKNOWN, decide
 from bladewing.classify.predict import Answer, answer
 from bladewing.classify.recording import Recording
-from bladewing.classify.track import FITTED_DWELL_S, fuse, weights
+from bladewing.classify.track import DOUBT, FITTED_DWELL_S, fuse, weights
 from bladewing.simulate import Radar, Scene, draw_records
 from bladewing.simulate.catalogue import AIRFRAMES
 from hypothesis import assume, given
@@ -112,13 +112,13 @@ def test_contradiction_is_unknown():
 
 
 @given(dwells(), st.floats(0, 1))
-def test_declared_at_the_first_dwell_that_names_a_class_at_half_the_odds(p, correlation):
+def test_declared_at_the_first_dwell_that_names_a_class_with_its_odds_divided(p, correlation):
     track = fused(p, labelled(p), correlation=correlation)
     safe = []
     for n in range(1, len(p) + 1):
         so_far = fused(p[:n], labelled(p)[:n], correlation=correlation)
         best = float(so_far.probabilities.max())
-        needed = 0.6 / 0.4 * 2  # odds
+        needed = 0.6 / 0.4 * DOUBT  # odds
         odds = best / max(1 - best, 1e-9)
         assume(abs(odds / needed - 1) > 1e-4)  # float32 cannot tell
         if odds > needed:
@@ -126,12 +126,14 @@ def test_declared_at_the_first_dwell_that_names_a_class_at_half_the_odds(p, corr
     assert (track.declared, track.declared_after) == (safe[0] if safe else ("", 0))
 
 
-def test_declared_is_what_is_named_with_its_own_odds_halved_also_where_another_is_likelier():
+def test_declared_is_what_is_named_with_its_own_odds_divided_also_where_another_is_likelier():
     def rule(p):  # as prediction sets may: the bird's own limit is low
         named = np.where(p[:, 1] >= 0.38, "bird", np.where(p[:, 0] >= 0.5, "uav", UNKNOWN))
         return named, [""] * len(p)
 
-    sure, unsure = np.float32([[0.39, 0.6, 0.01]]), np.float32([[0.49, 0.4, 0.11]])
+    limit = 0.38 / 0.62 * DOUBT  # odds
+    birds = np.array([1.1, 0.9]) * limit / (1 + np.array([1.1, 0.9]) * limit)
+    sure, unsure = (np.float32([[1 - bird, bird, 0]]) for bird in birds)
     assert fuse(sure, ["bird"], rule=rule).declared == "bird"
     found = fuse(unsure, ["bird"], rule=rule)
     assert (found.label, found.declared) == ("bird", "")
@@ -152,11 +154,12 @@ def test_silent_dwells_take_their_time_before_a_declaration():
 def test_stopping_early_keeps_what_calibrated_probabilities_promise():
     # Independent dwells of known densities: the fused probability is the true posterior. Declared at odds of 8 to 1, at
     # least 8 of 9 are right, whenever that was: a posterior probability is a martingale.
+    limit = 8 / DOUBT  # odds
     rng = np.random.default_rng(2)
     truth = rng.integers(0, 3, 1500)
     seen = rng.normal(size=(1500, 20, 3)) + 0.5 * np.eye(3)[truth][:, None]
     p = np.exp(0.5 * seen) / np.exp(0.5 * seen).sum(axis=-1, keepdims=True)
-    tracks = [fused(one, decide(one, ACCEPT)[0], accept=(0.8,) * 3, correlation=0) for one in p]
+    tracks = [fused(one, decide(one, ACCEPT)[0], accept=(limit / (1 + limit),) * 3, correlation=0) for one in p]
     declared = np.array([track.declared_after > 0 for track in tracks])
     right = np.array([track.declared == CLASSES[index] for track, index in zip(tracks, truth, strict=True)])[declared]
     assert declared.mean() > 0.5
@@ -259,6 +262,8 @@ def test_bad_arguments(p, labels, correlation, message):
         ({"dwell_s": float("nan")}, "dwell_s is nan"),
         ({"shown": ["nothing"]}, "shown holds 'nothing': it may hold comb, wings, heaves, steps"),
         ({"longer": {2: (np.full((1, 3), np.nan), ["uav"])}}, "probabilities of look 0 are not finite"),
+        ({"longer": {2: ([[1.5, -0.3, -0.2]], ["uav"])}}, r"probabilities of look 0 are \[ 1\.5 .*: .* sum to 1"),
+        ({"longer": {2: ([[0.5, 0.3, 0.3]], ["uav"])}}, "look 0 are .*: they must be 0 or more and sum to 1"),
     ],
 )
 def test_what_a_track_cannot_be_fused_with_is_refused(options, message):
@@ -280,10 +285,10 @@ def test_reason_shows_that_the_probability_is_below_the_limit():
     ],
 )
 def test_what_the_whole_track_shows_multiplies_odds_at_the_end_alone(shown, name, factor):
-    # ahead also with its odds halved, which reach the limits with what is found and not without
+    # ahead also with its odds divided, which reach the limits with what is found and not without
     p, best = [[0.6 if other == name else 0.2 for other in CLASSES]] * 4, CLASSES.index(name)
     ahead = fused(p, ["unknown"] * 4, accept=(1.0,) * 3, shown=()).probabilities[best]
-    between = np.sqrt(max(factor, 1)) / 2 * ahead / (1 - ahead)
+    between = np.sqrt(max(factor, 1)) / DOUBT * ahead / (1 - ahead)
     accept = (between / (1 + between),) * 3
     plain, more = (fused(p, ["unknown"] * 4, accept=accept, shown=found) for found in ((), shown))
     odds = [track.probabilities / (1 - track.probabilities) for track in (plain, more)]
@@ -405,7 +410,7 @@ def test_a_recording_outside_the_envelope_is_refused_before_its_dwells_are_read(
     def read(*_):
         raise AssertionError("dwells were read")
 
-    monkeypatch.setattr("bladewing.classify.inference.without_lost", read)
+    monkeypatch.setattr("bladewing.classify.inference.mended", read)
     recording = Recording("x", np.ones(40_000, np.complex64), 9.85e9, 25.0)
     given = answer(recording, Classifier.load())
     assert len(given.dwells.reasons) == 20_000
