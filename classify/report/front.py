@@ -239,7 +239,7 @@ def _costs(
     for place, (kind, name) in enumerate(entries):
         found[name] = {
             "model_bytes": sum(map(len, files[name])),
-            "weights": _weights(files[name][-1]),
+            "weights": " and ".join(sorted(set(map(_weights, files[name])))),
             "model_operations": sum(map(network_operations, files[name])),  # of a cascade at most
             "peak_bytes": peak_bytes(choices.prepared, kind, name, files[name], batch, quoted),
             "dwells": [],

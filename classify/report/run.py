@@ -245,6 +245,8 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
         except PermissionError as error:
             raise unreadable(folder, error, "give a folder that can be read") from None
         found = {path.stem: _content(path) for path in folder.glob("*.onnx")}
+        for stem, content in found.items():
+            Classifier(content, source=str(folder / f"{stem}.onnx"))  # or a model is refused without its file's name
     own = {*PICTURES, FEATURES, CASCADE, EIGHT_BITS}
     if taken := sorted(found.keys() & own):
         raise BadInput(f"{folder}: {taken[0]}.onnx has the name of what the report makes itself: rename the file")
