@@ -6,7 +6,7 @@ import numpy as np
 
 from ..axis import pooling
 from ..change import PARTS, frame_starts, part_length
-from ..dropouts import LEAST_DISTINCT, LEAST_LOST, MOST_IN_A_ROW
+from ..dropouts import LEAST_DISTINCT, LEAST_LOST
 from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
 from ..spectrum import LEAST_PART, Spectrum, doppler_spectrum
 from ..vector import BANDS, SIGNIFICANT, radar_columns
@@ -138,29 +138,20 @@ def input_graph(
 
 
 def _none_lost(graph: Graph, size: Value, pulses: int) -> Value:
-    """Whether no pulses were lost, much as `dropouts` tells them, nor a silence breaks a record, shape (records, 1).
+    """Whether no pulses were lost, and no silence breaks a record, much as `dropouts` tells them, shape (records, 1).
 
-    Fewer than three zeros are never enough, and those within a run do not count, unless it is a silence, which a
-    converter that hardly steps gives often. One that gives so many has as many samples of its least step: there are
-    eight such places for one that is 0. Of what hardly reaches that step this does not hold, and such a record counts
-    as one of lost pulses.
+    Fewer than three zeros are never enough. A converter that gives so many has as many samples of its least step: there
+    are eight such places for one that is 0. Of what hardly reaches that step this does not hold, and such a record
+    counts as one of lost pulses, unless it has hardly another size.
     """
     is_there = size > 0.0
-    there = is_there.to(np.float32)
-    beside = graph.op("MaxPool", there.reshape(-1, 1, pulses), kernel_shape=[3], pads=[1, 1]).reshape(-1, pulses)
-    zeros = (beside - there).sum()
+    there = is_there.count()
     others = graph.where(is_there, size, float(np.finfo(np.float32).max))
     least = others.min()
     steps = (others <= least * (1 + _OF_A_STEP)).count()
-    whole = (zeros < float(LEAST_LOST)) | (zeros < steps)
-    if pulses <= MOST_IN_A_ROW:
-        return whole
-    # three pulses in a row at every third place are all of them
-    thirds = beside.slice(1, pulses - 1).reshape(-1, 1, pulses - 2)
-    in_a_row = graph.op("MaxPool", thirds, kernel_shape=[(MOST_IN_A_ROW + 1) // 3], dilations=[3])
-    silent = in_a_row.reshape(-1, pulses - MOST_IN_A_ROW).min() <= 0.0
-    hardly_steps = (size.max() <= least * LEAST_DISTINCT) & (there.sum() <= steps.to(np.float32) * LEAST_DISTINCT)
-    return whole & (silent.apply("Not") | hardly_steps)
+    zeros = pulses - there
+    hardly_steps = (size.max() <= least * LEAST_DISTINCT) & (there <= steps * LEAST_DISTINCT)
+    return (zeros < float(LEAST_LOST)) | (zeros < steps) | hardly_steps
 
 
 def _two_channels(of_pulses: Value) -> Value:
