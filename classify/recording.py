@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .arrays import ARRAY_SUFFIXES, read_array
 from .clipping import clipped_values
 from .errors import BadInput, unreadable
+from .limits import require_size
 from .samples import complex_samples, positive
 from .sigmf_file import find_sigmf, read_sigmf
 
@@ -247,6 +248,7 @@ def find_recording(path: str | os.PathLike[str]) -> Path:
             raise BadInput(f"{path} is a directory: name the recordings in it, such as {given}/*.sigmf-meta")
         if not given.exists():
             raise BadInput(f"{path}: no such file, and no {given.name}.sigmf-meta beside it")
+        require_size(given)
     except OSError as error:
         raise unreadable(path, error) from None
     if given.suffix.lower() not in ARRAY_SUFFIXES:

@@ -132,6 +132,8 @@ def test_a_directory_is_refused_with_the_cure(tmp_path):
 def test_a_pipe_is_no_recording(tmp_path):
     os.mkfifo(tmp_path / "pipe.npy")
     assert "a pipe or a device, no file" in refused(tmp_path / "pipe.npy")
+    os.mkfifo(tmp_path / "63")  # as a shell hands on what a command gives
+    assert "a pipe or a device, no file" in refused(tmp_path / "63")
 
 
 def test_an_interval_given_as_the_prf_is_told_as_such():
