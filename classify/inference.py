@@ -285,9 +285,14 @@ class Classifier:
         else:
             records, stretches = mended(records)
             told, labels, reasons = self._answers(records, carrier_hz, prf_hz)
-            for row, stretch in stretches.items():
-                told[row], labels[row], why = self._of_stretch(records[row][stretch], carrier_hz, prf_hz)
-                reasons = _with(reasons, row, why)
+            if stretches:
+                reasons = reasons.astype(object)
+                ends = np.array([(stretch.start, stretch.stop) for stretch in stretches.values()])
+                for begin, end in np.unique(ends, axis=0):  # padded records are alike
+                    rows = np.array(list(stretches))[(ends == (begin, end)).all(axis=1), 0]
+                    whole = self._of_stretches(records[rows, begin:end], carrier_hz, prf_hz)
+                    told[rows], labels[rows], reasons[rows] = whole
+                reasons = reasons.astype(np.str_)
         return Prediction(
             labels.reshape(leading),
             np.ascontiguousarray(told[:, :-1]).reshape(*leading, len(CLASSES)),
@@ -313,15 +318,14 @@ class Classifier:
         labels[rows], reasons[rows] = self.decide(told[rows, :-1])
         return told, labels, reasons.astype(np.str_)
 
-    def _of_stretch(
-        self, stretch: NDArray[np.complex64], carrier_hz: float, prf_hz: float
-    ) -> tuple[NDArray[np.float32], str, str]:
-        """What is told of the longest stretch of a record that a silence breaks, its label and the reason."""
-        if outside := self.envelope.reason(carrier_hz, prf_hz, len(stretch)):
-            told, labels = _untold(1)
-            return told[0], labels[0], f"silence: no more than {len(stretch)} pulses in a row are not 0: {outside}"
-        told, labels, reasons = self._answers(stretch[None], carrier_hz, prf_hz)
-        return told[0], labels[0], reasons[0]
+    def _of_stretches(
+        self, stretches: NDArray[np.complex64], carrier_hz: float, prf_hz: float
+    ) -> tuple[NDArray[np.float32], NDArray[np.str_], NDArray[np.str_] | str]:
+        """As `_answers`, of the longest stretches of records that silences break."""
+        pulses = stretches.shape[-1]
+        if outside := self.envelope.reason(carrier_hz, prf_hz, pulses):
+            return *_untold(len(stretches)), f"silence: no more than {pulses} pulses in a row are not 0: {outside}"
+        return self._answers(stretches, carrier_hz, prf_hz)
 
     def _told(
         self, records: NDArray[np.complex64], rows: NDArray[np.intp] | None, carrier_hz: float, prf_hz: float
@@ -480,13 +484,6 @@ def _untold(records: int) -> tuple[NDArray[np.float32], NDArray[np.str_]]:
     told = np.full((records, _TOLD), 1 / len(CLASSES), dtype=np.float32)
     told[:, -1] = np.nan
     return told, np.full(records, UNKNOWN, dtype="<U7")
-
-
-def _with(reasons: NDArray[np.str_], row: tuple[int, ...], reason: str) -> NDArray[np.str_]:
-    """Reasons, one of them another, however long that is."""
-    longer = np.array(reasons, dtype=f"<U{max(reasons.dtype.itemsize // 4, len(reason), 1)}")
-    longer[row] = reason
-    return longer
 
 
 def _rule(max_false_alarm: object, coverage: object) -> tuple[float | None, float | None]:

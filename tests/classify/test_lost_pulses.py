@@ -122,9 +122,27 @@ def test_a_stretch_that_holds_no_decision_is_unknown_with_the_reason() -> None:
     records[1, 50:] = 0
     records[2, PULSES[:2000] % 400 < 300] = 0
     given = Classifier.load().predict(records, carrier_hz=9.85e9, prf_hz=25e3)
+    clear = Classifier.load().predict(records[:1], carrier_hz=9.85e9, prf_hz=25e3)
+    assert (given.labels[0], given.reasons[0]) == (clear.labels[0], clear.reasons[0])
     assert given.labels[1:].tolist() == ["unknown"] * 2
     for number, pulses in ((1, 50), (2, 100)):
         start = f"silence: no more than {pulses} pulses in a row are not 0: "
         assert given.reasons[number].startswith(start)
         assert given.reasons[number].endswith(", 0.005 s, or more (dwell = pulses / PRF)")
         np.testing.assert_allclose(given.probabilities[number], 1 / 3)
+
+
+def test_records_of_a_batch_are_broken_each_in_its_way() -> None:
+    records = (10 + noise(np.random.default_rng(13), 12 * 1000).reshape(3, 4, 1000)).astype(np.complex64)
+    stretches = [slice(0, 700), slice(0, 700), slice(300, 1000), slice(None)]
+    for cell, stretch in enumerate(stretches):
+        kept = np.zeros(1000, bool)
+        kept[stretch] = True
+        records[:, cell, ~kept] = 0
+    radar, classifier = {"carrier_hz": 9.85e9, "prf_hz": 25e3}, Classifier.load()
+    given = classifier.predict(records, **radar)
+    for cell, stretch in enumerate(stretches):
+        alone = classifier.predict(records[:, cell, stretch], **radar)
+        np.testing.assert_array_equal(given.probabilities[:, cell], alone.probabilities)
+        assert given.labels[:, cell].tolist() == alone.labels.tolist()
+        assert given.reasons[:, cell].tolist() == alone.reasons.tolist()
