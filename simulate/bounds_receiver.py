@@ -22,6 +22,8 @@ CHAIN = (
     "fading",
     "phase_noise",
     "impulses",
+    "steps",
+    "limiter",
     "flicker",
     "spurs",
     "mains",
@@ -87,6 +89,7 @@ class ReceiverBounds:
         drawn = self.reception.drawn
         return {
             "fading": float(10 ** (abs(drawn.fading_db[0]) / 20)),
+            "steps": float(10 ** (max(-drawn.step_db[0], 0) / 20)),
             "colour": float(10 ** ((np.abs(drawn.hump_db[0]).sum() + max(drawn.tilt_db[0], 0)) / 20)),
             "canceller": float(2 ** (drawn.canceller_pulses[0] - 1)),
             "image": float(1 + 10 ** (drawn.image_db[0] / 20)),
@@ -106,7 +109,7 @@ class ReceiverBounds:
         before = self.effects[:place]
         changed, plain = (self.reception.receive(self._signal, some) for some in ((*before, effect), before))
         reaches = self._missed * float(np.prod([self.gain(name) for name in before], initial=1.0))
-        if effect in ("fading", "phase_noise"):
+        if effect in ("fading", "phase_noise", "steps"):
             spread = self._multiplier(effect)
         elif effect in ("dc", "impulses", "flicker", "spurs", "mains", "bursts"):
             spread = 0.0

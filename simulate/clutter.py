@@ -15,6 +15,9 @@ from .motion import TWO_PI
 from .radar import Radar
 from .target import Normals, Target
 
+#: How often ground moves by a Gaussian law: the lower part of `ground_law`.
+GAUSSIAN_GROUND = 0.35
+
 #: Width of the line of ripples [m/s].
 BRAGG_WIDTH_MPS = 0.1
 
@@ -152,13 +155,46 @@ def ground_psd(
     return psd, a / (a + 1)
 
 
+def gaussian_ground(draws: Draws) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Draw which ground moves by a Gaussian law, as models older than Billingsley's have it.
+
+    Parameters
+    ----------
+    draws : Draws
+        The records' uniform numbers.
+
+    Returns
+    -------
+    width_mps : ndarray, shape (records,)
+        Its rms velocity [m/s]; NaN where the ground moves by Billingsley's law.
+    rest : ndarray, shape (records,)
+        Share of the power that stands still.
+
+    References
+    ----------
+    Barlow, "Doppler radar" (Proc. IRE 37, 1949); Skolnik, Introduction to Radar Systems, ch. 3.
+    """
+    gaussian = draws.value("ground_law") < GAUSSIAN_GROUND
+    still = 10 ** (draws.value("ground_still_db") / 10)
+    return np.where(gaussian, draws.value("ground_width_mps"), np.nan), still / (still + 1)
+
+
 def draw_ground(
-    normals: Normals, radar: Radar, wind_mph: NDArray[np.float64], phase_rad: NDArray
+    normals: Normals,
+    radar: Radar,
+    wind_mph: NDArray[np.float64],
+    phase_rad: NDArray,
+    gaussian: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
 ) -> NDArray[np.complex64]:
-    """Wind-blown ground of unit mean power, shape (records, pulses)."""
+    """Wind-blown ground of unit mean power, shape (records, pulses); `gaussian` as `gaussian_ground` gives it."""
     # as many lines as the strongest wind of the law needs: how many numbers a record takes is the same in any batch
     v = slow_velocities(radar, max(LAWS["wind_mph"].high, float(np.max(wind_mph, initial=0.0))))
     psd, rest = ground_psd(radar, wind_mph, v)
+    if gaussian is not None:
+        rows = np.flatnonzero(np.isfinite(gaussian[0]))
+        psd[rows] = _gaussian(v, np.zeros(len(rows)), gaussian[0][rows], radar)
+        rest = rest.copy()
+        rest[rows] = gaussian[1][rows]
     moving = shaped_noise(normals, radar, psd, v)
     still = (np.sqrt(rest) * np.exp(1j * phase_rad)).astype(np.complex64)
     return still[:, None] + np.sqrt(1 - rest).astype(np.float32)[:, None] * moving
@@ -188,8 +224,10 @@ def draw_clutter(draws: Draws, radar: Radar, kind: str, normals: Normals) -> Tar
     v = process_velocities(radar)
     if kind == "ground":
         wind = draws.value("wind_mph")
-        iq = draw_ground(normals, radar, wind, draws.value("phase_rad"))
-        return Target(iq, snr_law="clutter_snr_db", truth={"wind_mph": wind})
+        phase, gaussian = draws.value("phase_rad"), gaussian_ground(draws)
+        iq = draw_ground(normals, radar, wind, phase, gaussian)
+        blown = np.where(np.isnan(gaussian[0]), wind, np.nan)
+        return Target(iq, snr_law="clutter_snr_db", truth={"wind_mph": blown, "width_mps": gaussian[0]})
     if kind == "rain":
         mean, width = draws.value("rain_velocity_mps"), draws.value("rain_width_mps")
         iq = shaped_noise(normals, radar, _gaussian(v, mean, width, radar), v)

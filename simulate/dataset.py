@@ -13,7 +13,7 @@ from numpy.random import Generator, Philox, SeedSequence
 from numpy.typing import NDArray
 
 from .bird import draw_bird
-from .clutter import draw_clutter, draw_ground
+from .clutter import draw_clutter, draw_ground, gaussian_ground
 from .discretes import DISCRETES, draw_discrete
 from .laws import LAWS, WIDTH, Draws
 from .radar import SPEED_OF_LIGHT_MPS, Radar, whole
@@ -322,14 +322,16 @@ def _background(draws: Draws, radar: Radar, normals_of: NormalsOf, level_db: NDA
     """What is in the cell behind any target: nothing, a return at rest, wind-blown ground, rain or sea."""
     present, blown = draws.chance(0.6), draws.chance(0.5)
     drawn_db, wind = draws.value("background_db"), draws.value("wind_mph")
-    phase = draws.value("phase_rad")
+    phase, gaussian = draws.value("phase_rad"), gaussian_ground(draws)
     weather, wet, own = draws.chance(WEATHER), draws.chance(0.5), draws.uniform(_WEATHER_NUMBERS)
     drawn_db = np.where(weather, draws.value("weather_db"), drawn_db)
     level_db[:] = np.where(present, drawn_db, np.nan)
     out = np.exp(1j * phase).astype(np.complex64)[:, None] * np.ones((1, radar.pulses), np.complex64)
     rows = np.flatnonzero(present & blown & ~weather)
     if len(rows):
-        out[rows] = draw_ground(normals_of(rows), radar, wind[rows], phase[rows])
+        out[rows] = draw_ground(
+            normals_of(rows), radar, wind[rows], phase[rows], (gaussian[0][rows], gaussian[1][rows])
+        )
     for kind, of_kind in (("rain", wet), ("sea", ~wet)):
         rows = np.flatnonzero(present & weather & of_kind)
         if len(rows):

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 1662 of them.
-WIDTH = 1663
+#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 1696 of them.
+WIDTH = 1697
 
 #: What a steady body's acceleration is of a manoeuvring one's. Half of all bodies are steady, whatever they are: if one
 #: class alone accelerated, a line that bends would be all there is to learn of it.
@@ -65,6 +65,9 @@ LAWS: dict[str, Law] = {
     ),
     "weather_db": Law("uniform", -10.0, 35.0, "dB", "rain or sea behind a target, over noise"),
     "wind_mph": Law("log", 2.0, 35.0, "mph", "Billingsley"),
+    "ground_law": Law("uniform", 0.0, 1.0, "1", "below 0.35 ground moves by a Gaussian law, as many models have it"),
+    "ground_width_mps": Law("log", 0.01, 0.5, "m/s", "its rms; 0.01-0.32 m/s from bare hills to woods in a gale"),
+    "ground_still_db": Law("uniform", -25.0, 25.0, "dB", "what stands still over what moves by it"),
     # rotors
     "blade_length_m": Law("log", 0.06, 0.7, "m", "0.075-0.41 m (P); 0.7 m on agricultural drones"),
     "tip_mps": Law("log", 28.0, 190.0, "m/s", "idling 33 m/s (measured) to fast racing props, below Mach 0.6"),
@@ -158,6 +161,10 @@ LAWS: dict[str, Law] = {
     "impulse_lasts": Law("log", 0.02, 100.0, "1", "pulses in a row that a packet or a chirp spoils; one, if below 1.5"),
     "impulse_turns": Law("uniform", -0.5, 0.5, "1", "turns a pulse of its phase when it begins"),
     "impulse_sweep": Law("log", 0.01, 1.0, "1", "by how much those rise or fall until it ends"),
+    "step_db": Law("log", 0.05, 12.0, "dB", "most by which the gain steps down: attenuators of 1-10 dB"),
+    "step_rad": Law("log", 0.02, np.pi, "rad", "most by which the phase steps to either side"),
+    "step_count": Law("log", 1.0, 8.0, "1", "such steps of both, at any time"),
+    "limit_db": Law("uniform", -10.0, 30.0, "dB", "a limiter's level over noise: under strong echoes phase is left"),
     "spur_db": Law("uniform", -30.0, 25.0, "dB", "a steady line of the receiver's own over noise"),
     "spur_turns": Law("uniform", -0.5, 0.5, "1", "turns a pulse of its phase"),
     "spur_count": Law("uniform", 0.5, 3.5, "1", "such lines"),

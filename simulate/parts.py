@@ -35,11 +35,14 @@ BOUNDS = {
     "turbine_row_points": (2, 1e6),
     "insect_count": (1, 20),
     "wind_mph": (0.5, 200),
+    "ground_law": (0, 1),
+    "ground_width_mps": (1e-6, 0.6),
     "gait_hz": (0.05, 20),
     "texture_hz": (1e-6, 1000),
     "high_pass_hz": (1e-6, 1e9),
     "canceller_pulses": (2, 3),
     "adc_bits": (1, 24),
+    "step_count": (1, 8),
 }
 
 #: The same of every level [dB].

@@ -42,6 +42,8 @@ WORDS = {
     "fading": ("slow rise and fall of all echoes", "constant levels"),
     "phase_noise": ("phase noise", "a clean oscillator"),
     "impulses": ("spoilt pulses", "none"),
+    "steps": ("steps of gain and phase", "one gain and phase"),
+    "limiter": ("a limiter", "none"),
     "flicker": ("1/f noise", "white noise alone"),
     "spurs": ("steady lines of the receiver's own", "none"),
     "mains": ("mains lines", "none"),

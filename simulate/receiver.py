@@ -20,6 +20,8 @@ from .target import Normals
 FAULT_CHANCE = {
     "fading": 0.4,
     "impulses": 0.2,
+    "steps": 0.16,
+    "limiter": 0.06,
     "high_pass": 0.12,
     "canceller": 0.08,
     "flicker": 0.25,
@@ -44,6 +46,10 @@ EFFECT_OF = {
     "impulse_turns": "impulses",
     "impulse_sweep": "impulses",
     "impulse_count": "impulses",
+    "step_db": "steps",
+    "step_rad": "steps",
+    "step_count": "steps",
+    "limit_db": "limiter",
     "spur_db": "spurs",
     "spur_turns": "spurs",
     "spur_count": "spurs",
@@ -75,6 +81,9 @@ SPOILT_SHARE = 0.25
 
 #: Most steady lines of a receiver's own.
 SPURS = 3
+
+#: Most steps of a receiver's gain and phase within a record.
+STEPS = 8
 
 
 class Receiver:
@@ -130,6 +139,12 @@ class Receiver:
         faulty = ~draws.chance(FAULTLESS_CHANCE)
         self.impulse_even = draws.chance(0.5)
         self.impulse_pulses = draws.value("impulse_pulses")
+        self.step_db = draws.value("step_db")
+        self.step_rad = draws.value("step_rad")
+        self.step_count = np.rint(draws.value("step_count"))
+        self.step_at = draws.uniform(STEPS)
+        self.step_shares = draws.uniform(2 * STEPS + 2)
+        self.limit_db = draws.value("limit_db")
         self.on = {name: chosen & faulty for name, chosen in on.items()}
 
     def receive(
@@ -173,6 +188,12 @@ class Receiver:
         rows = np.flatnonzero(self.on["impulses"])
         if len(rows):
             self._spoil(iq, rows, normals_of("impulses")(rows))
+        rows = np.flatnonzero(self.on["steps"])
+        if len(rows):
+            iq[rows] *= self._steps(radar, rows)
+        for row in np.flatnonzero(self.on["limiter"]):
+            limit = np.float32(10 ** (self.limit_db[row] / 20))
+            iq[row] *= limit / np.maximum(np.abs(iq[row]), limit)
         rows = np.flatnonzero(self.on["flicker"])
         if len(rows):
             # the law sets the density at 1 % of the PRF; the process has unit power, so scale by the sum of the lines
@@ -216,13 +237,12 @@ class Receiver:
         phases = normals(4 * pulses).view(np.complex64)
         phases /= np.abs(phases)
         for row, (phase, other) in zip(rows, phases.reshape(len(rows), 2, pulses), strict=True):
-            lasts = max(1, round(float(self.impulse_lasts[row])))
-            if self.impulse_even[row]:
-                spacing = max(float(self.impulse_pulses[row]), 1.0)
-                lasts = max(1, min(lasts, int(spacing * SPOILT_SHARE)))
+            even, spacing = self.impulse_even[row], max(float(self.impulse_pulses[row]), 1.0)
+            most = int((spacing if even else pulses) * SPOILT_SHARE)
+            lasts = max(1, min(round(float(self.impulse_lasts[row])), most))
+            if even:
                 first = np.arange(self.impulse_at[row] * spacing, pulses, spacing).astype(np.intp)
             else:
-                lasts = max(1, min(lasts, int(pulses * SPOILT_SHARE)))
                 count = max(1, min(int(self.impulse_count[row]), int(pulses * SPOILT_SHARE / lasts)))
                 first = ((np.angle(other[:count]) / TWO_PI + 0.5) * pulses).astype(np.intp) % pulses
             within = np.arange(lasts)
@@ -233,6 +253,17 @@ class Receiver:
             heard = spoilt < pulses
             # two may fall on one pulse
             np.add.at(iq[row], spoilt[heard], np.broadcast_to(stretch, spoilt.shape)[heard])
+
+    def _steps(self, radar: Radar, rows: NDArray[np.intp]) -> NDArray[np.complex64]:
+        """Gain and phase that step at any time: a control that switches attenuators, an oscillator locked anew."""
+        out = np.empty((len(rows), radar.pulses), np.complex64)
+        for factor, row in zip(out, rows, strict=True):
+            at = np.sort(self.step_at[row, : int(self.step_count[row])]) * radar.pulses
+            stretch = np.searchsorted(at, np.arange(radar.pulses))
+            lost, turned_by = self.step_shares[row].reshape(2, -1)
+            neper = -np.log(10) / 20 * self.step_db[row] * lost
+            factor[:] = np.exp(neper + 1j * self.step_rad[row] * (2 * turned_by - 1))[stretch]
+        return out
 
     def _spurs(self, radar: Radar, rows: NDArray[np.intp]) -> NDArray[np.complex64]:
         """Steady lines of the receiver's own, or of another mover: any number is no rotor's comb."""

@@ -17,8 +17,9 @@ from .receiver import NormalsOf, Receiver
 from .setting import Setting
 from .target import mean_power
 
-#: What clutter of a kind is in a scene whose values do not say otherwise: a person walks, at `person_mps`.
-USUAL = {"person": {"pace": 1.0, "pedalling": 0.0}}
+#: What clutter of a kind is in a scene whose values do not say otherwise: a person walks, at `person_mps`; ground moves
+#: by Billingsley's law.
+USUAL = {"person": {"pace": 1.0, "pedalling": 0.0}, "ground": {"ground_law": 1.0}}
 
 
 def stream(seed: int, name: str) -> Generator:
@@ -78,7 +79,7 @@ def clutter_echo(part: ClutterPart, radar: Radar, seed: int) -> tuple[NDArray[np
     iq = target.micro
     if target.body is not None and target.body_db is not None:
         iq = _unit(iq) + _unit(target.body) * (10 ** (target.body_db / 20)).astype(np.float32)[:, None]
-    drawn = {name: float(values[0]) for name, values in target.truth.items()}
+    drawn = {name: float(values[0]) for name, values in target.truth.items() if not np.isnan(values[0])}
     return (_unit(iq) * np.float32(10 ** (part.level_db / 20)))[0], drawn, sorted(draws.unused)
 
 
