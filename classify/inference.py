@@ -284,15 +284,10 @@ class Classifier:
             reasons = np.broadcast_to(np.array(outside), len(records))
         else:
             records, stretches = mended(records)
-            told, labels, reasons = self._answers(records, carrier_hz, prf_hz)
             if stretches:
-                reasons = reasons.astype(object)
-                ends = np.array([(stretch.start, stretch.stop) for stretch in stretches.values()])
-                for begin, end in np.unique(ends, axis=0):  # padded records are alike
-                    rows = np.array(list(stretches))[(ends == (begin, end)).all(axis=1), 0]
-                    whole = self._of_stretches(records[rows, begin:end], carrier_hz, prf_hz)
-                    told[rows], labels[rows], reasons[rows] = whole
-                reasons = reasons.astype(np.str_)
+                told, labels, reasons = self._of_stretches(records, stretches, carrier_hz, prf_hz)
+            else:
+                told, labels, reasons = self._answers(records, carrier_hz, prf_hz)
         return Prediction(
             labels.reshape(leading),
             np.ascontiguousarray(told[:, :-1]).reshape(*leading, len(CLASSES)),
@@ -319,13 +314,25 @@ class Classifier:
         return told, labels, reasons.astype(np.str_)
 
     def _of_stretches(
-        self, stretches: NDArray[np.complex64], carrier_hz: float, prf_hz: float
-    ) -> tuple[NDArray[np.float32], NDArray[np.str_], NDArray[np.str_] | str]:
-        """As `_answers`, of the longest stretches of records that silences break."""
-        pulses = stretches.shape[-1]
-        if outside := self.envelope.reason(carrier_hz, prf_hz, pulses):
-            return *_untold(len(stretches)), f"silence: no more than {pulses} pulses in a row are not 0: {outside}"
-        return self._answers(stretches, carrier_hz, prf_hz)
+        self,
+        records: NDArray[np.complex64],
+        stretches: Mapping[tuple[int, ...], slice],
+        carrier_hz: float,
+        prf_hz: float,
+    ) -> tuple[NDArray[np.float32], NDArray[np.str_], NDArray[np.str_]]:
+        """As `_answers`, of records some of which silences break: of each its longest stretch that is whole."""
+        told, labels = _untold(len(records))
+        reasons = np.empty(len(records), dtype=object)
+        ends = np.full((len(records), 2), (0, records.shape[-1]))
+        for (row,), stretch in stretches.items():
+            ends[row] = stretch.start, stretch.stop
+        for begin, end in np.unique(ends, axis=0):  # padded records are alike
+            rows, pulses = np.flatnonzero((ends == (begin, end)).all(axis=1)), end - begin
+            if pulses < records.shape[-1] and (outside := self.envelope.reason(carrier_hz, prf_hz, pulses)):
+                reasons[rows] = f"silence: no more than {pulses} pulses in a row are not 0: {outside}"
+                continue
+            told[rows], labels[rows], reasons[rows] = self._answers(records[rows, begin:end], carrier_hz, prf_hz)
+        return told, labels, reasons.astype(np.str_)
 
     def _told(
         self, records: NDArray[np.complex64], rows: NDArray[np.intp] | None, carrier_hz: float, prf_hz: float

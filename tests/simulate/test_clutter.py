@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from bladewing.simulate import Radar, clutter
 from bladewing.simulate.clutter import (
+    GAUSSIAN_GROUND,
     _texture,
     billingsley,
     bragg_mps,
     draw_clutter,
     draw_ground,
+    gaussian_ground,
     process_velocities,
     shaped_noise,
 )
@@ -50,6 +52,46 @@ def test_shaped_noise_has_the_spectrum_asked_for():
     spread = np.sqrt(np.sum((axis - centre) ** 2 * measured) / measured.sum())
     assert centre == pytest.approx(mean_mps, abs=0.05)
     assert spread == pytest.approx(width_mps, abs=0.05)
+
+
+@pytest.mark.parametrize(("width_mps", "rest"), [(0.05, 0.0), (0.05, 0.75), (0.4, 0.2)])
+def test_ground_of_a_gaussian_law_has_its_width_and_what_stands_still(width_mps, rest):
+    records = 400
+    radar = Radar(24e9, 2e3, 2000)
+    nothing = np.zeros(records)
+    gaussian = (np.full(records, width_mps), np.full(records, rest))
+    iq = draw_ground(normals(records), radar, np.full(records, 10.0), nothing, gaussian)
+    assert np.mean(iq) == pytest.approx(np.sqrt(rest), abs=0.05)
+    moving = iq - np.sqrt(rest)
+    power = np.mean(abs(moving) ** 2)
+    # correlated over about wavelength / (2 width): 16 or more independent values a record
+    assert power == pytest.approx(1 - rest, abs=4.5 * (1 - rest) / np.sqrt(16 * records))
+    # the mean square of a derivative is that of the velocity, without a window's leakage; differences at 2 kHz see it
+    turns = np.mean(moving[:, 1:] * moving[:, :-1].conj()) / power
+    exact = np.exp(-0.5 * (4 * np.pi * width_mps / radar.wavelength_m / radar.prf_hz) ** 2)
+    assert turns == pytest.approx(exact, abs=0.004 if width_mps > 0.1 else 4e-5)
+
+
+def test_a_third_of_the_ground_moves_by_a_gaussian_law_of_any_width():
+    records = 4000
+    draws = Draws(np.random.default_rng(5).random((records, WIDTH)))
+    width, rest = gaussian_ground(draws)
+    found = np.isfinite(width)
+    share = GAUSSIAN_GROUND
+    assert found.mean() == pytest.approx(share, abs=4.5 * np.sqrt(share * (1 - share) / records))
+    law = LAWS["ground_width_mps"]
+    place = np.log(width[found] / law.low) / np.log(law.high / law.low)
+    assert np.mean(place) == pytest.approx(0.5, abs=4.5 / np.sqrt(12 * found.sum()))
+    assert ((rest > 0.003) & (rest < 0.997)).all()
+
+
+def test_ground_of_billingsleys_law_is_the_same_whatever_else_was_drawn():
+    wind, phase = np.full(3, 12.0), np.zeros(3)
+    usual = draw_ground(normals(3), RADAR, wind, phase)
+    width = np.array([np.nan, 0.1, np.nan])
+    mixed = draw_ground(normals(3), RADAR, wind, phase, (width, np.full(3, 0.5)))
+    np.testing.assert_array_equal(mixed[[0, 2]], usual[[0, 2]])
+    assert not np.array_equal(mixed[1], usual[1])
 
 
 def test_ground_rests_and_moves_in_billingsleys_shares():

@@ -169,6 +169,54 @@ def test_a_canceller_is_a_difference_of_pulses_once_or_twice_but_for_its_delay(p
     np.testing.assert_allclose(power, np.mean(np.abs(differences) ** 2, axis=1), rtol=1e-4, atol=1e-6)
 
 
+def alone(effect: str, records: int, seed: int = 0) -> Receiver:
+    """Receivers with one effect and no gain of their own."""
+    drawn = Receiver(Draws(np.random.default_rng(seed).random((records, 400))))
+    drawn.on = {name: np.full(records, name == effect) for name in drawn.on}
+    drawn.gain_db[:] = 0.0
+    return drawn
+
+
+def test_a_receiver_steps_as_often_and_as_far_as_its_laws_say_and_is_steady_between():
+    records, radar = 300, Radar(9.85e9, 1e4, 3000)
+    drawn = alone("steps", records)
+    still = np.ones((records, radar.pulses), np.complex64)
+    iq = drawn.receive(still.copy(), np.zeros_like(still), radar, lambda _: None)
+    assert ((np.diff(iq, axis=1) != 0).sum(axis=1) <= drawn.step_count).all()
+    assert np.mean((np.diff(iq, axis=1) != 0).sum(axis=1) == drawn.step_count) > 0.9  # two may fall on one pulse
+    level_db, angle = 20 * np.log10(np.abs(iq)), np.angle(iq)
+    assert (level_db <= 1e-5).all()
+    assert (level_db >= -drawn.step_db[:, None] - 1e-5).all()
+    assert (np.abs(angle) <= drawn.step_rad[:, None] + 1e-6).all()
+    # of so many steps the widest reaches most of the range: the ends of n + 1 even numbers are 2 / (n + 2) off it
+    n = drawn.step_count
+    reached = np.ptp(level_db, axis=1) / drawn.step_db
+    spread = np.sqrt(2 * n / ((n + 2) ** 2 * (n + 3)))
+    assert np.mean((reached - n / (n + 2)) / spread) == pytest.approx(0, abs=4.5 / np.sqrt(records))
+
+
+def test_a_step_acts_on_noise_and_echo_alike():
+    radar, drawn = Radar(9.85e9, 1e4, 500), alone("steps", 4)
+    rng = np.random.default_rng(1)
+    signal, noise = rng.standard_normal((2, 4, radar.pulses, 2)).astype(np.float32).view(np.complex64)[..., 0]
+    both = drawn.receive(signal.copy(), noise, radar, lambda _: None)
+    factor = drawn.receive(np.ones_like(signal), np.zeros_like(noise), radar, lambda _: None)
+    np.testing.assert_allclose(both, factor * (signal + noise), rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("limit_db", [-10.0, 3.0, 30.0])
+def test_a_limiter_keeps_the_phase_and_what_is_below_its_level(limit_db):
+    radar, drawn = Radar(9.85e9, 1e4, 2000), alone("limiter", 3)
+    drawn.limit_db[:] = limit_db
+    rng = np.random.default_rng(2)
+    signal = rng.standard_normal((3, radar.pulses, 2)).astype(np.float32).view(np.complex64)[..., 0] * 3
+    iq = drawn.receive(signal.copy(), np.zeros_like(signal), radar, lambda _: None)
+    limit = 10 ** (limit_db / 20)
+    np.testing.assert_allclose(np.abs(iq), np.minimum(np.abs(signal), limit), rtol=1e-5)
+    np.testing.assert_allclose(np.angle(iq), np.angle(signal), atol=1e-5)
+    assert (np.abs(signal) > limit).any() == (limit_db < 20)
+
+
 def test_rain_and_the_sea_stand_behind_targets_as_often_as_they_are_to(monkeypatch):
     radar, count = Radar(9.85e9, 5e3, 32), 3000
     drawn = Counter()
