@@ -13,7 +13,7 @@ from bladewing.simulate import Radar, draw_records
 
 RADAR = Radar(carrier_hz=9.85e9, prf_hz=10e3, pulses=3000)
 # (kind, seed): records of the "bench" streams that show what the kind is about
-SHOWN = (("quadcopter", 35), ("flapping_bird", 77), ("vehicle", 37))
+SHOWN = (("quadcopter", 188), ("flapping_bird", 36), ("vehicle", 17))
 FRAME, FRAMES, SPAN_DB = 160, 300, 45
 
 figure, axes = plt.subplots(2, 3, figsize=(11, 5.6), height_ratios=(1.5, 1), sharey="row", layout="constrained")
