@@ -124,7 +124,7 @@ def test_wheel_installs_into_a_clean_environment_and_predicts(tmp_path):
     (wheel,) = (tmp_path / "dist").glob("bladewing-*.whl")
     run(sys.executable, "-m", "venv", tmp_path / "clean")
     python = tmp_path / "clean" / "bin" / "python"
-    run(python, *pip[1:], "install", "-c", ROOT / "constraints.txt", wheel)
+    run(python, *pip[1:], "install", "--no-compile", "-c", ROOT / "constraints.txt", wheel)
     environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
     run(python, "-c", RUN.format(packages=LISTED), env=environment)
     asked = run(python.parent / "bladewing", "--help", env=environment)
