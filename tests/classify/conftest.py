@@ -1,6 +1,8 @@
 """Small models and recordings that the tests of classify share."""
 
+import fcntl
 import json
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -161,13 +163,16 @@ def tiny_settings(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def report_folder(tmp_path_factory: pytest.TempPathFactory, tiny_models: Path, tiny_settings: Path) -> Path:
-    """A whole report on few records: report.json and report.html."""
+    """A whole report on few records: report.json and report.html, made once for all workers of a run."""
     from bladewing.classify.report.run import run_report
 
-    folder = tmp_path_factory.mktemp("report") / "new"
-    with pytest.MonkeyPatch.context() as patch:
-        few_choices(patch)
-        run_report(folder, models=tiny_models, quick=True, config=tiny_settings, progress=False)
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "report"
+    with folder.with_suffix(".lock").open("w") as lock, pytest.MonkeyPatch.context() as patch:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (folder / "report.json").exists():
+            few_choices(patch)
+            run_report(folder, models=tiny_models, quick=True, config=tiny_settings, progress=False)
     return folder
 
 
