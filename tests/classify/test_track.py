@@ -288,7 +288,7 @@ def test_what_the_whole_track_shows_multiplies_odds_at_the_end_alone(shown, name
     # ahead also with its odds divided, which reach the limits with what is found and not without
     p, best = [[0.6 if other == name else 0.2 for other in CLASSES]] * 4, CLASSES.index(name)
     ahead = fused(p, ["unknown"] * 4, accept=(1.0,) * 3, shown=()).probabilities[best]
-    between = np.sqrt(max(factor, 1)) / DOUBT * ahead / (1 - ahead)
+    between = np.sqrt(max(factor, 1.01)) / DOUBT * ahead / (1 - ahead)
     accept = (between / (1 + between),) * 3
     plain, more = (fused(p, ["unknown"] * 4, accept=accept, shown=found) for found in ((), shown))
     odds = [track.probabilities / (1 - track.probabilities) for track in (plain, more)]
