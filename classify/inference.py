@@ -328,7 +328,7 @@ class Classifier:
             ends[row] = stretch.start, stretch.stop
         for begin, end in np.unique(ends, axis=0):  # padded records are alike
             rows, pulses = np.flatnonzero((ends == (begin, end)).all(axis=1)), end - begin
-            if pulses < records.shape[-1] and (outside := self.envelope.reason(carrier_hz, prf_hz, pulses)):
+            if outside := self.envelope.reason(carrier_hz, prf_hz, pulses):
                 reasons[rows] = f"silence: no more than {pulses} pulses in a row are not 0: {outside}"
                 continue
             told[rows], labels[rows], reasons[rows] = self._answers(records[rows, begin:end], carrier_hz, prf_hz)

@@ -1,6 +1,5 @@
 """Small models and recordings that the tests of classify share."""
 
-import fcntl
 import json
 import os
 from collections.abc import Callable, Sequence
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bladewing.classify.envelope import Envelope
+from bladewing.classify.files import only_writer
 from bladewing.features.schema import INPUT_SHAPES, schema_hash
 from bladewing.models.seal import PLACEHOLDER, SEAL_KEY, seal
 
@@ -167,9 +167,9 @@ def report_folder(tmp_path_factory: pytest.TempPathFactory, tiny_models: Path, t
     from bladewing.classify.report.run import run_report
 
     own = tmp_path_factory.getbasetemp()
-    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "report"
-    with folder.with_suffix(".lock").open("w") as lock, pytest.MonkeyPatch.context() as patch:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+    folder = shared / "report"
+    with only_writer(shared), pytest.MonkeyPatch.context() as patch:
         if not (folder / "report.json").exists():
             few_choices(patch)
             run_report(folder, models=tiny_models, quick=True, config=tiny_settings, progress=False)

@@ -99,7 +99,7 @@ def test_of_a_recording_that_clips_no_comb_that_stays_is_counted(tmp_path) -> No
     # four times the line's own: it is there, and does not count
     assert long_look(recording.iq, 9.85e9, 25e3)["comb"] == pytest.approx(80, rel=0.01)
     assert "comb" not in given.shown
-    assert "bird" not in given.dwells.labels
+    assert set(given.dwells.labels) <= {"unknown", "clutter"}
     assert "may pass for a rotor, and no comb that stays is counted" in given.remarks[0]
     assert "tips may come out too fast" in recording.remarks(0.08, recording.dwells(0.08), measured=True)[0]
 

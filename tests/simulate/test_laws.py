@@ -157,24 +157,23 @@ def test_a_tail_rotor_drifts_and_wanders_as_its_gear_makes_it():
     np.testing.assert_allclose(turned[0], ratio[:, None] * turned[1], rtol=1e-9, atol=1e-9)
 
 
+def alone(effect: str, records: int) -> Receiver:
+    """Receivers with one effect and no gain of their own."""
+    drawn = Receiver(Draws(np.random.default_rng(0).random((records, 400))))
+    drawn.on = {name: np.full(records, name == effect) for name in drawn.on}
+    drawn.gain_db[:] = 0.0
+    return drawn
+
+
 @pytest.mark.parametrize("pulses", [2.0, 3.0])
 def test_a_canceller_is_a_difference_of_pulses_once_or_twice_but_for_its_delay(pulses):
     radar, turns = Radar(9.85e9, 1e4, 400), np.array([0.0, 0.05, 0.25, -0.4, 0.5])
-    drawn = Receiver(Draws(np.random.default_rng(0).random((len(turns), 200))))
-    drawn.on = {name: np.full(len(turns), name == "canceller") for name in drawn.on}
-    drawn.canceller_pulses[:], drawn.gain_db[:] = pulses, 0.0
+    drawn = alone("canceller", len(turns))
+    drawn.canceller_pulses[:] = pulses
     tones = np.exp(2j * np.pi * turns[:, None] * np.arange(radar.pulses)).astype(np.complex64)
     power = np.mean(np.abs(drawn.receive(tones, np.zeros_like(tones), radar, lambda _: None)) ** 2, axis=1)
     differences = np.diff(tones, n=int(pulses) - 1, axis=1)
     np.testing.assert_allclose(power, np.mean(np.abs(differences) ** 2, axis=1), rtol=1e-4, atol=1e-6)
-
-
-def alone(effect: str, records: int, seed: int = 0) -> Receiver:
-    """Receivers with one effect and no gain of their own."""
-    drawn = Receiver(Draws(np.random.default_rng(seed).random((records, 400))))
-    drawn.on = {name: np.full(records, name == effect) for name in drawn.on}
-    drawn.gain_db[:] = 0.0
-    return drawn
 
 
 def test_a_receiver_steps_as_often_and_as_far_as_its_laws_say_and_is_steady_between():
