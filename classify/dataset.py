@@ -22,10 +22,10 @@ from bladewing.simulate.dataset import KIND_CLASS, RADAR_GROUP, Records, draw_ra
 
 from .errors import BadInput, unreadable, unwritable
 from .files import clear_litter, no_empty_folder, only_writer, read_bounded, settle, write_whole
-from .gather import in_order
 from .progress import Progress
 from .shards import Contents, intact, read_shard, shard_bytes, write_shard
 from .training_config import TrainingConfig, training_config
+from .workers import in_order
 
 #: Name of the manifest.
 MANIFEST = "dataset.json"

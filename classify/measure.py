@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
 from bladewing.features.inputs import MIN_PULSES
-from bladewing.features.measure import MOST_BLADES_GIVEN, measure
+from bladewing.features.measure import MOST_BLADES_GIVEN
 from bladewing.features.measurements import BODY, EACH_ROTOR, Measurements
 from bladewing.features.one_channel import half_empty, made_analytic
 from bladewing.features.spectrum import centred_power, scaled, unit_scale
@@ -19,6 +19,7 @@ from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
 from .envelope import Envelope, dwell_length, in_kilohertz, require_hertz
 from .errors import BadInput
+from .measure_dwells import measure_dwells
 from .progress import Progress
 from .recording import Recording
 from .terminal import counted
@@ -342,7 +343,7 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     acceleration, acceleration_std, smeared = body_acceleration(iq, **radar)
     iq = without_acceleration(iq, np.where(smeared, acceleration, 0.0), **radar)
     with (progress or Progress(visible=False)).phase(f"measure {counted(count)}", count) as on_record:
-        values = measure(iq, **radar, blades=settings.blades, beta_rad=settings.beta_rad, on_record=on_record)
+        values = measure_dwells(iq, on_record=on_record, **radar, blades=settings.blades, beta_rad=settings.beta_rad)
     start_s = recording.start_s + np.arange(count) * pulses / recording.prf_hz
     long = len(recording.iq) >= LEAST_S * recording.prf_hz
     beat = wingbeat(whole, **radar) if long else None

@@ -1,6 +1,8 @@
 """What `measure` gives: every number of a record with its standard deviation."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +116,14 @@ class Measurements:
     gear_ratio_std: NDArray[np.float64]
     gear_reason: NDArray[np.str_]
     band_reason: NDArray[np.str_]
+
+    @classmethod
+    def joined(cls, runs: Sequence[Self]) -> Self:
+        """Those of one batch and more, measured with the same beta, as of one: along their first axis."""
+        columns: dict[str, Any] = {"length_is_lower_bound": runs[0].length_is_lower_bound}
+        for name in (field.name for field in fields(cls) if field.name not in columns):
+            columns[name] = np.concatenate([getattr(run, name) for run in runs])
+        return cls(**columns)
 
     def alternatives(self, index: tuple[int, ...] = ()) -> list[dict[str, float]]:
         """The {blades, rpm, blade_length_m} that a record's chopping frequency and band allow.

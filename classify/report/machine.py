@@ -8,7 +8,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from ..gather import workers_at_hand
+from ..workers import workers_at_hand
 
 # Those whose versions change scores or timings.
 PACKAGES = ("bladewing", "numpy", "scipy", "onnxruntime")

@@ -1,10 +1,8 @@
-import operator
 import os
 import signal
 import subprocess
 import sys
 import time
-from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from bladewing.classify.errors import BadInput
 from bladewing.classify.gather import gather, inputs_digest
 from bladewing.classify.parts import Parts
 from bladewing.features import INPUT_SHAPES
-from threadpoolctl import threadpool_info
 
 
 def test_inputs_do_not_depend_on_the_workers(monkeypatch):
@@ -26,14 +23,6 @@ def test_inputs_do_not_depend_on_the_workers(monkeypatch):
         np.testing.assert_array_equal(one.inputs[name], two.inputs[name])
     np.testing.assert_array_equal(one.labels, np.arange(60) % 3)
     np.testing.assert_array_equal(one.truth["kind"], two.truth["kind"])
-
-
-@pytest.mark.skipif(gather_module.workers_at_hand() == 1, reason="on one processor nothing has more threads")
-def test_a_worker_computes_on_one_thread():
-    for libraries in gather_module.in_order(operator.call, [threadpool_info] * 2, workers=2):
-        threads = [library["num_threads"] for library in libraries if library["user_api"] == "blas"]
-        assert threads
-        assert set(threads) == {1}
 
 
 def test_other_measurements_have_another_digest(monkeypatch):
@@ -167,16 +156,3 @@ def test_an_interrupt_is_the_parent_s_alone(tmp_path):
     script.write_text(INTERRUPTED)
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, start_new_session=True, timeout=120)
     assert (done.stdout, done.stderr, done.returncode) == ("stopped\n", "", 0)
-
-
-def test_a_worker_of_the_caller_s_own_outlives_tasks_that_are_given_up():
-    own = get_context("spawn").Process(target=time.sleep, args=(30,))
-    own.start()
-    try:
-        tasks = gather_module.in_order(abs, [-1, -2, -3, -4], workers=2)
-        assert next(tasks) == 1
-        tasks.close()
-        assert own.is_alive()
-    finally:
-        own.terminate()
-        own.join()

@@ -1,0 +1,91 @@
+"""Tasks done on several processes, their results in order; Ctrl-C and a killed parent end them all."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from functools import partial
+from multiprocessing import active_children, get_context, parent_process, resource_tracker
+from typing import TypeVar
+
+from bladewing.features.one_thread import one_thread
+
+Task = TypeVar("Task")
+Done = TypeVar("Done")
+
+
+def workers_at_hand() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def in_order(work: Callable[[Task], Done], tasks: Sequence[Task], workers: int | None = None) -> Iterator[Done]:
+    """Do tasks on several processes; give the results in the order of the tasks, a few a worker under way.
+
+    Parameters
+    ----------
+    work, tasks
+        What to do with each; both must travel to another process.
+    workers : int, optional
+        Processes; by default one a processor. 1 works in this process.
+    """
+    workers = workers_at_hand() if workers is None else workers
+    if workers < 2 or len(tasks) < 2:
+        yield from map(work, tasks)
+        return
+    # spawn, not fork: a fork of a process with threads (torch, onnxruntime) may hang
+    others = set(active_children())
+    pool_of = partial(ProcessPoolExecutor, mp_context=get_context("spawn"), initializer=_begin)
+    with pool_of(min(workers, len(tasks))) as pool:
+        waiting: list[Future[Done]] = []
+        try:
+            for task in tasks:
+                with _deaf_children():
+                    waiting.append(pool.submit(work, task))
+                if len(waiting) >= 3 * workers:
+                    yield waiting.pop(0).result()
+            while waiting:
+                yield waiting.pop(0).result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for worker in set(active_children()) - others:  # else what they have begun is waited for
+                worker.terminate()
+            raise
+
+
+@contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Processes started within never hear of Ctrl-C, which a terminal sends to all: they end with their parent.
+
+    It is held back, not ignored: the parent hears of it right after.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # whose own start would let it through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _begin() -> None:
+    """Begin as a worker: on one thread, and watching the parent.
+
+    There are as many workers as processors; with threads of their own besides they draw two thirds as many records. A
+    worker whose parent was killed would wait for work for ever.
+    """
+    one_thread.__enter__()
+    parent = parent_process()
+    if parent is not None:
+
+        def watch() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=watch, daemon=True).start()

@@ -1,0 +1,40 @@
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from bladewing.classify import measure_dwells as module
+from bladewing.classify.measure_dwells import measure_dwells
+from bladewing.classify.workers import in_order
+from bladewing.features import measure
+
+from ..features.signals import CARRIER_HZ, PRF_HZ, PULSES, rotors, white
+
+RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+
+
+@pytest.fixture(scope="module")
+def dwells():
+    rng = np.random.default_rng(7)
+    turning = [10 ** (snr_db / 20) * rotors(rates_hz) for rates_hz, snr_db in (((57.0,), 0), ((56.6, 58.0), 10))]
+    heard = [echo + white(rng, PULSES) for echo in (*turning, np.zeros(PULSES))]
+    return np.stack([*heard, np.zeros(PULSES), white(rng, PULSES)]).astype(np.complex64)
+
+
+@pytest.mark.parametrize(("alone_s", "workers"), [(1e-3, None), (1e9, 1)], ids=["shared", "alone"])
+def test_dwells_are_measured_alike_by_one_process_and_by_several(dwells, monkeypatch, alone_s, workers):
+    asked, said = [], []
+
+    def watched(work, tasks, workers):
+        asked.append((len(tasks), workers))
+        return in_order(work, tasks, 2 if workers is None else workers)
+
+    monkeypatch.setattr(module, "in_order", watched)
+    monkeypatch.setattr(module, "ALONE_S", alone_s)
+    monkeypatch.setattr(module, "TASK_S", 1e-3)
+    found = measure_dwells(dwells, on_record=said.append, **RADAR, blades=2, beta_rad=0.1)
+    together = measure(dwells, **RADAR, blades=2, beta_rad=0.1)
+    for field in fields(together):
+        np.testing.assert_array_equal(getattr(found, field.name), getattr(together, field.name), field.name)
+    assert not found.length_is_lower_bound
+    assert said == list(range(1, len(dwells) + 1))
+    assert asked == [(len(dwells) - 1 if workers is None else 0, workers)]
