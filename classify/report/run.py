@@ -232,7 +232,7 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
     Raises
     ------
     BadInput
-        If the folder does not exist, or holds no model or one of a name that the report needs.
+        If the folder does not exist, or holds no model, one that cannot be used or one of a name that the report needs.
     """
     if folder is None:
         shipped = resources.files("bladewing.models.pretrained").iterdir()
@@ -245,8 +245,8 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
         except PermissionError as error:
             raise unreadable(folder, error, "give a folder that can be read") from None
         found = {path.stem: _content(path) for path in folder.glob("*.onnx")}
-        for stem, content in found.items():
-            Classifier(content, source=str(folder / f"{stem}.onnx"))  # or a model is refused without its file's name
+    for name, content in found.items():  # what cannot be used is told before anything is measured, by its file
+        Classifier(content, source=name if folder is None else str(folder / f"{name}.onnx"))
     own = {*PICTURES, FEATURES, CASCADE, EIGHT_BITS}
     if taken := sorted(found.keys() & own):
         raise BadInput(f"{folder}: {taken[0]}.onnx has the name of what the report makes itself: rename the file")
@@ -327,8 +327,6 @@ def run_report(
     """
     settings = report_config(config, seed=seed, quick=quick)
     found, account = load_models(models), training_account(models)
-    for name, content in found.items():
-        Classifier(content, source=name)  # what cannot be used is told before anything is measured
     out = result_folder(out)
     stability = worst_of_each(out)
     parts = Parts(out / REPORT_PARTS, _of(settings, found, account))

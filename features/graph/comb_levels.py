@@ -22,9 +22,11 @@ def line_nats(relative_power: Value) -> Value:
 
 def broad_power(radar: Spectrum, transform: Value, floor: Value, band: slice) -> Value:
     """As `comb_levels.broad_power`: from parts (n, 2, bins) and the floor to power (n, bins of the band)."""
-    bins = radar.bins
-    around = transform.graph.concat(transform.slice(bins - 1, bins), transform, transform.slice(0, 1))
-    first, stop = band.start + 1, band.stop + 1
+    bins, first, stop = radar.bins, band.start, band.stop
+    around = transform
+    if not (first and stop < bins):  # beyond an end lies the other
+        around = transform.graph.concat(transform.slice(bins - 1, bins), transform, transform.slice(0, 1))
+        first, stop = first + 1, stop + 1
     beside = around.slice(first - 1, stop - 1) + around.slice(first + 1, stop + 1)
     lines = around.slice(first, stop) + beside * NEIGHBOUR_SHARE
     return power_of(lines, stop - first) / (floor * float(definition.NOISE_GAIN))
