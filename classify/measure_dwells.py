@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from concurrent.futures import BrokenExecutor
 from functools import partial
 from typing import Any
 
@@ -11,6 +12,9 @@ from bladewing.features.measurements import Measurements
 from numpy.typing import NDArray
 
 from .workers import in_order
+
+#: What tells that workers cannot be had, where processes, memory or semaphores are short, or were lost.
+NO_WORKERS = (OSError, RuntimeError, AssertionError, BrokenExecutor)
 
 #: So long dwells are measured in this process; if what is left would take it as long again, which is what workers need
 #: to begin, they share it, in tasks of about so long [s].
@@ -44,10 +48,15 @@ def measure_dwells(iq: NDArray[np.complex64], *, on_record: Callable[[float], No
         on_record(done)
     each_s = (time.monotonic() - started) / done
     some = max(1, round(TASK_S / each_s))
-    tasks = [iq[first : first + some] for first in range(done, len(iq), some)]
     shared = (len(iq) - done) * each_s > ALONE_S
-    for run in in_order(work, tasks, None if shared else 1):
-        runs.append(run)
-        done += len(run.reason)
-        on_record(done)
+    for workers in (None, 1) if shared else (1,):  # what workers leave undone is done here
+        tasks = [iq[first : first + some] for first in range(done, len(iq), some)]
+        try:
+            for run in in_order(work, tasks, workers):
+                runs.append(run)
+                done += len(run.reason)
+                on_record(done)
+        except NO_WORKERS:
+            if workers == 1:
+                raise
     return Measurements.joined(runs)

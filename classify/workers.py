@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from multiprocessing import active_children, get_context, parent_process, resource_tracker
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from bladewing.features.one_thread import one_thread
 
@@ -44,7 +45,7 @@ def in_order(work: Callable[[Task], Done], tasks: Sequence[Task], workers: int |
         waiting: list[Future[Done]] = []
         try:
             for task in tasks:
-                with _deaf_children():
+                with _deaf_children(), _without_main():
                     waiting.append(pool.submit(work, task))
                 if len(waiting) >= 3 * workers:
                     yield waiting.pop(0).result()
@@ -72,6 +73,23 @@ def _deaf_children() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """Processes started within do not run the caller's script again: their work needs nothing of it.
+
+    They would, to find what is pickled by a name in it, and all that no guard keeps from it with it.
+    """
+    names = vars(sys.modules["__main__"])
+    kept: dict[str, Any] = {name: names[name] for name in ("__spec__", "__file__") if name in names}
+    names["__spec__"], names["__file__"] = None, None
+    try:
+        yield
+    finally:
+        for name in ("__spec__", "__file__"):
+            names.pop(name)
+        names.update(kept)
 
 
 def _begin() -> None:

@@ -1,4 +1,6 @@
 import operator
+import subprocess
+import sys
 import time
 from multiprocessing import get_context
 
@@ -26,3 +28,17 @@ def test_a_worker_of_the_caller_s_own_outlives_tasks_that_are_given_up():
     finally:
         own.terminate()
         own.join()
+
+
+UNGUARDED = """
+from bladewing.classify.workers import in_order
+
+print(list(in_order(abs, [-1, -2, -3], workers=2)), __file__[-9:], __spec__)
+"""
+
+
+def test_workers_do_not_run_a_script_again_that_has_no_guard(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(UNGUARDED)
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=120)
+    assert (done.stdout, done.stderr, done.returncode) == ("[1, 2, 3] script.py None\n", "", 0)
