@@ -68,3 +68,6 @@ DEFAULT_MODEL = "spectrum-cnn-wide"
 
 KIND_SCORES = "kind_scores"
 """What a network that knows kinds calls their raw scores, beside those of the classes."""
+
+WEIGHT_STEPS = 127
+"""Steps of a network's weights that are stored in a byte each, to either side of 0."""

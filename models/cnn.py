@@ -1,8 +1,9 @@
 """Two small convolutional networks, each reading a signal, most often beside other evidence.
 
-Both have the same anatomy: strided convolutions over the signal, their mean and their maximum along the axes (how much
-there is of a pattern, and whether it is there at all), a small branch over each other input (a cadence, a vector of
-measurements), and a common head.
+Both have the same anatomy: strided convolutions over the signal, a small branch over each other input (a cadence, a
+vector of measurements), and a common head. Half-way the convolutions are told where on the velocity axis they look, and
+by the evidence what for: an offset of each place, a gain and an offset of each map. What they end with is seen by its
+mean in bands of speed (how much there is of a pattern, and how far from rest) and its maximum (whether it is there).
 The inputs are standardised inside, by buffers that `EvidenceNet.standardise_by` fills: the exported model eats raw
 inputs.
 A network may learn kinds, of which each belongs to a class, and tell the classes: what sets a rotor's comb apart from a
@@ -17,10 +18,12 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
+from . import WEIGHT_STEPS
 from ._checks import CLASS_COUNT, require_finite
 
 _BRANCH = 64
 _RATES = (16, 24, 32)  # channels of the convolutions over a spectrum of rates
+_SPEED_BANDS = 4  # of a trunk's places, both signs of the velocity alike
 _HEAD = 128  # 48 were the narrowest place of all (docs/ablation.md)
 _CLIP = 8.0  # standard deviations; beyond them an input says no more than "very much"
 _CHUNK = 1024
@@ -74,6 +77,7 @@ class _Convolution(nn.Sequential):
     """Convolution, batch normalisation, rectifier."""
 
     def __init__(self, inputs: int, outputs: int, kernel: tuple[int, int], stride: tuple[int, int]) -> None:
+        self.outputs = outputs
         padding = (kernel[0] // 2, kernel[1] // 2)
         super().__init__(
             nn.Conv2d(inputs, outputs, kernel, stride, padding, bias=False), nn.BatchNorm2d(outputs), nn.ReLU()
@@ -111,6 +115,14 @@ def _branch(shape: tuple[int, ...]) -> nn.Sequential:
     return nn.Sequential(nn.Unflatten(1, (shape[0], 1)), *convolutions, nn.Flatten(), dense, nn.ReLU())
 
 
+def _speed_bands(places: int) -> Tensor:
+    """What makes of values along an axis of velocity their means in bands of speed, shape (places, bands)."""
+    away = torch.arange(places) - (places - 1) / 2
+    bands = min(_SPEED_BANDS, (places + 1) // 2)
+    own = nn.functional.one_hot((away.abs() / (places / 2) * bands).long(), bands).float()
+    return own / own.sum(0)
+
+
 CLASSES_ALONE = tuple(range(CLASS_COUNT))
 """The kinds of a network that knows none but the classes."""
 
@@ -123,16 +135,21 @@ class EvidenceNet(nn.Module):
     shapes
         The inputs, name to shape of one record: the signal (C, ...) first, then the evidence, if any: a spectrum of
         rates (C, B), measurements (F,).
-    trunk
-        From (n, C, H, W) to (n, width, h, w).
-    width
-        Channels that the trunk ends with.
+    stem, trunk
+        Layers over the signal (n, C, H, W), before and after they are told where they look and what for; velocity lies
+        along W of a signal of one axis (H is 1), along H of an image.
     kinds
         Class of each kind that the network tells apart inside, 0 to 2, rising.
     """
 
+    bands: Tensor
+
     def __init__(
-        self, shapes: Mapping[str, tuple[int, ...]], trunk: nn.Module, width: int, kinds: Sequence[int] = CLASSES_ALONE
+        self,
+        shapes: Mapping[str, tuple[int, ...]],
+        stem: nn.Sequential,
+        trunk: nn.Sequential,
+        kinds: Sequence[int] = CLASSES_ALONE,
     ) -> None:
         super().__init__()
         self.input_shapes, self.kinds = dict(shapes), tuple(kinds)
@@ -143,9 +160,24 @@ class EvidenceNet(nn.Module):
             {name: Standardise(shape[0], len(shape) - 1) for name, shape in self.input_shapes.items()}
         )
         self.flat = len(signal) == 2  # one axis: a height of 1 is put in, since 2-D convolutions run faster than 1-D
-        self.trunk = trunk
+        self.stem, self.trunk = stem, trunk
         self.branches = nn.ModuleList(_branch(shape) for shape in evidence)
-        seen = 2 * width + _BRANCH * len(evidence)
+        widths, places = [], [signal[1]]
+        for layers in (stem, trunk):
+            strided = [layer for layer in layers if isinstance(layer, _Convolution)]
+            widths.append(strided[-1].outputs)
+            places.append(-(-places[-1] // 2 ** len(strided)))  # each stride halves, rounding up
+        along = (1, places[1]) if self.flat else (places[1], 1)
+        self.place = nn.Parameter(torch.zeros(widths[0] * places[1]))
+        self.along = (1, widths[0], *along)
+        told = _BRANCH * len(evidence)
+        self.told = nn.Linear(told, 2 * widths[0]) if told else None
+        if self.told is not None:  # at first the maps are as they are
+            nn.init.zeros_(self.told.weight)
+            with torch.no_grad():
+                self.told.bias.copy_(torch.arange(2).eq(0).float().repeat_interleave(widths[0]))
+        self.register_buffer("bands", _speed_bands(places[2]))
+        seen = (self.bands.shape[1] + 1) * widths[1] + told
         # no dropout: with drawn records by the hundred thousand nothing is learned by heart, and it costs accuracy
         self.head = nn.Sequential(nn.Linear(seen, _HEAD), nn.ReLU(), nn.Linear(_HEAD, len(self.kinds)))
 
@@ -200,9 +232,9 @@ class EvidenceNet(nn.Module):
         return counts.pop()
 
     def compact(self) -> None:
-        """Fold each normalisation into its convolution and round the weights to half precision, for good.
+        """Fold each normalisation into its convolution and round the weights, for good: see `rounded`.
 
-        What is left computes in float32 as before and is stored in half the bytes without a further change. Call it
+        What is left computes in float32 as before and is stored in a byte a weight without a further change. Call it
         after training and before calibration, so that every figure is that of the network which is stored.
         """
         self.eval()
@@ -215,7 +247,7 @@ class EvidenceNet(nn.Module):
                             part[place] = fuse_conv_bn_eval(convolution, normalisation)
                             part[place + 1] = nn.Identity()
             for weights in self.parameters():
-                weights.copy_(weights.half().float())
+                weights.copy_(rounded(weights))
 
     def forward(self, signal: Tensor, *evidence: Tensor) -> Tensor:
         """Return the scores of the classes.
@@ -246,18 +278,45 @@ class EvidenceNet(nn.Module):
         """Return the scores of the kinds, shape (n, kinds); the inputs as in `forward`."""
         signal_name, *names = self.input_shapes
         planes = self.standardise[signal_name](signal)
-        maps = self.trunk(planes.unsqueeze(2) if self.flat else planes)
-        seen = [maps.mean((2, 3)), maps.amax((2, 3))]
-        for name, branch, values in zip(names, self.branches, evidence, strict=True):
-            seen.append(branch(self.standardise[name](values)))
-        return self.head(torch.cat(seen, dim=1))
+        beside = [
+            branch(self.standardise[name](values))
+            for name, branch, values in zip(names, self.branches, evidence, strict=True)
+        ]
+        maps = self.stem(planes.unsqueeze(2) if self.flat else planes) + self.place.view(self.along)
+        if self.told is not None:
+            gain, shift = self.told(torch.cat(beside, dim=1)).unflatten(1, (2, -1, 1, 1)).unbind(1)
+            maps = maps * gain + shift
+        maps = self.trunk(maps)
+        along = maps.squeeze(2) if self.flat else maps.mean(3)
+        return self.head(torch.cat([(along @ self.bands).flatten(1), maps.amax((2, 3)), *beside], dim=1))
+
+
+def rounded(weights: Tensor) -> Tensor:
+    """Round a layer's weights to what takes a byte each, its offsets to half precision.
+
+    Parameters
+    ----------
+    weights
+        Finite, outputs first; of one dimension, offsets.
+
+    Returns
+    -------
+    Tensor
+        As many: of each output whole multiples, of at most `WEIGHT_STEPS`, of a step that half precision holds.
+    """
+    if weights.ndim == 1:
+        return weights.half().float()
+    rows = weights.reshape(len(weights), -1)
+    step = (rows.abs().amax(1, keepdim=True) / WEIGHT_STEPS).half().float()
+    whole = (rows / torch.where(step > 0, step, torch.ones(()))).round().clamp(-WEIGHT_STEPS, WEIGHT_STEPS)
+    return (whole * step).reshape(weights.shape)
 
 
 class SpectrumNet(EvidenceNet):
     """1-D network over the velocity spectrum, alone or beside other evidence.
 
-    About 126 000 parameters and 1.1 million multiplications a record of 10 x 256 beside rates of 2 x 96 and 1 x 64 and
-    measurements; twice as wide, 230 000 and 3.4 million.
+    About 159 000 parameters and 1.1 million multiplications a record of 10 x 256 beside rates of 2 x 96 and 1 x 64 and
+    measurements; twice as wide, 295 000 and 3.5 million.
 
     Parameters
     ----------
@@ -283,21 +342,21 @@ class SpectrumNet(EvidenceNet):
         first, second, third, last = (round(widen * channels) for channels in (16, 24, 32, 48))
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
-            trunk = nn.Sequential(
+            stem = nn.Sequential(
                 _Convolution(next(iter(shapes.values()))[0], first, (1, 7), (1, 2)),
                 _Convolution(first, second, (1, 5), (1, 2)),
                 _Convolution(second, third, (1, 5), (1, 2)),
-                _Residual(third, (1, 5)),
-                _Convolution(third, last, (1, 5), (1, 2)),
-                _Residual(last, (1, 5)),
             )
-            super().__init__(shapes, trunk, last, kinds)
+            trunk = nn.Sequential(
+                _Residual(third, (1, 5)), _Convolution(third, last, (1, 5), (1, 2)), _Residual(last, (1, 5))
+            )
+            super().__init__(shapes, stem, trunk, kinds)
 
 
 class ImageNet(EvidenceNet):
     """2-D network over a joint image, alone or beside other evidence.
 
-    About 55 000 parameters and 1.1 million multiplications a record of 1 x 64 x 32 beside measurements.
+    About 65 000 parameters and 1.1 million multiplications a record of 1 x 64 x 32 beside measurements.
 
     Parameters
     ----------
@@ -315,12 +374,13 @@ class ImageNet(EvidenceNet):
     ) -> None:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
+            stem = nn.Sequential(
+                _Convolution(next(iter(shapes.values()))[0], 8, (5, 5), (2, 2)), _Convolution(8, 16, (3, 3), (2, 2))
+            )
             trunk = nn.Sequential(
-                _Convolution(next(iter(shapes.values()))[0], 8, (5, 5), (2, 2)),
-                _Convolution(8, 16, (3, 3), (2, 2)),
                 _Residual(16, (3, 3)),
                 _Convolution(16, 32, (3, 3), (2, 2)),
                 _Residual(32, (3, 3)),
                 _Convolution(32, 48, (3, 3), (2, 2)),
             )
-            super().__init__(shapes, trunk, 48, kinds)
+            super().__init__(shapes, stem, trunk, kinds)

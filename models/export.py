@@ -18,7 +18,7 @@ import onnx
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
-from . import KIND_SCORES
+from . import KIND_SCORES, WEIGHT_STEPS
 from ._checks import CLASS_COUNT
 from .calibration import Calibration
 from .seal import PLACEHOLDER, SEAL_KEY
@@ -41,7 +41,7 @@ TABULAR_TOLERANCE = 1e-5
 """Largest difference of a probability that an exported tabular model may show."""
 
 _CHECK_BATCH = 1024
-_LEAST_HALVED = 512  # values; a smaller tensor saves less than its extra node costs
+_LEAST_ROUNDED = 512  # values; a smaller tensor saves less than its extra nodes cost
 
 
 def export_network(net: "EvidenceNet", input_shapes: Mapping[str, tuple[int, ...]], calibration: Calibration) -> bytes:
@@ -101,7 +101,7 @@ def export_network(net: "EvidenceNet", input_shapes: Mapping[str, tuple[int, ...
         )
     assert program is not None
     model = program.model_proto  # made anew at each asking
-    _store_in_half(model.graph)
+    _store_rounded(model.graph)
     return _finish(model, net.input_shapes, calibration, len(net.kinds) if told else 0)
 
 
@@ -198,12 +198,7 @@ def in_eight_bits(onnx_bytes: bytes) -> bytes:
 
     model = onnx.load_model_from_string(onnx_bytes)
     graph = model.graph
-    halved = {one.name: one for one in graph.initializer if one.data_type == TensorProto.FLOAT16}
-    for node in [node for node in graph.node if node.op_type == "Cast" and node.input[0] in halved]:
-        whole = numpy_helper.to_array(halved[node.input[0]]).astype(np.float32)
-        graph.initializer.append(numpy_helper.from_array(whole, node.output[0]))
-        graph.initializer.remove(halved[node.input[0]])
-        graph.node.remove(node)
+    _widen(graph)
     metadata = {entry.key: entry.value for entry in model.metadata_props}
     level = logging.root.level
     logging.root.setLevel(logging.ERROR)  # its advice to optimise first is not for here
@@ -327,16 +322,50 @@ def _quiet_converters() -> Iterator[None]:
         logger.setLevel(level)
 
 
-def _store_in_half(graph: onnx.GraphProto) -> None:
-    """Store the weights that half precision holds exactly in half the bytes; runtimes widen them as they load."""
+def _store_rounded(graph: onnx.GraphProto) -> None:
+    """Store weights that `cnn.rounded` left exact in a byte each, offsets in two; runtimes widen them as they load."""
     for weights in list(graph.initializer):
         values = numpy_helper.to_array(weights)
-        half = values.astype(np.float16)
-        if weights.data_type == TensorProto.FLOAT and values.size >= _LEAST_HALVED and np.array_equal(half, values):
-            graph.initializer.remove(weights)
-            graph.initializer.append(numpy_helper.from_array(half, f"{weights.name}_half"))
-            cast = helper.make_node("Cast", [f"{weights.name}_half"], [weights.name], to=TensorProto.FLOAT)
-            graph.node.insert(0, cast)
+        if weights.data_type != TensorProto.FLOAT or values.size < _LEAST_ROUNDED:
+            continue
+        name, half = weights.name, values.astype(np.float16)
+        in_bytes, in_half, steps_of, whole = (f"{name}_{part}" for part in ("bytes", "half", "steps", "whole"))
+        largest = np.abs(values).max(axis=tuple(range(1, values.ndim)), keepdims=True)
+        steps = np.where(largest > 0, largest / np.float32(WEIGHT_STEPS), np.float32(1))
+        codes = np.rint(values / steps)
+        if np.array_equal(codes * steps, values):
+            graph.initializer.extend(
+                [
+                    numpy_helper.from_array(codes.astype(np.int8), in_bytes),
+                    numpy_helper.from_array(steps, steps_of),
+                ]
+            )
+            nodes = [
+                helper.make_node("Cast", [in_bytes], [whole], to=TensorProto.FLOAT),
+                helper.make_node("Mul", [whole, steps_of], [name]),
+            ]
+        elif np.array_equal(half, values):
+            graph.initializer.append(numpy_helper.from_array(half, in_half))
+            nodes = [helper.make_node("Cast", [in_half], [name], to=TensorProto.FLOAT)]
+        else:
+            continue
+        graph.initializer.remove(weights)
+        for node in reversed(nodes):
+            graph.node.insert(0, node)
+
+
+def _widen(graph: onnx.GraphProto) -> None:
+    """Undo `_store_rounded`: weights of four bytes each."""
+    stored = {one.name: one for one in graph.initializer}
+    for node in list(graph.node):
+        if node.op_type in ("Cast", "Mul") and all(name in stored for name in node.input):
+            parts = [numpy_helper.to_array(stored[name]).astype(np.float32) for name in node.input]
+            whole = numpy_helper.from_array(np.prod(np.broadcast_arrays(*parts), axis=0), node.output[0])
+            for name in node.input:
+                graph.initializer.remove(stored.pop(name))
+            graph.initializer.append(whole)
+            stored[node.output[0]] = graph.initializer[-1]
+            graph.node.remove(node)
 
 
 def _rename(graph: onnx.GraphProto, old: str, new: str) -> None:

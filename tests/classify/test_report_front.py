@@ -158,11 +158,20 @@ def test_operations_of_a_convolution_and_of_trees() -> None:
     node = helper.make_node("Conv", ["x", "w"], ["y"], strides=[2, 2], pads=[1, 1, 1, 1])
     # 5 maps of 4 x 3 places, each 2 x 3 x 3 multiplications and as many additions
     assert network_operations(model(node, weights=[kernel], shape=(2, 8, 6), out=(5, 4, 3))) == 2 * 5 * 4 * 3 * 2 * 9
-    # weights stored in half count no less
+    # weights stored in half, or in bytes and steps, count no less
     half = numpy_helper.from_array(np.zeros((5, 2, 3, 3), np.float16), "half")
     cast = helper.make_node("Cast", ["half"], ["w"], to=TensorProto.FLOAT)
     stored = model(cast, node, weights=[half], shape=(2, 8, 6), out=(5, 4, 3))
     assert network_operations(stored) == 2 * 5 * 4 * 3 * 2 * 9
+    parts = [("bytes", np.zeros((5, 2, 3, 3), np.int8)), ("steps", np.zeros((5, 1, 1, 1), np.float32))]
+    widened = [
+        helper.make_node("Cast", ["bytes"], ["whole"], to=TensorProto.FLOAT),
+        helper.make_node("Mul", ["whole", "steps"], ["w"]),
+    ]
+    kept = [numpy_helper.from_array(values, name) for name, values in parts]
+    assert (
+        network_operations(model(*widened, node, weights=kept, shape=(2, 8, 6), out=(5, 4, 3))) == 2 * 5 * 4 * 3 * 2 * 9
+    )
     # one tree, left leaf after one comparison, two right ones after two: 5 / 3 in the mean, and one addition
     tree = helper.make_node(
         "TreeEnsembleRegressor",

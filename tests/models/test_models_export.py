@@ -9,7 +9,7 @@ import onnxruntime
 import pytest
 import torch
 from bladewing.models.calibration import Calibration
-from bladewing.models.cnn import ImageNet, SpectrumNet
+from bladewing.models.cnn import ImageNet, SpectrumNet, rounded
 from bladewing.models.export import (
     NETWORK_TOLERANCE,
     TABULAR_TOLERANCE,
@@ -149,7 +149,52 @@ def test_a_full_ensemble_stays_under_300_kb_and_a_network_under_200():
         ImageNet({"image": (1, 64, 32), "joint_features": (60,)}, seed=0),
     )
     for net in nets:
-        assert sum(p.numel() for p in net.parameters()) * 2 < 200_000  # stored in half precision
+        net.compact()
+        assert len(export_network(net, net.input_shapes, CALIBRATION)) < 200_000
+
+
+def test_rounded_weights_are_stored_in_a_byte_each_and_mean_the_same():
+    shapes = SHAPES | {"spectrum": (3, 256)}
+    net = SpectrumNet(shapes, seed=0)
+    inputs = {
+        name: np.random.default_rng(1).normal(size=(40, *shape)).astype(np.float32) for name, shape in shapes.items()
+    }
+    with torch.no_grad():
+        net.head[0].weight[3] = 0  # an output without any weight
+        net.place.normal_()
+    net.standardise_by(inputs)
+    before = network_scores(net, inputs)
+    net.compact()
+    scores = network_scores(net, inputs)
+    assert 0 < np.abs(scores - before).max() < 0.02 * np.ptp(before)
+    onnx_bytes = export_network(net, shapes, CALIBRATION)
+    check_export(onnx_bytes, CALIBRATION.probabilities(scores), inputs, 1e-6)
+    kept = onnx.load_model_from_string(onnx_bytes).graph.initializer
+    large = {one.data_type: np.prod(one.dims) for one in kept if np.prod(one.dims) >= 512}
+    assert set(large) == {onnx.TensorProto.INT8, onnx.TensorProto.FLOAT16}  # weights, and the offsets of places
+    weights = sum(values.numel() for values in net.parameters() if values.ndim > 1)
+    assert sum(np.prod(one.dims) for one in kept if one.data_type == onnx.TensorProto.INT8) > 0.95 * weights
+    again = export_network(net, shapes, CALIBRATION)
+    assert again == onnx_bytes
+    net.compact()  # what is rounded stays as it is
+    assert export_network(net, shapes, CALIBRATION) == onnx_bytes
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e4])
+def test_a_weight_is_rounded_by_half_a_step_of_its_own_output_at_most(size):
+    weights = (
+        torch.randn(6, 4, 1, 5, generator=torch.Generator().manual_seed(2))
+        * torch.logspace(-3, 0, 6)[:, None, None, None]
+    )
+    weights *= size
+    found = rounded(weights)
+    largest = weights.abs().amax((1, 2, 3))
+    off = (found - weights).abs().amax((1, 2, 3))
+    assert (
+        off <= largest * (0.5 + 127 / 2048) / 127 + 127 * 2.0**-25
+    ).all()  # half a step, and what the step is off by
+    assert (found.abs().amax((1, 2, 3)) / largest - 1).abs().max() < (0.001 if size > 1e-3 else 2)
+    torch.testing.assert_close(rounded(found), found, rtol=0, atol=0)
 
 
 def test_wrong_shapes_are_refused():

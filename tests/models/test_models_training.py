@@ -6,7 +6,7 @@ import torch
 from bladewing.models import training
 from bladewing.models.augment import VelocityMirror
 from bladewing.models.calibration import softmax
-from bladewing.models.cnn import ImageNet, SpectrumNet, Standardise
+from bladewing.models.cnn import ImageNet, SpectrumNet, Standardise, _speed_bands
 from bladewing.models.tabular import tabular_scores, train_boosted, train_linear
 from bladewing.models.training import Course, Lessons, network_scores, train_network
 from bladewing.models.training_state import ForeignSnapshot
@@ -92,6 +92,42 @@ def test_a_net_learns_what_its_measurements_tell():
     net = SpectrumNet(SHAPES, seed=0)
     train_network(net, Lessons(inputs, y), (inputs, y), Course(4, batch=64), seed=0)
     assert (network_scores(net, inputs).argmax(axis=1) == y).mean() > 0.9
+
+
+def test_a_net_learns_how_far_from_rest_a_line_is():
+    rng, rest = np.random.default_rng(0), 512  # no end of the axis is within reach of the convolutions
+    y = rng.integers(0, 3, 900)
+    away = rest * (np.array([0.2, 0.45, 0.7])[y] + rng.uniform(-0.1, 0.1, 900))
+    spectrum = rng.normal(size=(900, 2, 2 * rest))
+    spectrum[np.arange(900), :, (rest + rng.choice([-1, 1], 900) * away).astype(int)] += 12
+    parts = [{"spectrum": spectrum[rows].astype(np.float32)} for rows in (slice(0, 600), slice(600, 900))]
+    net = SpectrumNet({"spectrum": (2, 2 * rest)}, seed=0)
+    train_network(net, Lessons(parts[0], y[:600]), (parts[1], y[600:]), Course(6, batch=64), seed=0)
+    assert (network_scores(net, parts[1]).argmax(axis=1) == y[600:]).mean() > 0.9
+
+
+def test_evidence_tells_the_maps_nothing_at_first_and_something_once_trained():
+    net, (inputs, _) = SpectrumNet(SHAPES, seed=0), _spectra(50, 3)
+    gain, shift = net.told.bias.reshape(2, -1)
+    assert (gain == 1).all()
+    assert not shift.any()
+    assert not net.told.weight.any()
+    net = _trained()[0]
+    before = network_scores(net, inputs)
+    with torch.no_grad():
+        net.told.weight.zero_()
+    assert np.abs(network_scores(net, inputs) - before).max() > 1e-3
+
+
+@pytest.mark.parametrize("places", range(1, 20))
+def test_bands_of_speed_are_alike_on_both_sides_of_rest(places):
+    bands = _speed_bands(places)
+    torch.testing.assert_close(bands, bands.flip(0))
+    torch.testing.assert_close(bands.sum(0), torch.ones(bands.shape[1]))
+    assert ((bands > 0).sum(1) == 1).all()
+    away = (torch.arange(places) - (places - 1) / 2).abs()
+    own = bands.argmax(1)[away.argsort(stable=True)]
+    assert (own.diff() >= 0).all()
 
 
 KINDS = (0, 0, 0, 1, 2, 2)
