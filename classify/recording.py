@@ -254,8 +254,8 @@ def find_recording(path: str | os.PathLike[str]) -> Path:
     if given.suffix.lower() not in ARRAY_SUFFIXES:
         raise BadInput(
             f"{path}: not a kind of recording known here: give SigMF, {', '.join(ARRAY_SUFFIXES)} (I and Q by turns: "
-            'x = np.fromfile(path, "<i2") of int16, "<f4" of float32, np.loadtxt(path, delimiter=",").ravel() of CSV; '
-            'np.save("cell.npy", x[::2] + 1j * x[1::2]))'
+            'x = np.fromfile(path, "<i2") of int16, "<f4" of float32, np.loadtxt(path, delimiter=",").ravel() of CSV, '
+            'scipy.io.wavfile.read(path)[1].ravel() of WAV; np.save("cell.npy", x[::2] + 1j * x[1::2]))'
         )
     return given
 

@@ -49,6 +49,10 @@ FURTHEST_TIP = 2.0
 #: tips of three blades make every second line five times stronger.
 UNLIKE_FACTOR = 7.0
 
+#: So many times the score of a second comb that of one about another strong line must exceed to be another body's: of
+#: drones in one cell it is 1.7 times and more, about a strong line of a tail itself 0.98 at most.
+FOREIGN_SHARE = 1.2
+
 #: Candidates looked at closely.
 CLOSER = 4
 
@@ -145,6 +149,8 @@ def _second_comb(data: Periodogram, comb: Comb, furthest: float) -> tuple[Gear |
     best = _loudest(rest, evidence, comb, limits, furthest)
     if best is None or best.score < THRESHOLD:
         return None, f"no second comb: evidence {best.score if best else 0.0:.1f} nats, {THRESHOLD:.0f} are needed"
+    if _foreign(rest, evidence, comb, limits, furthest) > FOREIGN_SHARE * best.score:
+        return None, "no second comb: the lines left over are as much those of another body"
     rival = _rival(rest, evidence, hidden, best)
     if rival > 0:
         return None, f"no second comb: the lines left over repeat every {rival * data.prf_hz:.1f} Hz as well"
@@ -236,8 +242,23 @@ def _loudest(
             _geometric(chopping * low, min(chopping * high, limits[1]), rest.pulses),
         ]
     )
-    if not len(spacings):
-        return None
+    return _loudest_of(spacings, rest, evidence, centre, furthest) if len(spacings) else None
+
+
+def _foreign(rest: Periodogram, evidence: Evidence, first: Comb, limits: tuple[float, float], furthest: float) -> float:
+    """What speaks for a comb of any spacing about a strong line that is none of the first comb's [nats]."""
+    fit, spacings, most = first.fit, _geometric(*limits, rest.pulses), 0.0
+    for centre in rest.strong.centres if len(spacings) else ():
+        off = (centre - fit.centre) / fit.spacing
+        if abs(off - round(off)) * fit.spacing * rest.pulses > SHADOW_BINS:
+            most = max(most, _loudest_of(spacings, rest, evidence, float(centre), furthest).score)
+    return most
+
+
+def _loudest_of(
+    spacings: NDArray[np.float64], rest: Periodogram, evidence: Evidence, centre: float, furthest: float
+) -> Candidate:
+    """The comb about a centre, of spacings that rise or of those near them, that speaks loudest."""
     loudest = spacings[np.argsort(_even_heights(evidence, spacings, centre, furthest))[: -CLOSER - 1 : -1]]
     return _closest(rest, evidence, loudest, centre)
 

@@ -54,6 +54,17 @@ def test_a_tail_is_no_further_rotor_at_a_fraction_of_its_rate(gear):
         assert found.chopping_hz == found.main_chopping_hz
 
 
+@pytest.mark.parametrize("seed", [7, 29, 36, 38])
+def test_two_drones_in_one_cell_are_no_helicopter(seed):
+    """Of the lines of either some repeat at a gear ratio about the other's body; about its own all do."""
+    rng = np.random.default_rng(seed)
+    one = rotors((rng.uniform(40, 60),), velocity_mps=rng.uniform(-15, 15), body=5.0)
+    other = rotors((rng.uniform(80, 150),), velocity_mps=rng.uniform(-15, 15), body=5.0, length_m=0.1)
+    found = measure((one + other) * 10 ** (15 / 20) + white(rng, PULSES), **RADAR)
+    assert np.isnan(found.gear_ratio)
+    assert "another body" in str(found.gear_reason)
+
+
 def test_the_body_is_in_the_middle_of_its_rotors_lines_though_one_of_them_is_stronger():
     """Blades seen at a long wavelength: the outermost lines are the strongest."""
     fields = AIRFRAMES["helicopter_41cm"].fields
