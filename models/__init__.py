@@ -57,7 +57,7 @@ LADDER: dict[str, Rung] = {
     "features-boosted": Rung("boosted", ("features",)),
     "spectrum-cnn-fast": Rung("network", ("levels", "cadence", "combs"), teacher="spectrum-cnn-wide"),
     "spectrum-cnn": Rung("network", ("spectrum", "cadence", "combs", "features"), teacher="spectrum-cnn-wide"),
-    "spectrum-cnn-wide": Rung("network", ("spectrum", "cadence", "combs", "features"), widen=2),
+    "spectrum-cnn-wide": Rung("network", ("spectrum", "cadence", "combs", "features"), widen=3),
     "joint-boosted": Rung("boosted", ("joint_features",)),
     "image-cnn": Rung("network", ("image", "joint_features"), teacher="spectrum-cnn-wide"),
 }

@@ -316,7 +316,7 @@ class SpectrumNet(EvidenceNet):
     """1-D network over the velocity spectrum, alone or beside other evidence.
 
     About 159 000 parameters and 1.1 million multiplications a record of 10 x 256 beside rates of 2 x 96 and 1 x 64 and
-    measurements; twice as wide, 295 000 and 3.5 million.
+    measurements; three times as wide, 491 000 and 7.3 million.
 
     Parameters
     ----------
@@ -326,7 +326,7 @@ class SpectrumNet(EvidenceNet):
     seed
         Draws the first weights; the global generator of torch is left as it was.
     widen
-        Factor on the channels of the spectrum's layers, 0.5, 1 or 2.
+        Factor on the channels of the spectrum's layers, 0.5, 1, 2 or 3.
     kinds
         As in `EvidenceNet`.
     """
