@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor
 from functools import partial
 from typing import Any
 
@@ -13,8 +12,9 @@ from numpy.typing import NDArray
 
 from .workers import in_order
 
-#: What tells that workers cannot be had, where processes, memory or semaphores are short, or were lost.
-NO_WORKERS = (OSError, RuntimeError, AssertionError, BrokenExecutor)
+#: What tells that workers cannot be had, where processes, memory or semaphores are short, or were lost (which breaks a
+#: pool, a RuntimeError).
+NO_WORKERS = (OSError, RuntimeError, AssertionError)
 
 #: So long dwells are measured in this process; if what is left would take it as long again, which is what workers need
 #: to begin, they share it, in tasks of about so long [s].

@@ -10,7 +10,7 @@ A network may learn kinds, of which each belongs to a class, and tell the classe
 turbine's and from a wheel's is more than three words can teach.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import torch
@@ -77,11 +77,11 @@ class _Convolution(nn.Sequential):
     """Convolution, batch normalisation, rectifier."""
 
     def __init__(self, inputs: int, outputs: int, kernel: tuple[int, int], stride: tuple[int, int]) -> None:
-        self.outputs = outputs
         padding = (kernel[0] // 2, kernel[1] // 2)
         super().__init__(
             nn.Conv2d(inputs, outputs, kernel, stride, padding, bias=False), nn.BatchNorm2d(outputs), nn.ReLU()
         )
+        self.outputs = outputs
 
 
 class _Residual(nn.Module):
@@ -99,6 +99,12 @@ class _Residual(nn.Module):
         return torch.relu(values + self.change(values))
 
 
+def _left_by(layers: Iterable[nn.Module], places: int) -> tuple[int, int]:
+    """Maps that layers end with, and the places of so many along an axis: each stride halves, rounding up."""
+    strided = [layer for layer in layers if isinstance(layer, _Convolution)]
+    return strided[-1].outputs, -(-places // 2 ** len(strided))
+
+
 def _branch(shape: tuple[int, ...]) -> nn.Sequential:
     """From evidence to `_BRANCH` numbers: dense over measurements (F,), convolutions over a spectrum of rates (C, B).
 
@@ -110,8 +116,8 @@ def _branch(shape: tuple[int, ...]) -> nn.Sequential:
         _Convolution(inputs, outputs, (1, kernel), (1, 2))
         for inputs, outputs, kernel in zip((shape[0], *_RATES[:-1]), _RATES, (7, 5, 5), strict=True)
     ]
-    left = -(-shape[1] // 2 ** len(convolutions))  # each stride halves, rounding up
-    dense = nn.Linear(_RATES[-1] * left, _BRANCH)
+    maps, left = _left_by(convolutions, shape[1])
+    dense = nn.Linear(maps * left, _BRANCH)
     return nn.Sequential(nn.Unflatten(1, (shape[0], 1)), *convolutions, nn.Flatten(), dense, nn.ReLU())
 
 
@@ -162,22 +168,18 @@ class EvidenceNet(nn.Module):
         self.flat = len(signal) == 2  # one axis: a height of 1 is put in, since 2-D convolutions run faster than 1-D
         self.stem, self.trunk = stem, trunk
         self.branches = nn.ModuleList(_branch(shape) for shape in evidence)
-        widths, places = [], [signal[1]]
-        for layers in (stem, trunk):
-            strided = [layer for layer in layers if isinstance(layer, _Convolution)]
-            widths.append(strided[-1].outputs)
-            places.append(-(-places[-1] // 2 ** len(strided)))  # each stride halves, rounding up
-        along = (1, places[1]) if self.flat else (places[1], 1)
-        self.place = nn.Parameter(torch.zeros(widths[0] * places[1]))
-        self.along = (1, widths[0], *along)
+        maps, places = _left_by(stem, signal[1])
+        self.place = nn.Parameter(torch.zeros(maps * places))  # of one dimension, as all that is an offset
+        self.along = (1, maps, 1, places) if self.flat else (1, maps, places, 1)
         told = _BRANCH * len(evidence)
-        self.told = nn.Linear(told, 2 * widths[0]) if told else None
+        self.told = nn.Linear(told, 2 * maps) if told else None
         if self.told is not None:  # at first the maps are as they are
             nn.init.zeros_(self.told.weight)
-            with torch.no_grad():
-                self.told.bias.copy_(torch.arange(2).eq(0).float().repeat_interleave(widths[0]))
-        self.register_buffer("bands", _speed_bands(places[2]))
-        seen = (self.bands.shape[1] + 1) * widths[1] + told
+            nn.init.ones_(self.told.bias[:maps])
+            nn.init.zeros_(self.told.bias[maps:])
+        width, left = _left_by(trunk, places)
+        self.register_buffer("bands", _speed_bands(left))
+        seen = (self.bands.shape[1] + 1) * width + told
         # no dropout: with drawn records by the hundred thousand nothing is learned by heart, and it costs accuracy
         self.head = nn.Sequential(nn.Linear(seen, _HEAD), nn.ReLU(), nn.Linear(_HEAD, len(self.kinds)))
 

@@ -6,6 +6,7 @@ The calibration is three nodes at the end: Mul, Add, Softmax.
 """
 
 import logging
+import math
 import tempfile
 import warnings
 from collections.abc import Iterator, Mapping
@@ -360,7 +361,7 @@ def _widen(graph: onnx.GraphProto) -> None:
     for node in list(graph.node):
         if node.op_type in ("Cast", "Mul") and all(name in stored for name in node.input):
             parts = [numpy_helper.to_array(stored[name]).astype(np.float32) for name in node.input]
-            whole = numpy_helper.from_array(np.prod(np.broadcast_arrays(*parts), axis=0), node.output[0])
+            whole = numpy_helper.from_array(math.prod(parts[1:], start=parts[0]), node.output[0])
             for name in node.input:
                 graph.initializer.remove(stored.pop(name))
             graph.initializer.append(whole)

@@ -50,7 +50,7 @@ FURTHEST_TIP = 2.0
 UNLIKE_FACTOR = 7.0
 
 #: So many times the score of a second comb that of one about another strong line must exceed to be another body's: of
-#: drones in one cell it is 1.7 times and more, about a strong line of a tail itself 0.98 at most.
+#: most drones in one cell it is 1.7 times and more, about a strong line of a tail itself 0.98 at most.
 FOREIGN_SHARE = 1.2
 
 #: Candidates looked at closely.
