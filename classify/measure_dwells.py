@@ -12,10 +12,6 @@ from numpy.typing import NDArray
 
 from .workers import in_order
 
-#: What tells that workers cannot be had, where processes, memory or semaphores are short, or were lost (which breaks a
-#: pool, a RuntimeError).
-NO_WORKERS = (OSError, RuntimeError, AssertionError)
-
 #: So long dwells are measured in this process; if what is left would take it as long again, which is what workers need
 #: to begin, they share it, in tasks of about so long [s].
 ALONE_S, TASK_S = 1.0, 0.5
@@ -49,14 +45,9 @@ def measure_dwells(iq: NDArray[np.complex64], *, on_record: Callable[[float], No
     each_s = (time.monotonic() - started) / done
     some = max(1, round(TASK_S / each_s))
     shared = (len(iq) - done) * each_s > ALONE_S
-    for workers in (None, 1) if shared else (1,):  # what workers leave undone is done here
-        tasks = [iq[first : first + some] for first in range(done, len(iq), some)]
-        try:
-            for run in in_order(work, tasks, workers):
-                runs.append(run)
-                done += len(run.reason)
-                on_record(done)
-        except NO_WORKERS:
-            if workers == 1:
-                raise
+    tasks = [iq[first : first + some] for first in range(done, len(iq), some)]
+    for run in in_order(work, tasks, None if shared else 1):
+        runs.append(run)
+        done += len(run.reason)
+        on_record(done)
     return Measurements.joined(runs)

@@ -1,4 +1,7 @@
-"""Tasks done on several processes, their results in order; Ctrl-C and a killed parent end them all."""
+"""Tasks done on several processes, their results in order; Ctrl-C and a killed parent end them all.
+
+Where processes cannot be had, or are lost, the tasks are done without them.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from multiprocessing import active_children, get_context, parent_process, resource_tracker
@@ -32,30 +35,64 @@ def in_order(work: Callable[[Task], Done], tasks: Sequence[Task], workers: int |
     work, tasks
         What to do with each; both must travel to another process.
     workers : int, optional
-        Processes; by default one a processor. 1 works in this process.
+        Processes; by default one a processor. 1 works in this process, and so does what workers cannot do: where
+        processes, memory or semaphores are short, in a worker of somebody else's pool, or once one is killed.
     """
     workers = workers_at_hand() if workers is None else workers
-    if workers < 2 or len(tasks) < 2:
-        yield from map(work, tasks)
-        return
+    done = 0
+    if workers > 1 and len(tasks) > 1:
+        try:
+            for result in _by_workers(work, tasks, workers):
+                yield result
+                done += 1
+        except _NoWorkersError:
+            pass
+    yield from map(work, tasks[done:])
+
+
+class _NoWorkersError(Exception):
+    """Workers cannot be had, or were lost."""
+
+
+def _by_workers(work: Callable[[Task], Done], tasks: Sequence[Task], workers: int) -> Iterator[Done]:
+    """Do tasks on several processes; what the work itself raises is raised here."""
     # spawn, not fork: a fork of a process with threads (torch, onnxruntime) may hang
     others = set(active_children())
-    pool_of = partial(ProcessPoolExecutor, mp_context=get_context("spawn"), initializer=_begin)
-    with pool_of(min(workers, len(tasks))) as pool:
+    with _told_apart():
+        pool_of = partial(ProcessPoolExecutor, mp_context=get_context("spawn"), initializer=_begin)
+        pool = pool_of(min(workers, len(tasks)))
+    with pool:
         waiting: list[Future[Done]] = []
         try:
             for task in tasks:
-                with _deaf_children(), _without_main():
+                with _told_apart(), _deaf_children(), _without_main():
                     waiting.append(pool.submit(work, task))
                 if len(waiting) >= 3 * workers:
-                    yield waiting.pop(0).result()
+                    yield _result(waiting.pop(0))
             while waiting:
-                yield waiting.pop(0).result()
+                yield _result(waiting.pop(0))
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             for worker in set(active_children()) - others:  # else what they have begun is waited for
                 worker.terminate()
             raise
+
+
+@contextmanager
+def _told_apart() -> Iterator[None]:
+    """Tell what starting a worker raises from what the work does: within, nothing of the work runs."""
+    try:
+        yield
+    except (OSError, RuntimeError, AssertionError) as error:  # the last of a daemonic process
+        raise _NoWorkersError from error
+
+
+def _result(asked: Future[Done]) -> Done:
+    """What the work gives or raises."""
+    try:
+        return asked.result()
+    except BrokenExecutor as error:
+        raise _NoWorkersError from error
 
 
 @contextmanager

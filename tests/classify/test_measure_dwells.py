@@ -1,4 +1,3 @@
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import fields
 
 import numpy as np
@@ -38,24 +37,7 @@ def test_dwells_are_measured_alike_by_one_process_and_by_several(dwells, monkeyp
         np.testing.assert_array_equal(getattr(found, field.name), getattr(together, field.name), field.name)
     assert not found.length_is_lower_bound
     assert said == list(range(1, len(dwells) + 1))
-    assert asked == ([(len(dwells) - 1, None), (0, 1)] if workers is None else [(0, 1)])
-
-
-@pytest.mark.parametrize("error", [OSError("no semaphores"), BrokenProcessPool("killed"), AssertionError("daemonic")])
-def test_what_workers_leave_undone_is_done_without_them(dwells, monkeypatch, error):
-    def lost(work, tasks, workers):
-        for number, task in enumerate(tasks):
-            if workers is None and number == 2:
-                raise error
-            yield work(task)
-
-    monkeypatch.setattr(module, "in_order", lost)
-    monkeypatch.setattr(module, "ALONE_S", 1e-3)
-    monkeypatch.setattr(module, "TASK_S", 1e-3)
-    said = []
-    found = measure_dwells(dwells, on_record=said.append, **RADAR)
-    np.testing.assert_array_equal(found.chopping_hz, measure(dwells, **RADAR).chopping_hz)
-    assert said == list(range(1, len(dwells) + 1))
+    assert asked == [(len(dwells) - 1, None) if workers is None else (0, 1)]
 
 
 def test_an_error_of_a_dwell_is_told(dwells, monkeypatch):
