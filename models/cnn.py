@@ -27,6 +27,7 @@ _SPEED_BANDS = 4  # of a trunk's places, both signs of the velocity alike
 _HEAD = 128  # 48 were the narrowest place of all (docs/ablation.md)
 _CLIP = 8.0  # standard deviations; beyond them an input says no more than "very much"
 _CHUNK = 1024
+_LEAST_EXPONENT = -100  # of two, of a weight's step: an output whose weights are smaller has none
 
 
 class Standardise(nn.Module):
@@ -304,12 +305,14 @@ def rounded(weights: Tensor) -> Tensor:
     Returns
     -------
     Tensor
-        As many: of each output whole multiples, of at most `WEIGHT_STEPS`, of a step that half precision holds.
+        As many: of each output whole multiples, of at most `WEIGHT_STEPS`, of a step of eleven bits.
     """
     if weights.ndim == 1:
         return weights.half().float()
     rows = weights.reshape(len(weights), -1)
-    step = (rows.abs().amax(1, keepdim=True) / WEIGHT_STEPS).half().float()
+    # eleven bits, as half precision has, so that each multiple is exact; but however small the weights are
+    mantissa, exponent = torch.frexp(rows.abs().amax(1, keepdim=True) / WEIGHT_STEPS)
+    step = torch.where(exponent > _LEAST_EXPONENT, torch.ldexp((mantissa * 2048).round() / 2048, exponent), 0.0)
     whole = (rows / torch.where(step > 0, step, torch.ones(()))).round().clamp(-WEIGHT_STEPS, WEIGHT_STEPS)
     return (whole * step).reshape(weights.shape)
 
