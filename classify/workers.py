@@ -11,7 +11,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing import active_children, get_context, parent_process, resource_tracker
 from typing import Any, TypeVar
@@ -41,12 +41,10 @@ def in_order(work: Callable[[Task], Done], tasks: Sequence[Task], workers: int |
     workers = workers_at_hand() if workers is None else workers
     done = 0
     if workers > 1 and len(tasks) > 1:
-        try:
+        with suppress(_NoWorkersError):
             for result in _by_workers(work, tasks, workers):
                 yield result
                 done += 1
-        except _NoWorkersError:
-            pass
     yield from map(work, tasks[done:])
 
 

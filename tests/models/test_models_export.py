@@ -197,6 +197,12 @@ def test_a_weight_is_rounded_by_half_a_step_of_its_own_output_at_most(size):
     torch.testing.assert_close(rounded(found), found, rtol=0, atol=0)
 
 
+def test_weights_that_no_step_can_hold_are_none():
+    found = rounded(torch.tensor([[1e-40, -1e-41], [1e-35, 0.0], [1.0, 0.0]]))
+    assert (found[:2] == 0).all()
+    assert found[2].tolist() == pytest.approx([1.0, 0.0], rel=0.001)
+
+
 def test_wrong_shapes_are_refused():
     net = SpectrumNet(SHAPES, seed=0)
     with pytest.raises(ValueError, match="the network was made for"):
