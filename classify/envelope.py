@@ -5,7 +5,8 @@ import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
 
-from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS, beyond_radars
+from bladewing.features.samples import beyond_radars
+from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 
 from .errors import BadInput
 from .samples import positive

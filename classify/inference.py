@@ -13,7 +13,7 @@ import numpy as np
 from bladewing.features.allocator import keep_freed
 from bladewing.features.dropouts import mended
 from bladewing.features.inputs import dwells_of
-from bladewing.features.spectrum import LEAST_PART, largest_part
+from bladewing.features.samples import LEAST_PART, largest_part
 from bladewing.models import KIND_SCORES
 from bladewing.models.calibration import softmax
 from bladewing.models.operating import OperatingPoint

@@ -28,6 +28,10 @@ _SCATTER = 1.05
 #: Name of the two models that are asked one after the other (see `Cascade`), in train.json and where one is loaded.
 CASCADE = "cascade"
 
+#: The folder of the shipped models, and the name of the account beside models.
+SHIPPED = resources.files("bladewing.models.pretrained")
+ACCOUNT = "train.json"
+
 #: Key of the cascade's account in train.json: the names of its two models.
 STAGES_KEY = "stages"
 
@@ -42,13 +46,12 @@ _ROUNDS = 40
 
 def shipped_account() -> dict[str, Any]:
     """The shipped models and their cascade, name to account in `train.json`, which also tells of others."""
-    folder = resources.files("bladewing.models.pretrained")
-    told = json.loads(folder.joinpath("train.json").read_text(encoding="utf-8"))
+    told = json.loads(SHIPPED.joinpath(ACCOUNT).read_text(encoding="utf-8"))
     accounts = told["models"] | ({CASCADE: told[CASCADE]} if told.get(CASCADE) else {})
     return {
         name: account
         for name, account in accounts.items()
-        if all(folder.joinpath(f"{part}.onnx").is_file() for part in account.get(STAGES_KEY, [name]))
+        if all(SHIPPED.joinpath(f"{part}.onnx").is_file() for part in account.get(STAGES_KEY, [name]))
     }
 
 

@@ -13,7 +13,8 @@ from bladewing.features.inputs import MIN_PULSES
 from bladewing.features.measure import MOST_BLADES_GIVEN
 from bladewing.features.measurements import BODY, EACH_ROTOR, Measurements
 from bladewing.features.one_channel import half_empty, made_analytic
-from bladewing.features.spectrum import centred_power, scaled, unit_scale
+from bladewing.features.samples import scaled, unit_scale
+from bladewing.features.spectrum import centred_power
 from bladewing.features.window import KAISER
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 

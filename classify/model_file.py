@@ -3,7 +3,6 @@
 import json
 import os
 from collections.abc import Mapping
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ from .envelope import Envelope
 from .errors import BadInput
 from .files import read_bounded
 from .labels import CLASSES
-from .ladder import CASCADE, PLACES, by_budget, by_place, measured_fft_us, shipped_account
+from .ladder import CASCADE, PLACES, SHIPPED, by_budget, by_place, measured_fft_us, shipped_account
 from .limits import MOST_MODEL_BYTES
 from .samples import positive
 
@@ -45,8 +44,7 @@ NOISE = "noise"
 
 def model_names() -> tuple[str, ...]:
     """Names of the shipped models, the default first."""
-    folder = resources.files("bladewing.models.pretrained")
-    names = {entry.name.removesuffix(".onnx") for entry in folder.iterdir() if entry.name.endswith(".onnx")}
+    names = {entry.name.removesuffix(".onnx") for entry in SHIPPED.iterdir() if entry.name.endswith(".onnx")}
     return tuple(sorted(names, key=lambda name: (name != DEFAULT_MODEL, name)))
 
 
@@ -91,7 +89,7 @@ def read_model(given: str) -> tuple[bytes, str]:
         There is no such model, or it cannot be read.
     """
     if given in model_names():
-        return resources.files("bladewing.models.pretrained").joinpath(f"{given}.onnx").read_bytes(), given
+        return SHIPPED.joinpath(f"{given}.onnx").read_bytes(), given
     if not given:
         raise BadInput(f"the model's name is empty: give one of the shipped, {', '.join(model_names())}, or a file")
     path = Path(given)

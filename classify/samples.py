@@ -4,7 +4,7 @@ import math
 from numbers import Real
 
 import numpy as np
-from bladewing.features.spectrum import FILL_IN
+from bladewing.features.samples import FILL_IN
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import BadInput

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bladewing.features.measure_record import PAPER_THRESHOLD_DB
 from bladewing.features.notch import body_line
 from bladewing.features.spectrum import doppler_spectrum
 from bladewing.simulate.scene import Scene
@@ -18,7 +19,7 @@ from bladewing.simulate.scene import Scene
 from .errors import unwritable
 from .files import result_folder, write_together
 from .measure_words import with_error
-from .table_measures import MEASURED_DB, SIMULATED_DB, PaperMeasures, by_the_papers_rules, strongest_line_db, theory
+from .table_measures import SIMULATED_DB, PaperMeasures, by_the_papers_rules, strongest_line_db, theory
 from .table_rotors import EXPLAINED, gear_rows, rotor_rows, velocity_rows
 
 #: Paper, Table III: bandwidth theory and measured, chopping theory and measured, Doppler shift measured [Hz].
@@ -105,7 +106,7 @@ def table_vii(seed: int) -> Iterator[Row]:
     """The four measured UAVs, hovering."""
     for name, (band, chop, strongest, weakest) in TABLE_VII.items():
         scene = Scene.load(name)
-        expected, found = theory(scene), by_the_papers_rules(scene.render(seed), MEASURED_DB)
+        expected, found = theory(scene), by_the_papers_rules(scene.render(seed), PAPER_THRESHOLD_DB)
         yield {
             "scene": name,
             "bandwidth paper measured": band,
@@ -138,7 +139,7 @@ def table_ix(seed: int) -> Iterator[Row]:
         beta_deg = float(np.rad2deg(np.arccos(min(1.0, band / theory(level)[0]))))
         moving = changed(level, beta_deg=beta_deg)
         rendering = moving.render(seed)
-        expected, found = theory(moving), by_the_papers_rules(rendering, MEASURED_DB)
+        expected, found = theory(moving), by_the_papers_rules(rendering, PAPER_THRESHOLD_DB)
         rotor, fitted = rotor_rows(moving, rendering, band_hz=band, chopping_hz=chop)
         yield {
             "scene": name,
@@ -157,7 +158,7 @@ def table_x(seed: int) -> Iterator[Row]:
         scene = Scene.load(name)
         tilted = changed(scene, rates=chop / theory(scene)[1], beta_deg=beta_deg)
         rendering = tilted.render(seed)
-        found = by_the_papers_rules(rendering, MEASURED_DB)
+        found = by_the_papers_rules(rendering, PAPER_THRESHOLD_DB)
         rotor, _ = rotor_rows(tilted, rendering, band_hz=band, chopping_hz=chop)
         yield {"scene": name, "beta [deg]": beta_deg, **_with_rules(rotor, found)}
 

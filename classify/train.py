@@ -23,12 +23,12 @@ from .files import result_folder, write_together
 from .gather import TASK_RECORDS, Gathered, TrainingSets, gather, gather_from, inputs_digest
 from .inference import Classifier
 from .labels import CLASSES
-from .ladder import CASCADE
+from .ladder import ACCOUNT, CASCADE
 from .model_file import COVERAGES, CURVE_KEY, FORMAT, KINDS_KEY, SETS_KEY
 from .parts import TRAIN_PARTS, Parts
 from .progress import Progress
 from .train_network import OnFraction, ScoresOf, Taught, epochs_of, train_net
-from .training_account import ACCOUNT, covered, figures, print_account
+from .training_account import covered, figures, print_account
 from .training_config import TrainingConfig, training_config
 from .training_costs import add_costs
 

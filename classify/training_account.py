@@ -8,11 +8,8 @@ from bladewing.models.operating import least_named
 from numpy.typing import NDArray
 
 from .labels import CLASSES
-from .ladder import CASCADE, COST_KEY, STAGES_KEY
+from .ladder import ACCOUNT, CASCADE, COST_KEY, STAGES_KEY
 from .terminal import console, print_table
-
-#: Name of the account beside the models.
-ACCOUNT = "train.json"
 
 #: A cascade whose second model is asked about more records than this is of no use.
 MOST_ASKED = 0.9

@@ -8,7 +8,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from bladewing.features import doppler_spectrum
 from bladewing.features.change import frame_power
-from bladewing.features.spectrum import to_db
+from bladewing.features.fast import to_db
 from bladewing.simulate import Radar, draw_records
 
 RADAR = Radar(carrier_hz=9.85e9, prf_hz=10e3, pulses=3000)

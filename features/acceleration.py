@@ -7,15 +7,8 @@ from scipy import fft
 from .inputs import in_blocks
 from .lines import middle_times, squared
 from .notch import parabola_offset
-from .spectrum import (
-    LEAST_PART,
-    SPEED_OF_LIGHT_MPS,
-    finite_complex,
-    largest_part,
-    require_radar,
-    scaled,
-    unit_scale,
-)
+from .samples import LEAST_PART, finite_complex, largest_part, require_radar, scaled, unit_scale
+from .spectrum import SPEED_OF_LIGHT_MPS
 
 #: Accelerations that are tried [m/s^2]: five times gravity; in long dwells of short waves fewer, up to those that smear
 #: a line over an eighth of the span.

@@ -6,7 +6,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .spectrum import LOWEST_DB, SPEED_OF_LIGHT_MPS, as_ordered, to_db
+from .fast import LOWEST_DB, as_ordered, to_db
+from .spectrum import SPEED_OF_LIGHT_MPS
 from .window import HANN
 
 #: Velocity below which bins are of about equal width [m/s]; above it their width grows with the velocity.

@@ -5,7 +5,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .spectrum import Spectrum, ones, sums
+from .fast import ones, sums
+from .spectrum import Spectrum
 
 #: Share of the residual energy left out on each side of the energy band.
 TAIL_SHARE = 0.025

@@ -114,7 +114,7 @@ def _likeliest(data: Periodogram, spectrum: Spectrum, blades: bool) -> tuple[flo
     shape, or lines that move are as strong on both sides of it, these are a hovering drone's blades. Places in
     [cycles a sample].
     """
-    lines = list(zip(data.strong.centres, data.strong.centres_db, strict=True))
+    lines = data.strong.lines
     moving = [] if blades else [line for line in lines if abs(line[0]) >= data.rest_half and line[1] >= LINE_DB]
     own, level_db = (moving or lines)[0]
     slow, slow_db = lines[0]

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .axis import UNSEEN_DB, expected_peak
+from .fast import as_ordered, means, power_of, to_db
 from .notch import Mask, weights
 from .schema import CADENCE_BINS
-from .spectrum import Spectrum, as_ordered, means, per_floor, power_of, to_db
+from .spectrum import Spectrum, per_floor
 from .window import HANN, Window
 
 #: Range of the shared axis of rates [Hz]: from slow wings to the tenth flash of the fastest propeller.

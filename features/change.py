@@ -6,10 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axis import pooling
-from .spectrum import Spectrum, at_least, centred_power, means, per_floor, scaled, sums, windows
+from .fast import at_least, sums, windows
+from .samples import scaled
+from .spectrum import Spectrum, centred_power, per_floor
 
 #: Parts of a dwell, half overlapping, each a quarter of it long.
 PARTS = 7
+
+#: Levels count towards a part's centroid from here on [dB].
+CENTROID_DB = 6.0
 
 #: Products with these give the mean of the parts, and each less that mean: half the time of sums over the parts.
 _MEAN = np.full(PARTS, 1 / PARTS, np.float32)
@@ -94,14 +99,9 @@ def change_db(parts: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def centroid_mps(parts: NDArray[np.float32], axis_mps: NDArray[np.float32]) -> NDArray[np.float32]:
     """Centroid of the level over the velocity in each part [m/s], shape (..., PARTS); 0 where nothing is seen."""
-    weight = at_least(parts, 6)
-    weight -= np.float32(6)
+    weight = at_least(parts, CENTROID_DB)
+    weight -= np.float32(CENTROID_DB)
     return np.vecdot(weight, axis_mps) / np.maximum(sums(weight), np.float32(1e-6))
-
-
-def busy_db(parts: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Mean level over the axis in each part [dB], shape (..., PARTS): flashes and wing strokes lift single parts."""
-    return means(parts)
 
 
 def swing(values: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, special
 
+from .fast import at_least, sums
 from .notch import Mask, parabola_offset, weights
-from .spectrum import Spectrum, at_least, bins_alike, sums
+from .spectrum import Spectrum, bins_alike
 from .window import Window
 
 #: Range in which a chopping frequency is sought [Hz]: a slow main rotor to a small propeller of four blades.
@@ -28,6 +29,8 @@ REPEAT_SHARE, LENGTH_POWER = 0.5, 0.15
 #: Lines stand out of the spectrum by no more than this [dB], so that one strong line does not become the cepstrum.
 CLIP_DB = 30.0
 
+#: Median of Rayleigh heights, as those of noise are, over their rms: sqrt(ln 2).
+MEDIAN_OVER_RMS = 0.8326
 
 _LEAST = np.float32(1e-30)  # divides in the stead of 0
 _BLOCK = 32
@@ -191,8 +194,8 @@ def cepstral_chopping(spectrum: Spectrum, mask: Mask) -> Chopping:
     count = flat.shape[1]
     begin = np.arange(0, flat.size, count)  # of each record in all of them, one behind the other
     every = flat.reshape(-1)
-    # the median of Rayleigh heights is 0.83 of their rms; a comb's own peaks do not move it
-    rms = _median(heights.reshape(flat.shape)[:, first : last + 1]) * np.float32(1 / 0.8326)
+    # a comb's own peaks do not move the median
+    rms = _median(heights.reshape(flat.shape)[:, first : last + 1]) * np.float32(1 / MEDIAN_OVER_RMS)
     best = _evidence(flat, first, last).argmax(axis=-1)
     best += first
     least = np.maximum(every[begin + best] * np.float32(FUNDAMENTAL_SHARE), rms * np.float32(FUNDAMENTAL_STRENGTH))

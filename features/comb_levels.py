@@ -16,9 +16,10 @@ from scipy import fft
 from .axis import UNSEEN_DB
 from .chopping import CHOPPING_RANGE_HZ, MIN_SPACING_BINS
 from .evidence import line_log_ratio
+from .fast import as_ordered, power_of, sums, to_db
 from .notch import Mask, weights
 from .schema import COMB_BINS
-from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, as_ordered, bins_alike, per_floor, power_of, sums, to_db
+from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, bins_alike, per_floor
 from .window import BROAD_HANN, NEIGHBOUR_SHARE
 
 #: Lines are looked for up to this speed [m/s]: beyond it lie the ends of few rotors' bands, and noise.

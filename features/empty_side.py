@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .spectrum import LOWEST_DB, Spectrum
+from .fast import LOWEST_DB
+from .spectrum import Spectrum
 
 #: A side whose floor lies so far below the other's has no level that is followed.
 EMPTY_SHARE = np.float32(10 ** (LOWEST_DB / 10))

@@ -10,7 +10,8 @@ from scipy import fft
 
 from .bodies import LINE_DB
 from .notch import body_line
-from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum, finite_complex, require_radar, scaled, unit_scale
+from .samples import finite_complex, require_radar, scaled, unit_scale
+from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum
 
 #: Dwells by which the body is followed [s].
 BODY_DWELL_S = 0.1

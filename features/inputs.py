@@ -14,8 +14,9 @@ from .empty_side import filled_sides
 from .joint import joint_vector, stft_image
 from .notch import Body, body_line, notch_mask, strongest_bin, weights
 from .one_channel import made_analytic
+from .samples import as_complex
 from .schema import AXIS_BINS, INPUT_SHAPES
-from .spectrum import as_complex, doppler_spectrum
+from .spectrum import doppler_spectrum
 from .vector import feature_vector
 from .window import HANN
 

@@ -15,7 +15,8 @@ from .measurements import EACH_ROTOR, Measurements
 from .one_channel import made_analytic
 from .one_thread import one_thread
 from .rotor.rotors import MAX_ROTORS
-from .spectrum import beyond_radars, doppler_spectrum, finite_complex, require_radar
+from .samples import beyond_radars, finite_complex, require_radar
+from .spectrum import doppler_spectrum
 
 #: No rotor has more blades; eight is the most that fly.
 MOST_BLADES_GIVEN = 64

@@ -30,8 +30,9 @@ from .rotor.past_edge import PastEdge, past_edge_of
 from .rotor.periodogram import Periodogram, prepared
 from .rotor.rotors import MAX_ROTORS, hidden_shift
 from .rotor.sidebands import sideband_spacing
+from .samples import LEAST_PART, largest_part
 from .smearing import wide_smearing_index
-from .spectrum import LEAST_PART, Spectrum, doppler_spectrum, largest_part
+from .spectrum import Spectrum, doppler_spectrum
 
 #: Threshold of the paper's bandwidth rule over the noise [dB]: it took 20 on measured data, 30 on simulated.
 PAPER_THRESHOLD_DB = 20.0

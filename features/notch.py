@@ -6,7 +6,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .spectrum import Spectrum, at_least, sums, to_db
+from .fast import at_least, sums, to_db
+from .spectrum import Spectrum
 
 #: Half width of the notch [m/s]. Set in velocity, not in Hz: a wingbeat of 18 Hz is not a Doppler of 18 Hz, and a
 #: bird's body with its heave stays within this of its mean at every carrier.
@@ -15,9 +16,11 @@ NOTCH_MPS = 3.0
 #: The notch is never narrower than the main lobe of the wider window, this many bins to each side.
 LOBE_BINS = 5
 
-
 #: Of bins within this share of the strongest the first one counts: rounding must not choose in a flat spectrum.
 EQUAL_SHARE = np.float32(1 - 1e-5)
+
+#: What is left outside the notch is at least this share of the noise [1].
+LEAST_RESIDUAL = 1e-2
 
 #: A top that curves less than this, relative to its height, is flat.
 LEAST_CURVE = np.float32(1e-5)
@@ -165,4 +168,4 @@ def notch_residual_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     """
     kept = weights(mask)
     mean = np.vecdot(spectrum.relative_power, kept) / np.maximum(sums(kept), np.float32(1))
-    return np.float32(10) * np.log10(np.maximum(mean, np.float32(1e-2)))
+    return np.float32(10) * np.log10(np.maximum(mean, np.float32(LEAST_RESIDUAL)))

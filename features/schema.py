@@ -152,7 +152,7 @@ INPUT_SHAPES: dict[str, tuple[int, ...]] = {
 
 
 def schema_hash() -> str:
-    """SHA-256 (hex) of all names, units, ranges and shapes: a model made for another schema must not be called."""
+    """SHA-256 (hex) of names, units, ranges, meanings and shapes: no model made for another may be called."""
     table = {
         "features": [asdict(f) for f in FEATURES],
         "joint_features": [asdict(f) for f in JOINT_FEATURES],

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axis import axis_velocities_mps
+from .fast import at_least, sums
 from .notch import Body, Mask, weights
-from .spectrum import Spectrum, at_least, sums
+from .spectrum import Spectrum
 
 #: Edges of the speed bands [m/s]: body and bird speeds below, limbs and wing tips between, blade tips above.
 SPEED_BANDS_MPS = (0.0, 0.8, 2.5, 6.0, 12.0, 22.0, 40.0, 70.0, 110.0, 200.0)

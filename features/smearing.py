@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .chopping import Chopping
+from .fast import sums
 from .notch import Body, weights
-from .spectrum import Spectrum, sums
+from .spectrum import Spectrum
 
 #: The index of lines that fill the space between orders evenly: the standard deviation of a uniform order, 1/sqrt(12).
 FULLY_SMEARED = 0.2887
@@ -16,6 +17,9 @@ MAX_ORDER = 24
 #: Of rates further apart the outer lines fill all there is between the orders and widen no more. Fewer orders are asked
 #: then: these, where the index times them says so [orders].
 FEWER_ORDERS, SATURATED = (12, 8), 0.2
+
+#: Orders squared that vary less than this do not show whether lines widen with them.
+LEAST_VARIANCE = 1e-3
 
 
 def smearing_index(
@@ -103,6 +107,6 @@ def _growth(
     nearest -= (np.vecdot(weight, nearest) * per_total)[..., None]
     weight *= nearest
     variance, covariance = np.vecdot(weight, nearest) * per_total, np.vecdot(weight, away) * per_total
-    slope = covariance * (variance > 1e-3) / np.maximum(variance, np.float32(1e-3))
+    slope = covariance * (variance > LEAST_VARIANCE) / np.maximum(variance, np.float32(LEAST_VARIANCE))
     index = np.sqrt(np.minimum(np.maximum(slope, 0), np.float32(FULLY_SMEARED**2)))
     return np.where(total > 0, index, np.float32(np.nan))

@@ -1,31 +1,24 @@
 """The Doppler spectrum of a dwell, scaled to its own noise floor."""
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft, special
 
+from .fast import means, ones, power_of, sums, to_db, windows
+from .samples import as_complex, require_radar, safe_scale, scaled
 from .window import KAISER, Window
 
 #: Speed of light [m/s].
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 
-#: Levels are not followed below this [dB re noise floor]: an empty side of the spectrum has no level.
-LOWEST_DB = -20.0
-
 #: Without any noise (a synthetic line) the floor is this share of the record's power, not what rounding leaves.
 LEAST_FLOOR = np.float32(1e-9)
 
-#: Of a radar [Hz]: beyond, a frequency was given in another unit.
-CARRIER_RANGE_HZ, PRF_RANGE_HZ = (1e8, 1e12), (1.0, 1e8)
-
-# Arrays without axes: to NumPy a number is one more thing to convert at every call.
-_HALF, _ONE, _NO_LIMIT = (np.array(value, np.float32) for value in (0.5, 1, np.inf))
-_DB_A_NEPER = np.array(10 / math.log(10), np.float32)  # of power
+# Without axes: to NumPy a number is one more thing to convert at every call.
+_HALF = np.array(0.5, np.float32)
 
 #: Under any power that is not 0: divides in its stead.
 LEAST_POWER = np.array(1e-36, np.float32)
@@ -33,13 +26,10 @@ LEAST_POWER = np.array(1e-36, np.float32)
 #: Noise shows where the least floor is at most this share of the floor, whatever rounding makes of a mean.
 SHOWN_SHARE = np.float32(0.99)
 
-# Energies of a record: neither its lines, at most that strong, nor its floor leave float32.
-_SAFE_ENERGY = np.array(1e-14, np.float32), np.array(1e30, np.float32)
 _FLOOR_QUANTILE = 0.25
 
 #: Blocks of a side of the spectrum whose quartile is the floor; a side so many times below the other holds no noise.
 FLOOR_BLOCKS, EMPTY_RATIO = 64, np.array(4, np.float32)
-
 
 #: What a spectrum holds of each record.
 _OF_RECORDS = ("relative_power", "transform_floor", "scale", "transform", "side_floors")
@@ -138,53 +128,6 @@ class Spectrum:
         return to_db(self.relative_power)
 
 
-def to_db(
-    relative_power: NDArray[np.float32], lowest_db: float = LOWEST_DB, out: NDArray[np.float32] | None = None
-) -> NDArray[np.float32]:
-    """10 log10 of a power ratio [dB], held at `lowest_db` from below."""
-    out = at_least(relative_power, 10 ** (lowest_db / 10), out=out)
-    np.log(out, out=out)  # a decadic one takes 3.7 times as long in float32 where there is no AVX-512
-    return np.multiply(out, _DB_A_NEPER, out=out)
-
-
-def at_least(values: NDArray[np.float32], low: float, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
-    """Values held at `low` from below: to clip takes half the time of a maximum with a number."""
-    return values.clip(np.float32(low), _NO_LIMIT, out=out)
-
-
-@lru_cache(maxsize=64)
-def ones(count: int) -> NDArray[np.float32]:
-    """So many ones, not to be written to."""
-    out = np.ones(count, np.float32)
-    out.flags.writeable = False
-    return out
-
-
-def sums(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Sums along the last axis: a dot product takes a third of the time of a reduction."""
-    return np.vecdot(values, ones(values.shape[-1]))
-
-
-def means(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Means along the last axis, in the same way."""
-    return sums(values) * np.float32(1 / values.shape[-1])
-
-
-def as_ordered(values: NDArray[np.float32]) -> NDArray[np.int32]:
-    """The same memory as whole numbers, in which what is not negative has the same order: maxima take half the time."""
-    return values.view(np.int32)
-
-
-def windows(values: NDArray, shape: tuple[int, ...], steps: tuple[int, ...], first: int = 0) -> NDArray:
-    """The last axis from an element on seen as axes of so many elements and steps, shape (..., *shape), to be read."""
-    values = np.ascontiguousarray(values)
-    if not values.size:  # no element to begin at
-        return np.empty((*values.shape[:-1], *shape), values.dtype)
-    strides = (*values.strides[:-1], *(step * values.itemsize for step in steps))
-    # a sixth of the time of `as_strided`
-    return np.ndarray((*values.shape[:-1], *shape), values.dtype, values, first * values.itemsize, strides)
-
-
 @lru_cache(maxsize=64)
 def _frequencies_hz(bins: int, prf_hz: float) -> NDArray[np.float64]:
     """Centred frequencies of a transform [Hz], shape (bins,)."""
@@ -227,13 +170,6 @@ def bins_alike(pulses: int, bins: int, window: Window) -> NDArray[np.float64]:
     return np.asarray(np.minimum(np.abs(fft.fft(squared / squared.sum(), n=bins)) ** 2, 1), np.float64)
 
 
-def scaled(iq: NDArray[np.complex64], scale: NDArray[np.float32]) -> NDArray[np.complex64]:
-    """Samples times a real factor a record: part by part, for half the price of a complex product."""
-    if np.count_nonzero(scale == _ONE) == scale.size:
-        return np.ascontiguousarray(iq)
-    return (np.ascontiguousarray(iq).view(np.float32) * scale).view(np.complex64)
-
-
 def centred_power(iq: NDArray[np.complex64], bins: int | None = None, *, window: Window) -> NDArray[np.float32]:
     """Windowed power spectrum, centred: white noise of unit power a sample gives mean 1 in every bin.
 
@@ -264,64 +200,9 @@ def centred_transform(iq: NDArray[np.complex64], bins: int | None = None, *, win
     return transform if even else fft.fftshift(transform, axes=-1)
 
 
-def power_of(transform: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """Power of complex values."""
-    power = np.abs(transform)
-    return np.multiply(power, power, out=power)
-
-
-#: What is to be done about samples that are missing.
-FILL_IN = "interpolate them from their neighbours (zeros in their place, or a cut, would draw lines beside every line)"
-
-#: What is said of samples that are not finite.
-NOT_FINITE = f"iq holds values that are not finite: {FILL_IN}"
-
-#: What is said of samples that are finite, but not in complex64.
-TOO_LARGE = "iq holds values that are too large for complex64: lower the gain"
-
-#: A record whose largest part is below this has lost its digits among float32's denormal numbers: 9 bits are left here.
-LEAST_PART = 2.0**-140
-
-
-def largest_part(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """Largest real or imaginary part of each record, by magnitude, shape (...)."""
-    parts = np.ascontiguousarray(iq).view(np.float32)
-    return np.maximum.reduce(np.abs(parts), axis=-1)
-
-
-def unit_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """Power of two that brings each record's largest part into [0.5, 1), shape (..., 1); 1 for an all-zero record.
-
-    A power of two changes no digit, so results do not depend on the gain; the square of the scaled samples can neither
-    overflow nor vanish.
-
-    Raises
-    ------
-    ValueError
-        If a sample is not finite.
-    """
-    largest = largest_part(iq)
-    if not np.isfinite(largest).all():
-        raise ValueError(NOT_FINITE)
-    _, exponent = np.frexp(largest[..., None])
-    return np.ldexp(np.float32(1), -np.minimum(np.maximum(exponent, -126), 126))
-
-
 def per_floor(floor: NDArray[np.float32]) -> NDArray[np.float32]:
     """What a power is multiplied by to be in units of its floor; finite where there is none, and no power either."""
     return np.reciprocal(np.maximum(floor, LEAST_POWER))
-
-
-def safe_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """`unit_scale` of the records that need it, 1 of the others: it changes no digit, and to scale is a pass more."""
-    parts = np.ascontiguousarray(iq).view(np.float32)
-    with np.errstate(over="ignore", under="ignore"):
-        energy = np.vecdot(parts, parts)
-    least, most = _SAFE_ENERGY
-    safe = (energy > least) & (energy < most)
-    if np.count_nonzero(safe) == energy.size:
-        return ones(energy.size).reshape(*energy.shape, 1)
-    return np.where(safe[..., None], np.float32(1), unit_scale(iq))
 
 
 def noise_floor(power: NDArray[np.float32], window: Window) -> NDArray[np.float32]:
@@ -401,62 +282,6 @@ def quartile_of_noise(bins: int, size: int, blocks: int, window: Window) -> NDAr
 def quartile_rank(blocks: int) -> int:
     """Rank of the lower quartile of so many, from 0."""
     return round(_FLOOR_QUANTILE * (blocks - 1))
-
-
-def as_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
-    """Samples as complex64; real ones would pass for a spectrum with two like sides, and a mask would be forgotten.
-
-    Raises
-    ------
-    ValueError
-        If they are not complex, some are masked, or the last axis holds fewer than `least` pulses.
-    """
-    if np.ma.is_masked(iq):
-        raise ValueError(f"iq holds masked samples: {FILL_IN}")
-    try:
-        samples = np.asarray(iq)
-    except ValueError:
-        raise ValueError("iq holds rows of unequal length: every record must have as many pulses") from None
-    if samples.dtype.kind != "c":
-        raise ValueError(f"iq holds {samples.dtype}: its samples must be complex, I + jQ")
-    if samples.ndim < 1 or samples.shape[-1] < least:
-        pulses = f"{least} pulse{'s' * (least > 1)}"
-        raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least {pulses}")
-    if samples.dtype == np.complex64:
-        return samples
-    with np.errstate(over="ignore"):  # what overflows is not finite, and found as that
-        return samples.astype(np.complex64)
-
-
-def finite_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
-    """Samples as complex64, all of them finite.
-
-    Raises
-    ------
-    ValueError
-        If they are not complex or not finite, some are masked, or the last axis holds fewer than `least` pulses.
-    """
-    samples = as_complex(iq, least)
-    if not np.isfinite(samples).all():
-        raise ValueError(NOT_FINITE if not np.isfinite(iq).all() else TOO_LARGE)
-    return samples
-
-
-def require_radar(carrier_hz: float, prf_hz: float) -> tuple[float, float]:
-    """Both frequencies [Hz] in float64, as phases need them; what is none is refused."""
-    for name, value in (("carrier_hz", carrier_hz), ("prf_hz", prf_hz)):
-        is_one = isinstance(value, Real) or (isinstance(value, np.ndarray) and value.ndim == 0)
-        if not (is_one and math.isfinite(value) and value > 0):
-            raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
-    return float(carrier_hz), float(prf_hz)
-
-
-def beyond_radars(carrier_hz: float, prf_hz: float) -> str:
-    """Which of both is no frequency of a radar, and the rule; empty where both are."""
-    for name, value, (low, high) in (("carrier", carrier_hz, CARRIER_RANGE_HZ), ("PRF", prf_hz, PRF_RANGE_HZ)):
-        if not low <= value <= high:
-            return f"the {name} is {value:g} Hz: it must be {low:g} to {high:g} Hz"
-    return ""
 
 
 def _least_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -9,7 +9,8 @@ from scipy import fft
 from .chopping import CHOPPING_RANGE_HZ
 from .lines import squared
 from .notch import NOTCH_MPS, parabola_offset
-from .spectrum import SPEED_OF_LIGHT_MPS, as_complex, require_radar
+from .samples import as_complex, require_radar
+from .spectrum import SPEED_OF_LIGHT_MPS
 
 #: Window length [s] and overlap [1] of the paper's Fig. 21: 20, 80 and 200 samples at 20 kHz, 50 to 90 %.
 PAPER_SETTINGS = ((1e-3, 0.9), (4e-3, 0.9), (4e-3, 0.5), (10e-3, 0.9))

@@ -9,16 +9,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from .axis import axis_velocities_mps
 from .bandwidth import energy_band_mps, noise_threshold_db, threshold_band_hz
-from .change import busy_db, centroid_mps, swing
+from .change import centroid_mps, swing
 from .chopping import cepstral_chopping
+from .fast import means, sums
 from .notch import Body, notch_residual_db, residual, weights
 from .schema import FEATURES, FeatureTable
 from .shape import band_levels_db, entropy, ripple_db, symmetry
 from .smearing import smearing_index
-from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, sums
+from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum
 
 #: Energy over the floor counts from here on, where the level is 6 dB: noise passes it in 2 % of the bins.
 SIGNIFICANT = np.float32(10 ** (6.0 / 10) - 1)
+
+#: Of an empty side of the spectrum there is this share of its noise, at least; turns of a rotor in a dwell, at least.
+EMPTIEST, LEAST_TURNS = 1e-2, 0.01
 
 #: Names of the bands' levels on the stronger and on the weaker side.
 BANDS = tuple([f.name for f in FEATURES if f.name.startswith(stem)] for stem in ("strong_", "weak_"))
@@ -49,7 +53,7 @@ def radar_columns(carrier_hz: float, prf_hz: float, pulses: int) -> dict[str, fl
 
 
 def lay_out(columns: Mapping[str, ArrayLike], table: FeatureTable, shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """Put named columns in a table's order, each held in its range and NaN (no value) set to 0, clipped to the range.
+    """Put named columns in a table's order, each held in its range; NaN (no value) becomes 0.
 
     Parameters
     ----------
@@ -124,7 +128,7 @@ def feature_vector(
     half, side = spectrum.bins // 2, (spectrum.bins - 1) // 2  # without the bin at half the PRF, which has no mirror
     power = spectrum.relative_power
     left, right = sums(power[..., half - side : half]), sums(power[..., half + 1 : half + 1 + side])
-    emptiest = np.float32(1e-2 * side)
+    emptiest = np.float32(EMPTIEST * side)
     peak = np.maximum.reduce(excess, axis=-1)
     chopping_hz = np.maximum(chopping.frequency_hz, np.float32(1))
     half_wavelength_m = np.float32(spectrum.wavelength_m / 2)
@@ -154,7 +158,7 @@ def feature_vector(
         "chopping_step_mps": chopping.frequency_hz * half_wavelength_m,
         "chopping_strength": chopping.strength,
         "chopping_repeats": chopping.repeats,
-        "chopping_turns": np.log10(np.maximum(chopping.frequency_hz * dwell_s, np.float32(0.01))),
+        "chopping_turns": np.log10(np.maximum(chopping.frequency_hz * dwell_s, np.float32(LEAST_TURNS))),
         "chopping_orders": width_hz / chopping_hz,
         "smearing_index": smearing_index(spectrum, energy, body, chopping, root),
         "change_slow_db": changes[..., 0],
@@ -162,7 +166,7 @@ def feature_vector(
         "change_fast_db": changes[..., 2],
         "centroid_swing_mps": swing(centroid),
         "centroid_drift_mps": np.abs(centroid[..., -1] - centroid[..., 0]),
-        "busy_swing_db": swing(busy_db(parts)),
+        "busy_swing_db": swing(means(parts)),
         "empty_side_db": np.abs(np.log10(np.maximum(left, emptiest) / np.maximum(right, emptiest))) * np.float32(10),
     }
     for names, levels in zip(BANDS, band_levels_db(axis_db), strict=True):

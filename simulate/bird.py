@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .blades import TILE_SAMPLES, TINY
 from .laws import Draws
-from .motion import TWO_PI, range_phasor, reduce_phase, straight_path
+from .motion import GRAVITY_MPS2, TWO_PI, range_phasor, reduce_phase, straight_path
 from .radar import Radar
 from .target import Target
 
@@ -15,7 +15,6 @@ MAX_WINGBEAT_HZ = 18.0
 #: Most birds that a flock brings into one range cell.
 MAX_FLOCK = 20
 
-_GRAVITY_MPS2 = 9.81
 _AIR_KG_M3 = 1.225
 
 
@@ -37,7 +36,7 @@ def wingbeat_hz(mass_kg: ArrayLike, span_m: ArrayLike, area_m2: ArrayLike) -> ND
     Pennycuick, "Wingbeat frequency of birds in steady cruising flight", J. Exp. Biol. 199 (1996) 1613-1618.
     """
     mass, span, area = (np.asarray(x, np.float64) for x in (mass_kg, span_m, area_m2))
-    return mass ** (3 / 8) * _GRAVITY_MPS2**0.5 * span ** (-23 / 24) * area ** (-1 / 3) * _AIR_KG_M3 ** (-3 / 8)
+    return mass ** (3 / 8) * GRAVITY_MPS2**0.5 * span ** (-23 / 24) * area ** (-1 / 3) * _AIR_KG_M3 ** (-3 / 8)
 
 
 def wing_size(mass_kg: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -24,6 +24,10 @@ class Entry:
     source: str
 
 
+#: Of the paper's radar, at 9.85 GHz [m].
+_PAPER_WAVELENGTH_M = 0.0304357825
+
+
 def _tips(length_m: float, rates_rpm: tuple[float, ...], *, arm_m: float = 0.0, flash_db: float = 17.0) -> list[dict]:
     """Rotors of point scatterers at the tip, as in the paper's model; neighbours turn against each other."""
     count = len(rates_rpm)
@@ -136,8 +140,8 @@ BIRDS: dict[str, Entry] = {
             "wingbeat_hz": 1 / 0.302,
             "wing_db": 18.0,
             "body_db": 25.0,
-            "velocity_mps": 340 * 0.0304357825 / 2,
-            "acceleration_mps2": -(340 + 316) * 0.0304357825 / 2 / 2.5,
+            "velocity_mps": 340 * _PAPER_WAVELENGTH_M / 2,
+            "acceleration_mps2": -(340 + 316) * _PAPER_WAVELENGTH_M / 2 / 2.5,
         },
         "the paper's bird: flash period 0.302 s, line swept from -340 to +316 Hz in 2.5 s (at 9.85 GHz); a gull's size",
     ),

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import fft, special
 
 from .laws import LAWS, Draws
-from .motion import TWO_PI
+from .motion import GRAVITY_MPS2, TWO_PI
 from .radar import Radar
 from .target import Normals, Target
 
@@ -20,6 +20,9 @@ GAUSSIAN_GROUND = 0.35
 
 #: Width of the line of ripples [m/s].
 BRAGG_WIDTH_MPS = 0.1
+
+#: Surface tension of sea water over its density (0.0728 N/m over 1000 kg/m^3 within 3 %).
+_TENSION_M3_PER_S2 = 7.3e-5
 
 
 def billingsley(wind_mph: ArrayLike, carrier_hz: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -259,11 +262,7 @@ def bragg_mps(wavelength_m: float) -> float:
         Wavelength of the radar [m], > 0.
     """
     k = 4 * np.pi / wavelength_m
-    return math.sqrt(_GRAVITY_MPS2 / k + _TENSION_M3_PER_S2 * k)
-
-
-#: Gravity, and the surface tension of sea water over its density (0.0728 N/m over 1000 kg/m^3 within 3 %).
-_GRAVITY_MPS2, _TENSION_M3_PER_S2 = 9.81, 7.3e-5
+    return math.sqrt(GRAVITY_MPS2 / k + _TENSION_M3_PER_S2 * k)
 
 
 def _gaussian(

@@ -1,20 +1,19 @@
 """Labelled records for training and testing: drawn one by one, rendered in batches.
 
-Record i of a data set depends on (seed, purpose, i) alone: it owns the stream
-``Generator(Philox(SeedSequence(seed, spawn_key=(purpose, i))))``, from which come first its uniform numbers, then its
-noise, then what its clutter process and its receiver need.
+Record i of a data set depends on (seed, purpose, i) alone: it owns the stream ``generator(seed, purpose, i)``, from
+which come first its uniform numbers, then its noise, then what its clutter process and its receiver need.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.random import Generator, Philox, SeedSequence
 from numpy.typing import NDArray
 
 from .bird import draw_bird
 from .clutter import draw_clutter, draw_ground, gaussian_ground
 from .discretes import DISCRETES, draw_discrete
+from .generator import generator
 from .laws import LAWS, WIDTH, Draws
 from .radar import SPEED_OF_LIGHT_MPS, Radar, whole
 from .receiver import NormalsOf, Receiver
@@ -40,6 +39,9 @@ KINDS: dict[str, dict[str, float]] = {
         "insects": 0.06,
     },
 }
+
+#: Class of each kind.
+KIND_CLASS = {kind: label for label, kinds in KINDS.items() for kind in kinds}
 
 #: Share of the records, of any kind, that hardly have thermal noise: simulated ones, near targets, laboratories. Were
 #: the levels over the noise another for each class up there, they would give the class away.
@@ -194,8 +196,7 @@ def draw_radar(seed: int, purpose: str, group: int) -> Radar:
         If `purpose` is unknown, or `seed` or `group` is no whole number or negative.
     """
     _require(purpose, seed=seed, group=group)
-    sequence = SeedSequence(seed, spawn_key=(PURPOSES[purpose], _RADAR_STREAM + group))
-    u = Generator(Philox(sequence)).random(4)
+    u = generator(seed, PURPOSES[purpose], _RADAR_STREAM + group).random(4)
     carrier = float(LAWS["carrier_hz"](u[0]))
     prf = 4 * float(LAWS["unambiguous_mps"](u[1])) * carrier / SPEED_OF_LIGHT_MPS
     prf = min(max(prf, 1e3), 1e5)
@@ -233,10 +234,6 @@ def stream(seed: int, purpose: str, count: int, *, start: int = 0) -> Iterator[R
         at = upto
 
 
-#: Class of each kind.
-KIND_CLASS = {kind: label for label, kinds in KINDS.items() for kind in kinds}
-
-
 def _render(
     radar: Radar,
     seed: int,
@@ -251,7 +248,7 @@ def _render(
     """Draw and render one chunk of records in place."""
     count = len(iq)
     indices = range(first, first + count)
-    generators = [Generator(Philox(SeedSequence(seed, spawn_key=(purpose, i)))) for i in indices]
+    generators = [generator(seed, purpose, i) for i in indices]
     uniforms = np.stack([g.random(WIDTH) for g in generators])
     normals_of = NormalsOf(generators)
     white = normals_of(np.arange(count))(2 * radar.pulses).reshape(count, radar.pulses, 2)

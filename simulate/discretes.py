@@ -32,8 +32,11 @@ LIMBS = (
 #: A foot on a pedal goes round at the gait, in a circle of this radius [m].
 CRANK_M = 0.17
 
-#: Most scatterers of a vehicle's body, of another's beside it, and of a vehicle's wheels together.
-MAX_BODY_POINTS, MAX_COMPANY_POINTS, MAX_WHEEL_POINTS = 48, 12, 240
+#: Most scatterers of a vehicle's body, of another's beside it, and of one of its wheels.
+MAX_BODY_POINTS, MAX_COMPANY_POINTS, MAX_TYRE_POINTS = 48, 12, 60
+
+#: Most wheels of a vehicle that show.
+MAX_WHEELS = 4
 
 #: Width of a vehicle's body [m].
 VEHICLE_WIDTH_M = 1.8
@@ -172,10 +175,11 @@ def _wheels(
     own_phase = draws.value("phase_rad", 4)
     shows, equal, rim_only = draws.uniform(), draws.chance(0.5), draws.chance(0.5)
     spokes = np.where(shows < 2 / 3, spokes, 0)
-    blocks = np.where(shows > 1 / 3, np.minimum(blocks, MAX_WHEEL_POINTS // 4 - spokes), 0)
+    blocks = np.where(shows > 1 / 3, np.minimum(blocks, MAX_TYRE_POINTS - spokes), 0)
     points = wheels * (spokes + blocks)
-    depth, angle, echo = (draws.uniform(MAX_WHEEL_POINTS) for _ in range(3))
-    level = np.exp(0.4 * draws.normal(MAX_WHEEL_POINTS))
+    most = MAX_WHEELS * MAX_TYRE_POINTS
+    depth, angle, echo = (draws.uniform(most) for _ in range(3))
+    level = np.exp(0.4 * draws.normal(most))
     out = np.zeros((len(draws), radar.pulses), np.complex64)
     # a radius is 2000 rad of phase at most: float32 holds it; one sine a vehicle serves all its points
     rolled = reduce_phase(gone_m / radius[:, None])

@@ -8,7 +8,7 @@ from .radar import Radar
 from .target import Target
 
 #: Most insects in the cell.
-_MOST = 20
+MAX_INSECTS = 20
 
 
 def draw_insects(draws: Draws, radar: Radar) -> Target:
@@ -27,11 +27,11 @@ def draw_insects(draws: Draws, radar: Radar) -> Target:
         `micro` is the sum of all insects.
     """
     t = radar.times_s
-    count = np.clip(np.rint(draws.value("insect_count")), 1, _MOST)
+    count = np.clip(np.rint(draws.value("insect_count")), 1, MAX_INSECTS)
     mean, spread = draws.value("insect_velocity_mps"), draws.value("insect_spread_mps")
     wingbeat, depth = draws.value("insect_wingbeat_hz"), draws.value("insect_depth")
     micro = np.zeros((len(draws), radar.pulses), np.complex64)
-    for number in range(_MOST):
+    for number in range(MAX_INSECTS):
         velocity = mean + spread * draws.normal()
         rate = wingbeat * (0.9 + 0.2 * draws.uniform())
         phase = draws.value("phase_rad")

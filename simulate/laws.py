@@ -1,7 +1,7 @@
 """What the training records are drawn from: one table of laws, and the cursor that draws by it.
 
 Every record owns one row of uniform numbers; each parameter maps one of them through its law. The bounds are physical,
-the sources stand beside them ("P": the paper; "facts" are computed or cited in the README's references).
+the sources stand beside them ("P": the paper).
 """
 
 from dataclasses import dataclass

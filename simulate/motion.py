@@ -5,6 +5,8 @@ from numpy.typing import ArrayLike, NDArray
 
 TWO_PI = 2 * np.pi
 
+GRAVITY_MPS2 = 9.81
+
 
 def reduce_phase(phase_rad: NDArray[np.float64]) -> NDArray[np.float32]:
     """Bring a phase into [-pi, pi] and then to float32.

@@ -11,8 +11,10 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validat
 
 from .bird import wing_size
 from .catalogue import AIRFRAMES, BIRDS, Entry
+from .discretes import MAX_BLADE_POINTS, MAX_BODY_POINTS, MAX_TYRE_POINTS, MAX_WHEELS
+from .insects import MAX_INSECTS
 from .laws import LAWS
-from .receiver import FAULT_CHANCE
+from .receiver import FAULT_CHANCE, MAX_STEPS
 
 #: Size of any number, at most: beyond every scene, and its samples are finite still.
 MOST = 1e12
@@ -26,14 +28,14 @@ MOST_POINTS = 1000
 #: What a parameter can be where its law does not tell: how many of a thing are rendered, what still has a spectrum
 #: (Billingsley's has none in still air), a gait or a texture, and what float32 holds.
 BOUNDS = {
-    "wheels": (1, 4),
-    "body_points": (1, 48),
+    "wheels": (1, MAX_WHEELS),
+    "body_points": (1, MAX_BODY_POINTS),
     "sight_rad": (-1.56, 1.56),
     "spokes": (1, 10),
-    "tyre_points": (1, 60),
-    "turbine_points": (3, 100),
+    "tyre_points": (1, MAX_TYRE_POINTS),
+    "turbine_points": (3, MAX_BLADE_POINTS),
     "turbine_row_points": (2, 1e6),
-    "insect_count": (1, 20),
+    "insect_count": (1, MAX_INSECTS),
     "wind_mph": (0.5, 200),
     "ground_law": (0, 1),
     "ground_width_mps": (1e-6, 0.6),
@@ -42,18 +44,19 @@ BOUNDS = {
     "high_pass_hz": (1e-6, 1e9),
     "canceller_pulses": (2, 3),
     "adc_bits": (1, 24),
-    "step_count": (1, 8),
+    "step_count": (1, MAX_STEPS),
 }
 
 #: The same of every level [dB].
 LEVEL_BOUNDS_DB = (-200, 200)
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-MOST, le=MOST)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=MOST)]
-NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=MOST)]
-Level = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-200, le=200)]
-Aspect = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=90)]
-Share = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
+Real = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Number = Annotated[Real, Field(ge=-MOST, le=MOST)]
+Positive = Annotated[Real, Field(gt=0, le=MOST)]
+NotNegative = Annotated[Real, Field(ge=0, le=MOST)]
+Level = Annotated[Real, Field(ge=LEVEL_BOUNDS_DB[0], le=LEVEL_BOUNDS_DB[1])]
+Aspect = Annotated[Real, Field(ge=0, le=90)]
+Share = Annotated[Real, Field(ge=0, le=1)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=60)]
 
 
@@ -103,7 +106,7 @@ class RadarPart(Part):
     """The radar: carrier [Hz], PRF [Hz], pulses."""
 
     carrier_hz: Positive
-    prf_hz: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1e9)]
+    prf_hz: Annotated[Real, Field(gt=0, le=1e9)]
     pulses: Annotated[int, Field(strict=True, ge=1, le=10_000_000)]
 
     @field_validator("carrier_hz")
@@ -144,10 +147,10 @@ class RotorPart(Part):
     bearing_deg: Number = 0.0
     hub_phase_deg: Number = 0.0
     blade_amplitudes: tuple[NotNegative, ...] | None = None
-    edge_asymmetry: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1, le=1)] = 0.0
+    edge_asymmetry: Annotated[Real, Field(ge=-1, le=1)] = 0.0
     drift_hz_per_s: Number = 0.0
     wander_hz: NotNegative = 0.0
-    wander_rate_hz: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-6, le=MOST)] = 1.0
+    wander_rate_hz: Annotated[Real, Field(ge=1e-6, le=MOST)] = 1.0
     wander_phase_deg: Number = 0.0
 
     @model_validator(mode="after")
@@ -252,13 +255,13 @@ class BirdPart(TargetPart):
     mass_kg: Positive
     span_m: Positive | None = None
     area_m2: Positive | None = None
-    wingbeat_hz: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=100)] | None = None
+    wingbeat_hz: Annotated[Real, Field(gt=0, le=100)] | None = None
     wing_db: Level
     body_db: Level
     phase_deg: Number = 0.0
     heading_deg: Number = 0.0
-    elevation_deg: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-90, le=90)] = 20.0
-    stroke_scale: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=2)] = 1.0
+    elevation_deg: Annotated[Real, Field(ge=-90, le=90)] = 20.0
+    stroke_scale: Annotated[Real, Field(ge=0, le=2)] = 1.0
     down_stroke: Share = 0.3
     feather_weight: NotNegative = 0.3
     heave_m: NotNegative = 0.0

@@ -83,7 +83,7 @@ SPOILT_SHARE = 0.25
 SPURS = 3
 
 #: Most steps of a receiver's gain and phase within a record.
-STEPS = 8
+MAX_STEPS = 8
 
 
 class Receiver:
@@ -142,8 +142,8 @@ class Receiver:
         self.step_db = draws.value("step_db")
         self.step_rad = draws.value("step_rad")
         self.step_count = np.rint(draws.value("step_count"))
-        self.step_at = draws.uniform(STEPS)
-        self.step_shares = draws.uniform(2 * STEPS + 2)
+        self.step_at = draws.uniform(MAX_STEPS)
+        self.step_shares = draws.uniform(2 * MAX_STEPS + 2)
         self.limit_db = draws.value("limit_db")
         self.on = {name: chosen & faulty for name, chosen in on.items()}
 

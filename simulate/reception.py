@@ -5,11 +5,12 @@ from collections.abc import Collection
 from typing import Any
 
 import numpy as np
-from numpy.random import Generator, Philox, SeedSequence
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from .clutter import draw_clutter
 from .discretes import DISCRETES, draw_discrete
+from .generator import generator
 from .laws import LAWS, WIDTH, Draws
 from .parts import ClutterPart
 from .radar import Radar
@@ -22,9 +23,9 @@ from .target import mean_power
 USUAL = {"person": {"pace": 1.0, "pedalling": 0.0}, "ground": {"ground_law": 1.0}}
 
 
-def stream(seed: int, name: str) -> Generator:
+def generator_of(seed: int, name: str) -> Generator:
     """The generator of one part: it depends on the seed and the part's name alone."""
-    return Generator(Philox(SeedSequence(seed, spawn_key=(zlib.crc32(name.encode()),))))
+    return generator(seed, zlib.crc32(name.encode()))
 
 
 class Chosen(Draws):
@@ -64,13 +65,13 @@ def pulse_times_s(scene: Setting, seed: int) -> NDArray[np.float64]:
     """Instants of the pulses, with the PRF's jitter [s], shape (pulses,)."""
     times = scene.sight.times_s
     if scene.receiver.jitter_s:
-        times = times + scene.receiver.jitter_s * stream(seed, "jitter").standard_normal(len(times))
+        times = times + scene.receiver.jitter_s * generator_of(seed, "jitter").standard_normal(len(times))
     return times
 
 
 def clutter_echo(part: ClutterPart, radar: Radar, seed: int) -> tuple[NDArray[np.complex64], dict[str, Any], list[str]]:
     """Clutter of mean power `level_db`, what was drawn of it, and which of its `values` it has no use for."""
-    rng = stream(seed, part.name)
+    rng = generator_of(seed, part.name)
     draws = Chosen(rng.random((1, WIDTH)), USUAL.get(part.kind, {}) | part.values)
     if part.kind in DISCRETES:
         target = draw_discrete(draws, radar, part.kind)
@@ -102,7 +103,7 @@ class Reception:
 
     def __init__(self, scene: Setting, seed: int) -> None:
         part, self.radar, self._seed = scene.receiver, scene.sight, seed
-        draws = Chosen(stream(seed, "receiver").random((1, WIDTH)), part.values)
+        draws = Chosen(generator_of(seed, "receiver").random((1, WIDTH)), part.values)
         self.drawn = Receiver(draws)
         self.drawn.gain_db = np.zeros(1)  # the levels of a scene are those of its samples
         #: Names of fixed values that it has no use for.
@@ -123,7 +124,7 @@ class Reception:
         self.offset = np.complex64(0 if part.dc_db is None else 10 ** (part.dc_db / 20))
         self.noise = np.zeros((1, self.radar.pulses), np.complex64)
         if scene.noise:
-            white = stream(seed, "noise").standard_normal((1, self.radar.pulses, 2), dtype=np.float32)
+            white = generator_of(seed, "noise").standard_normal((1, self.radar.pulses, 2), dtype=np.float32)
             self.noise = white.view(np.complex64)[..., 0] * np.float32(np.sqrt(0.5))
 
     def receive(
@@ -137,6 +138,6 @@ class Reception:
             np.array(signal[None, :], np.complex64),
             np.zeros_like(self.noise) if quiet else self.noise,
             self.radar,
-            lambda effect: NormalsOf([stream(self._seed, f"receiver {effect}")]),
+            lambda effect: NormalsOf([generator_of(self._seed, f"receiver {effect}")]),
         )
         return iq[0].astype(np.complex64, copy=False)

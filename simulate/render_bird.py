@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.random import Generator, Philox, SeedSequence
 from numpy.typing import NDArray
 
 from .bird import wing_echo, wing_size, wingbeat_hz
 from .exact import range_echo
+from .generator import generator
 from .motion import TWO_PI
 from .parts import BirdPart
 from .radar import Radar
@@ -38,7 +38,7 @@ class Member:
 
 def members(part: BirdPart) -> list[Member]:
     """Birds of a part: the first is as the part says, the others are drawn by its `flock_seed`."""
-    rng = Generator(Philox(SeedSequence(part.flock_seed)))
+    rng = generator(part.flock_seed)
     birds = [Member(1.0, float(np.deg2rad(part.phase_deg)), 0.0, 0.0)]
     for _ in range(part.members - 1):
         beat, phase, place = rng.uniform(0.95, 1.05), rng.uniform(-np.pi, np.pi), rng.uniform(0, 3)

@@ -9,7 +9,7 @@ from bladewing.simulate import stream
 
 from ..inference import Classifier
 from ..labels import CLASSES
-from .scores import UNKNOWN, Answers, Truth
+from .scores import DECLINED, Answers, Truth
 
 PURPOSE = "report"
 
@@ -57,7 +57,7 @@ def ask(
         drawn["radar"].append(np.full(count, number))
         for name, classifier in classifiers.items():
             given = classifier.predict(some.iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
-            labels = np.array([index.get(str(label), UNKNOWN) for label in given.labels])
+            labels = np.array([index.get(str(label), DECLINED) for label in given.labels])
             probabilities, label, answered = said[name]
             probabilities.append(given.probabilities)
             label.append(labels)

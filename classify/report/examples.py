@@ -16,7 +16,7 @@ from .pictures import STFT_SETTINGS
 from .stft import STFT_BINS, frames, stft
 
 # The paper's middle window [samples] and its largest overlap.
-WINDOW, OVERLAP = 80, 0.9
+WINDOW, OVERLAP = STFT_SETTINGS[0]
 # Strong enough to see, weak enough to be honest [dB].
 SNR_SHOWN_DB = (5.0, 20.0)
 # ... and with a line this far over the noise, if any has one [dB].

@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
-from importlib import metadata, resources
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +27,12 @@ from ..files import read_bounded, result_folder, settle, write_together
 from ..gather import inputs_digest
 from ..inference import Classifier
 from ..labels import CLASSES
-from ..ladder import CASCADE, STAGES_KEY
-from ..limits import MOST_MODEL_BYTES, MOST_TEXT_BYTES
+from ..ladder import ACCOUNT, CASCADE, SHIPPED, STAGES_KEY
+from ..limits import MOST_TEXT_BYTES
+from ..model_file import model_names, read_model
 from ..parts import REPORT_PARTS, Parts
 from ..progress import Progress
 from ..stability.run import worst_of_each
-from ..training_account import ACCOUNT
 from ..training_config import TrainingConfig
 from . import cost, evaluate, scores, stft, storage, trade
 from .card import model_card
@@ -235,8 +235,7 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
         If the folder does not exist, or holds no model, one that cannot be used or one of a name that the report needs.
     """
     if folder is None:
-        shipped = resources.files("bladewing.models.pretrained").iterdir()
-        found = {entry.name[:-5]: entry.read_bytes() for entry in shipped if entry.name.endswith(".onnx")}
+        found = {name: read_model(name)[0] for name in model_names()}
     elif not folder.is_dir():
         raise BadInput(f"{folder}: not a folder: give the one that `bladewing train --out` wrote")
     else:
@@ -244,7 +243,7 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
             settle(folder)
         except PermissionError as error:
             raise unreadable(folder, error, "give a folder that can be read") from None
-        found = {path.stem: _content(path) for path in folder.glob("*.onnx")}
+        found = {path.stem: read_model(str(path))[0] for path in folder.glob("*.onnx")}
     for name, content in found.items():  # what cannot be used is told before anything is measured, by its file
         Classifier(content, source=name if folder is None else str(folder / f"{name}.onnx"))
     own = {*PICTURES, FEATURES, CASCADE, EIGHT_BITS}
@@ -259,8 +258,7 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
 
 def training_account(folder: Path | None) -> dict[str, Any] | None:
     """Read what `train.json` beside the models says of their training; None where there is none."""
-    place = folder if folder is not None else resources.files("bladewing.models.pretrained")
-    file = place.joinpath(ACCOUNT)
+    file = (SHIPPED if folder is None else folder).joinpath(ACCOUNT)
     try:
         content = file.read_bytes() if folder is None else read_bounded(folder / ACCOUNT, MOST_TEXT_BYTES)
         found: dict[str, Any] = json.loads(content)
@@ -277,13 +275,6 @@ def training_account(folder: Path | None) -> dict[str, Any] | None:
     except (KeyError, TypeError, AttributeError) as error:
         raise BadInput(f"{file}: not the account of a training ({error}): remove it or train again") from None
     return found
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return read_bounded(path, MOST_MODEL_BYTES)
-    except (OSError, ValueError) as error:
-        raise BadInput(f"{path}: the model cannot be read: {getattr(error, 'strerror', None) or error}") from None
 
 
 def run_report(

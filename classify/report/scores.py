@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from . import metrics
 
 # Answers are class numbers; this one stands for "unknown".
-UNKNOWN = -1
+DECLINED = -1
 FALSE_ALARM_RATE = 1e-2
 SNR_STEP_DB = 5.0
 #: Beyond lie records that hardly have noise, and moving parts that nobody could see.
@@ -62,7 +62,7 @@ class Answers:
     ----------
     probabilities : (n, classes) float
     label : (n,) int
-        Class number after the acceptance thresholds, `UNKNOWN` where the model declined.
+        Class number after the acceptance thresholds, `DECLINED` where the model declined.
     answered : (n,) bool
         False where the record was refused before the model saw it (outside the envelope, no signal).
     """
@@ -169,7 +169,7 @@ def _confusion(
     table = np.zeros((classes, classes), int)
     np.add.at(table, (label, best), 1)
     withheld = np.zeros((classes, classes + 1), int)
-    np.add.at(withheld, (label, np.where(accepted == UNKNOWN, classes, accepted)), 1)
+    np.add.at(withheld, (label, np.where(accepted == DECLINED, classes, accepted)), 1)
     return {"best": table.tolist(), "accepted": withheld.tolist()}
 
 
@@ -233,7 +233,7 @@ def _by_kind(
         for one in np.unique(kind[label == number]):
             chosen = (kind == one) & (label == number)
             called = {other: metrics.rate(best[chosen] == i) for i, other in enumerate(truth.classes)}
-            held_back = metrics.rate(accepted[chosen] == UNKNOWN)
+            held_back = metrics.rate(accepted[chosen] == DECLINED)
             declared = metrics.rate(accepted[chosen] == truth.classes.index("uav"))
             row = {"kind": str(one), "class": name, "called": called}
             rows.append({**row, "unknown": held_back, "declared_uav": declared})
@@ -242,7 +242,7 @@ def _by_kind(
 
 def _acceptance(truth: Truth, seen: NDArray[np.bool_], accepted: NDArray[np.intp]) -> dict[str, Any]:
     """Coverage, and accuracy of what was accepted, over the records seen."""
-    label, given = truth.label[seen], accepted != UNKNOWN
+    label, given = truth.label[seen], accepted != DECLINED
     hits = accepted == label
     return {
         "coverage": metrics.rate(given),

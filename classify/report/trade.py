@@ -25,7 +25,7 @@ def weigh_up(scores: Mapping[str, Mapping[str, Any]], cost: Sequence[Mapping[str
     list of dict
         One a batch size: ``batch``, ``points`` (``{"model", "cost_us", "balanced_accuracy", "front"}``, cheapest
         first) and ``budgets`` (``{"budget_us", "model", "cost_us", "balanced_accuracy"}``: the most accurate model
-        whose median cost keeps to the budget; None, and the cheapest model's name under ``cheapest``, if none does).
+        whose median cost keeps to the budget, None if none does; ``cheapest``, the cheapest model's name).
     """
     weighed = []
     for part in cost:

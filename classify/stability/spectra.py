@@ -12,14 +12,15 @@ from bladewing.features.chopping import CLIP_DB, cepstrum, noise_shape
 from bladewing.features.comb_levels import broad_power, comb_heights, comb_plan
 from bladewing.features.inputs import model_inputs
 from bladewing.features.notch import notch_mask, residual, strongest_bin
+from bladewing.features.samples import unit_scale
 from bladewing.features.schema import INPUT_SHAPES
 from bladewing.features.spectrum import (
     LEAST_FLOOR,
+    SPEED_OF_LIGHT_MPS,
     Spectrum,
     centred_power,
     doppler_spectrum,
     noise_floor,
-    unit_scale,
 )
 from bladewing.features.window import HANN, KAISER, Window
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ from scipy import fft
 from .cell import Cell, Outcome, sweep
 
 _CARRIER_HZ, _PRF_HZ = 10e9, 20e3
-_WAVELENGTH_M = 299_792_458.0 / _CARRIER_HZ
+_WAVELENGTH_M = SPEED_OF_LIGHT_MPS / _CARRIER_HZ
 
 _SCALE_GUARD = "scaled by a power of two to [0.5, 1) first: no digit changes, no square overflows or vanishes"
 _COUNTS = (2, 3, 16, 127, 1000, 1021, 8191, 65536)

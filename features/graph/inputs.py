@@ -7,9 +7,11 @@ import numpy as np
 from ..axis import pooling
 from ..change import PARTS, frame_starts, part_length
 from ..dropouts import LEAST_DISTINCT, LEAST_LOST
+from ..notch import LEAST_RESIDUAL
+from ..samples import LEAST_PART
 from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
-from ..spectrum import LEAST_PART, Spectrum, doppler_spectrum
-from ..vector import BANDS, SIGNIFICANT, radar_columns
+from ..spectrum import Spectrum, doppler_spectrum
+from ..vector import BANDS, EMPTIEST, LEAST_TURNS, SIGNIFICANT, radar_columns
 from ..window import HANN
 from .cadence import cadence_db
 from .comb_levels import comb_levels_db
@@ -181,7 +183,7 @@ def _feature_vector(
     over = (relative_power - 1.0).at_least(0.0)
     excess = over * kept
     energy = excess * (excess > float(SIGNIFICANT)).to(np.float32)
-    residual_db = 10.0 * log10(((relative_power * kept).sum() / kept.sum().at_least(1.0)).at_least(1e-2))
+    residual_db = 10.0 * log10(((relative_power * kept).sum() / kept.sum().at_least(1.0)).at_least(LEAST_RESIDUAL))
     width_hz = threshold_width_hz(radar, relative_power, kept)
     low, high, occupancy = energy_band(radar, energy)
     changes = change_levels_db(change, AXIS_BINS)
@@ -215,7 +217,7 @@ def _feature_vector(
         "centroid_swing_mps": centroid.std(),
         "centroid_drift_mps": (centroid.slice(PARTS - 1, PARTS) - centroid.slice(0, 1)).apply("Abs"),
         "busy_swing_db": parts_db.mean().squeeze().std(),
-        "empty_side_db": (10.0 * log10(left.at_least(1e-2) / right.at_least(1e-2))).apply("Abs"),
+        "empty_side_db": (10.0 * log10(left.at_least(EMPTIEST) / right.at_least(EMPTIEST))).apply("Abs"),
     }
     for names, levels in zip(BANDS, (strong, weak), strict=True):
         columns.update((name, levels.slice(i, i + 1)) for i, name in enumerate(names))
@@ -225,7 +227,7 @@ def _feature_vector(
         told = {
             "chopping_log": log10(frequency.at_least(1.0)),
             "chopping_step_mps": frequency * (radar.wavelength_m / 2),
-            "chopping_turns": log10((frequency * dwell_s).at_least(0.01)),
+            "chopping_turns": log10((frequency * dwell_s).at_least(LEAST_TURNS)),
             "chopping_orders": width_hz / frequency.at_least(1.0),
         }
         columns |= {name: graph.where(comb.given, value, 0.0) for name, value in told.items()}

@@ -9,7 +9,9 @@ import numpy as np
 
 from .. import bandwidth, chopping, notch, shape, smearing, vector
 from ..axis import UNSEEN_DB, axis_velocities_mps
-from ..spectrum import LOWEST_DB, Spectrum
+from ..change import CENTROID_DB
+from ..fast import LOWEST_DB
+from ..spectrum import Spectrum
 from .operators import Value
 from .spectrum import dft_power, to_db
 
@@ -146,7 +148,7 @@ def change_levels_db(change: Value, bins: int) -> Value:
 
 def centroid_mps(parts_db: Value, bins: int) -> Value:
     """As `change.centroid_mps`, shape (n, parts)."""
-    weight = (parts_db - 6.0).at_least(0.0)
+    weight = (parts_db - CENTROID_DB).at_least(0.0)
     sums = weight.graph.matmul(weight, axis_velocities_mps(bins)[:, None])
     return ratio(sums, weight.sum()).squeeze()
 
@@ -177,7 +179,7 @@ def cepstral_chopping(radar: Spectrum, level_db: Value, kept: Value) -> Chopping
     window = flat.slice(first, last + 1)
     searched = last + 1 - first
     even = 1 - searched % 2
-    rms = heights.slice(first, last + 1).ranked(searched // 2 - even, 1 + even).mean() / 0.8326
+    rms = heights.slice(first, last + 1).ranked(searched // 2 - even, 1 + even).mean() / chopping.MEDIAN_OVER_RMS
     highest = _evidence(flat, first, last, periods).argmax()
     peak, top = window.pick(highest), highest.to(np.float32) + float(first)
     least = (chopping.FUNDAMENTAL_SHARE * peak).at_least(chopping.FUNDAMENTAL_STRENGTH * rms)
@@ -230,6 +232,6 @@ def smearing_index(radar: Spectrum, energy: Value, body: Body, comb: Chopping) -
     x = x - ratio((weight * x).sum(), total)
     weight = weight * x
     variance, covariance = ratio((weight * x).sum(), total), ratio((weight * y).sum(), total)
-    slope = covariance / where(variance > 1e-3, variance, float("inf"))
+    slope = covariance / where(variance > smearing.LEAST_VARIANCE, variance, float("inf"))
     index = slope.at_least(0.0).at_most(smearing.FULLY_SMEARED**2).apply("Sqrt")
     return where((total > 0.0) & comb.given, index, 0.0)

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from .. import spectrum as definition
 from ..axis import UNSEEN_DB, Pooling
 from ..cadence import CadencePlan
+from ..fast import LOWEST_DB
 from ..window import Window
 from .operators import Value
 
@@ -112,8 +113,8 @@ def noise_shows(power: Value, floor: Value) -> Value:
     return power.mean() * float(definition.LEAST_FLOOR / definition.SHOWN_SHARE) < floor
 
 
-def to_db(relative_power: Value, lowest_db: float = definition.LOWEST_DB) -> Value:
-    """As `spectrum.to_db`."""
+def to_db(relative_power: Value, lowest_db: float = LOWEST_DB) -> Value:
+    """As `fast.to_db`."""
     return relative_power.at_least(10 ** (lowest_db / 10)).apply("Log") * (10 / np.log(10))
 
 

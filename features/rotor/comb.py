@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bodies import LINE_DB
 from ..chopping import CHOPPING_RANGE_HZ
 from ..lines import squared
 from .comb_centre import centred
@@ -27,10 +26,10 @@ from .past_edge import told_no_further
 from .periodogram import Periodogram
 from .wide_line import beside_line
 
-#: Score that chance alone exceeds in under 1 % of the records: of white noise; where a line was taken out; where the
-#: static background was, with its skirt, or in one channel, whose combs are sought about two places [nats]. Checked by
-#: tests/benchmarks/measurement_tables.py.
-THRESHOLDS = (18.0, 18.0, 25.0)
+#: Score that chance alone exceeds in under 1 % of the records: of white noise, also where a line was taken out; and
+#: where the static background was, with its skirt, or in one channel, whose combs are sought about two places [nats].
+#: Checked by tests/benchmarks/measurement_tables.py.
+THRESHOLD, THRESHOLD_AT_REST = 18.0, 25.0
 
 #: A rotor's lines reach at least so far from the body [m/s]; wings, limbs and wheels seldom do with so few lines.
 LEAST_REACH_MPS = 12.0
@@ -267,9 +266,7 @@ def _scores_near(data: Periodogram, fit: CombFit, spacings: NDArray[np.float64])
 
 def threshold(data: Periodogram) -> float:
     """Score a comb must exceed in this record [nats]."""
-    if data.rest_half > 0 or data.one_channel:
-        return THRESHOLDS[2]
-    return THRESHOLDS[1] if data.strong.centres_db[0] > LINE_DB else THRESHOLDS[0]
+    return THRESHOLD_AT_REST if data.rest_half > 0 or data.one_channel else THRESHOLD
 
 
 def _too_short(data: Periodogram) -> str:
@@ -301,7 +298,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     Parameters
     ----------
     data : Periodogram
-        From `prepare`.
+        From `prepared`.
     blades : int, optional
         Of a rotor.
 

@@ -153,8 +153,7 @@ def _one_sided(data: Periodogram, found: Candidate, best: Candidate, bonuses: di
     """
     if found.is_folded or data.one_channel:
         return {}
-    lines = zip(data.strong.centres, data.strong.centres_db, strict=True)
-    strong = [place for place, level_db in lines if level_db > LINE_DB and place in bonuses]
+    strong = [place for place, level_db in data.strong.lines if level_db > LINE_DB and place in bonuses]
     rivals, span = {}, best.high - best.low
     for place in strong:
         order = round((place - best.centre) / best.spacing)
@@ -228,10 +227,10 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
     highest_db = 10 * float(np.log10(power.max(initial=1.0)))
     others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
     moving = 0.0
-    centres, levels = data.strong.centres, data.strong.centres_db
+    centres = data.strong.centres
     # a line beside rest is a slow body's own, and hides no other
     hides = abs(centres[0]) * data.pulses < AT_REST_BINS and not any(_moves(data, line) for line in centres)
-    for centre, level_db in sorted(zip(centres, levels, strict=True), key=lambda line: -abs(line[0])):
+    for centre, level_db in sorted(data.strong.lines, key=lambda line: -abs(line[0])):
         if not _is_own(data, found, centre):
             continue
         is_line = _stands_out(data, np.array([centre]), 10 ** (level_db / 10))[0]

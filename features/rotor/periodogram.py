@@ -117,7 +117,7 @@ class Periodogram:
 
     @cached_property
     def contrast(self) -> Evidence:
-        """The same over what any place near by has, where lines fill that: see `octaves.over_neighbours`."""
+        """Evidence of a line in every bin, over what any place near by has where lines fill that: see `octaves`."""
         return Evidence(over_neighbours(line_evidence(self.power, self.block), self.block) * self.seen)
 
     @property

@@ -438,7 +438,7 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float, how: type[Separa
     """
     nominal, centre = comb.chopping, comb.fit.centre
     # one comb fitted to several finds its centre between them: a strong line near it tells better, if it is a body's
-    for line, level_db in zip(data.strong.centres, data.strong.centres_db, strict=True):
+    for line, level_db in data.strong.lines:
         if level_db > LINE_DB and abs(line - centre) * data.pulses < 1.5 and abs(line) > data.rest_half:
             centre = line
     reach = max(comb.last // comb.per_turn, int(np.clip(round(edge / nominal), 1, 0.45 / nominal)))

@@ -40,6 +40,11 @@ class StrongLines:
     centres: tuple[float, ...]
     centres_db: tuple[float, ...]
 
+    @property
+    def lines(self) -> tuple[tuple[float, float], ...]:
+        """Each line's place [cycles a sample] and level [dB]."""
+        return tuple(zip(self.centres, self.centres_db, strict=True))
+
 
 def strong_lines(spectrum: Spectrum) -> StrongLines:
     """Find the background at rest and the lines that may be a body's."""

@@ -103,8 +103,8 @@ def _image_of_lines(data: Periodogram, fit: CombFit, rest: LinesSeen, level: Lev
     """
 
     def line_at(place: float) -> float:
-        lines = zip(data.strong.centres, data.strong.centres_db, strict=True)
-        return max((10 ** (db / 10) for line, db in lines if abs(line - place) * data.pulses < 1), default=0.0)
+        near = (db for line, db in data.strong.lines if abs(line - place) * data.pulses < 1)
+        return max((10 ** (db / 10) for db in near), default=0.0)
 
     body, mirror = line_at(fit.centre), np.array([-fit.centre])
     if not body or not (line_at(-fit.centre) or data.usable(mirror)[0]):

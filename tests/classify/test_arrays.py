@@ -61,7 +61,7 @@ def test_the_only_complex_array_is_meant(put, suffix, content):
     np.testing.assert_array_equal(recording.iq, IQ)
 
 
-def test_version_4_mat_files_are_read(put, tmp_path):
+def test_version_4_mat_files_are_read(tmp_path):
     scipy.io.savemat(tmp_path / "old.mat", {"iq": IQ.astype(complex)}, format="4")
     np.testing.assert_array_equal(read_array(tmp_path / "old.mat").reshape(-1), IQ)
 

@@ -80,7 +80,7 @@ def test_usage_errors_are_one_line(calls, capsys, arguments, said):
     assert calls == []
 
 
-def test_an_option_without_its_value_points_to_no_other_help(calls, capsys):
+def test_an_option_without_its_value_points_to_no_other_help(capsys):
     assert main(["train", "--records"]) == 2
     assert capsys.readouterr().err.endswith(" (see --help)\n")
 

@@ -428,7 +428,7 @@ def test_a_name_that_the_output_cannot_hold_is_shown_escaped(tmp_path, uav_model
     assert r"h\xe9ron.npy" in done.stdout or r"h\u00e9ron.npy" in done.stdout
 
 
-def test_a_closed_pipe_ends_quietly(tmp_path, sigmf_pair, uav_model):
+def test_a_closed_pipe_ends_quietly(sigmf_pair, uav_model):
     meta = sigmf_pair()
     with subprocess.Popen(
         [*BLADEWING, "predict", "--json", str(meta), "--model", str(uav_model)],

@@ -84,7 +84,7 @@ def test_a_recording_that_was_not_simulated_is_not_written_over(scene_file, tmp_
     assert json.loads((tmp_path / "own.sigmf-meta").read_text())["global"]["bladewing:seed"] == 2
 
 
-def test_the_same_command_goes_on_after_it_was_killed_between_two_files(scene_file, tmp_path, monkeypatch, capsys):
+def test_the_same_command_goes_on_after_it_was_killed_between_two_files(scene_file, tmp_path, monkeypatch):
     replace, done = os.replace, []
 
     def once(source, target):

@@ -153,7 +153,7 @@ def test_killed_again_and_again_it_ends_with_the_bits_of_an_uninterrupted_run(wh
     assert content(folder) == content(whole)
 
 
-def test_a_full_disk_is_one_line_and_the_same_command_goes_on(whole, tmp_path, monkeypatch, capsys):
+def test_a_full_disk_is_one_line_and_the_same_command_goes_on(whole, tmp_path, monkeypatch):
     def full(descriptor):
         if len(list(tmp_path.glob("data/*.npy"))) == 3:
             raise OSError(28, "No space left on device")
@@ -178,7 +178,7 @@ def test_a_disk_that_is_too_small_is_refused_before_anything_is_drawn(tmp_path, 
     assert not list(tmp_path.iterdir())
 
 
-def test_one_writer_at_a_time(whole, tmp_path):
+def test_one_writer_at_a_time(whole):
     with only_writer(whole), pytest.raises(BadInput, match="another process is writing there"):
         write(whole)
 

@@ -316,7 +316,7 @@ def test_the_dwell_that_speaks_for_a_recording_is_clear_and_no_outlier():
     assert Measured.clearest(SimpleNamespace(values=values)) == 0
 
 
-def test_the_plot_of_silence_is_a_line_at_the_foot(tmp_path, capsys):
+def test_the_plot_of_silence_is_a_line_at_the_foot(tmp_path):
     np.save(tmp_path / "silence.npy", np.zeros(2000, np.complex64))
     target = tmp_path / "silence.svg"
     assert main(["measure", str(tmp_path / "silence.npy"), *RADAR, "--plot", str(target)]) == 0
@@ -326,7 +326,7 @@ def test_the_plot_of_silence_is_a_line_at_the_foot(tmp_path, capsys):
     assert not {"band", "comb", "2nd comb"} & words
 
 
-def test_a_long_name_is_shortened_in_its_middle_so_that_the_words_fit(tmp_path, capsys):
+def test_a_long_name_is_shortened_in_its_middle_so_that_the_words_fit(tmp_path):
     name = "2026-11-24T193412Z_" + 10 * "cell_" + 20 * "gate_" + "hover.npy"
     np.save(tmp_path / name, np.zeros(2000, np.complex64))
     target = tmp_path / "long.svg"

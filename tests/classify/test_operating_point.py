@@ -32,7 +32,7 @@ def test_the_rate_sets_the_threshold_on_uav_and_no_other(model):
     assert strict.operating_point == CURVE.points[1]
 
 
-def test_rates_that_cannot_be_kept_are_refused(model, uav_model, make_model):
+def test_rates_that_cannot_be_kept_are_refused(model, uav_model):
     with pytest.raises(BadInput, match=r"0\.001 cannot be supported by 2000 calibration records"):
         Classifier.load(model, max_false_alarm=0.001)
     with pytest.raises(BadInput, match="above 0 and below 1"):

@@ -20,7 +20,7 @@ def folder(tmp_path_factory):
     return folder
 
 
-def test_the_python_of_the_readme_runs_from_top_to_bottom(folder, monkeypatch, capsys):
+def test_the_python_of_the_readme_runs_from_top_to_bottom(folder, monkeypatch):
     monkeypatch.chdir(folder)
     blocks = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
     assert len(blocks) >= 5

@@ -168,7 +168,7 @@ def test_page_copes_with_one_model_without_answers(report: dict[str, Any]) -> No
         radar=np.zeros(120, int),
         beta_rad=np.full(120, np.nan),
     )
-    refused = scores.Answers(np.full((120, 3), 1 / 3), np.full(120, scores.UNKNOWN), np.zeros(120, bool))
+    refused = scores.Answers(np.full((120, 3), 1 / 3), np.full(120, scores.DECLINED), np.zeros(120, bool))
     lean["scores"] = {name: scores.score(truth, refused)}
     lean["records"] = scores.describe_records(truth)
     for part in lean["cost"]["batches"]:

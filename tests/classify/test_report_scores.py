@@ -2,7 +2,7 @@ import json
 
 import numpy as np
 import pytest
-from bladewing.classify.report.scores import SNR_RANGE_DB, UNKNOWN, Answers, Truth, describe_records, score
+from bladewing.classify.report.scores import DECLINED, SNR_RANGE_DB, Answers, Truth, describe_records, score
 from bladewing.classify.report.trade import weigh_up
 
 CLASSES = ("uav", "bird", "clutter")
@@ -27,7 +27,7 @@ def drawn(count: int = 300, seed: int = 0) -> tuple[Truth, Answers]:
     probabilities = np.exp(logits) / np.exp(logits).sum(axis=1, keepdims=True)
     best, answered = probabilities.argmax(axis=1), rng.random(count) < 0.9
     named = answered & (probabilities.max(axis=1) > 0.6)
-    return truth, Answers(probabilities, np.where(named, best, UNKNOWN), answered)
+    return truth, Answers(probabilities, np.where(named, best, DECLINED), answered)
 
 
 def test_scores_count_the_records_seen_and_tell_the_refused() -> None:
@@ -84,8 +84,8 @@ def test_every_kind_is_called_something_and_declined_answers_are_counted() -> No
     for row in found["by_kind"]:
         mine = seen & (truth.kind == row["kind"])
         assert sum(row["called"][name]["right"] for name in CLASSES) == np.sum(mine)
-        assert row["unknown"]["right"] == np.sum(answers.label[mine] == UNKNOWN)
-    accepted = seen & (answers.label != UNKNOWN)
+        assert row["unknown"]["right"] == np.sum(answers.label[mine] == DECLINED)
+    accepted = seen & (answers.label != DECLINED)
     assert found["acceptance"]["coverage"]["value"] == pytest.approx(np.sum(accepted) / np.sum(seen))
     right = answers.label[accepted] == truth.label[accepted]
     assert found["acceptance"]["accuracy"]["value"] == pytest.approx(np.mean(right))
@@ -95,13 +95,13 @@ def test_every_kind_is_called_something_and_declined_answers_are_counted() -> No
 def test_scores_of_lean_records_are_still_strict_json(case: str) -> None:
     truth, answers = drawn(48)
     if case == "nothing seen":
-        answers = Answers(answers.probabilities, np.full(48, UNKNOWN), np.zeros(48, bool))
+        answers = Answers(answers.probabilities, np.full(48, DECLINED), np.zeros(48, bool))
     elif case == "no SNR":
         truth = Truth(**{**vars(truth), "snr_db": np.full(48, np.nan)})
     elif case == "one class":
         truth = Truth(**{**vars(truth), "label": np.zeros(48, int), "kind": np.full(48, "quadcopter")})
     else:
-        answers = Answers(answers.probabilities, np.full(48, UNKNOWN), answers.answered)
+        answers = Answers(answers.probabilities, np.full(48, DECLINED), answers.answered)
     json.dumps(score(truth, answers), allow_nan=False)
     json.dumps(describe_records(truth), allow_nan=False)
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from bladewing.features import doppler_spectrum
 from bladewing.features.axis import LIMIT_MPS, UNSEEN_DB, axis_edges_mps, axis_velocities_mps, pooling
-from bladewing.features.spectrum import LOWEST_DB
+from bladewing.features.fast import LOWEST_DB
 from bladewing.features.window import HANN
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st

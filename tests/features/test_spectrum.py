@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from bladewing.features import doppler_spectrum
 from bladewing.features.notch import body_line
-from bladewing.features.spectrum import centred_power, noise_floor, unit_scale
+from bladewing.features.samples import unit_scale
+from bladewing.features.spectrum import centred_power, noise_floor
 from bladewing.features.window import HANN, KAISER
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -41,7 +41,7 @@ MUTATIONS = (
     ),
     Mutation(
         "records are scaled before they are squared",
-        "features/spectrum.py",
+        "features/samples.py",
         "return np.ldexp(np.float32(1), -np.minimum(np.maximum(exponent, -126), 126))",
         "return np.ones(exponent.shape, np.float32)",
         "tests/classify/test_stability.py -k features",

@@ -1,0 +1,129 @@
+"""What is asked of samples and of a radar before anything is computed of them, and the samples' safe scale."""
+
+import math
+from numbers import Real
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .fast import ones
+
+#: Of a radar [Hz]: beyond, a frequency was given in another unit.
+CARRIER_RANGE_HZ, PRF_RANGE_HZ = (1e8, 1e12), (1.0, 1e8)
+
+#: What is to be done about samples that are missing.
+FILL_IN = "interpolate them from their neighbours (zeros in their place, or a cut, would draw lines beside every line)"
+
+#: What is said of samples that are not finite.
+NOT_FINITE = f"iq holds values that are not finite: {FILL_IN}"
+
+#: What is said of samples that are finite, but not in complex64.
+TOO_LARGE = "iq holds values that are too large for complex64: lower the gain"
+
+#: A record whose largest part is below this has lost its digits among float32's denormal numbers: 9 bits are left here.
+LEAST_PART = 2.0**-140
+
+# Energies of a record: neither its lines, at most that strong, nor its floor leave float32.
+_SAFE_ENERGY = np.array(1e-14, np.float32), np.array(1e30, np.float32)
+
+# Without axes: to NumPy a number is one more thing to convert at every call.
+_ONE = np.array(1, np.float32)
+
+
+def as_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
+    """Samples as complex64; real ones would pass for a spectrum with two like sides, and a mask would be forgotten.
+
+    Raises
+    ------
+    ValueError
+        If they are not complex, some are masked, or the last axis holds fewer than `least` pulses.
+    """
+    if np.ma.is_masked(iq):
+        raise ValueError(f"iq holds masked samples: {FILL_IN}")
+    try:
+        samples = np.asarray(iq)
+    except ValueError:
+        raise ValueError("iq holds rows of unequal length: every record must have as many pulses") from None
+    if samples.dtype.kind != "c":
+        raise ValueError(f"iq holds {samples.dtype}: its samples must be complex, I + jQ")
+    if samples.ndim < 1 or samples.shape[-1] < least:
+        pulses = f"{least} pulse{'s' * (least > 1)}"
+        raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least {pulses}")
+    if samples.dtype == np.complex64:
+        return samples
+    with np.errstate(over="ignore"):  # what overflows is not finite, and found as that
+        return samples.astype(np.complex64)
+
+
+def finite_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
+    """Samples as complex64, all of them finite.
+
+    Raises
+    ------
+    ValueError
+        If they are not complex or not finite, some are masked, or the last axis holds fewer than `least` pulses.
+    """
+    samples = as_complex(iq, least)
+    if not np.isfinite(samples).all():
+        raise ValueError(NOT_FINITE if not np.isfinite(iq).all() else TOO_LARGE)
+    return samples
+
+
+def require_radar(carrier_hz: float, prf_hz: float) -> tuple[float, float]:
+    """Both frequencies [Hz] in float64, as phases need them; what is none is refused."""
+    for name, value in (("carrier_hz", carrier_hz), ("prf_hz", prf_hz)):
+        is_one = isinstance(value, Real) or (isinstance(value, np.ndarray) and value.ndim == 0)
+        if not (is_one and math.isfinite(value) and value > 0):
+            raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
+    return float(carrier_hz), float(prf_hz)
+
+
+def beyond_radars(carrier_hz: float, prf_hz: float) -> str:
+    """Which of both is no frequency of a radar, and the rule; empty where both are."""
+    for name, value, (low, high) in (("carrier", carrier_hz, CARRIER_RANGE_HZ), ("PRF", prf_hz, PRF_RANGE_HZ)):
+        if not low <= value <= high:
+            return f"the {name} is {value:g} Hz: it must be {low:g} to {high:g} Hz"
+    return ""
+
+
+def largest_part(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """Largest real or imaginary part of each record, by magnitude, shape (...)."""
+    parts = np.ascontiguousarray(iq).view(np.float32)
+    return np.maximum.reduce(np.abs(parts), axis=-1)
+
+
+def unit_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """Power of two that brings each record's largest part into [0.5, 1), shape (..., 1); 1 for an all-zero record.
+
+    A power of two changes no digit, so results do not depend on the gain; the square of the scaled samples can neither
+    overflow nor vanish.
+
+    Raises
+    ------
+    ValueError
+        If a sample is not finite.
+    """
+    largest = largest_part(iq)
+    if not np.isfinite(largest).all():
+        raise ValueError(NOT_FINITE)
+    _, exponent = np.frexp(largest[..., None])
+    return np.ldexp(np.float32(1), -np.minimum(np.maximum(exponent, -126), 126))
+
+
+def safe_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """`unit_scale` of the records that need it, 1 of the others: it changes no digit, and to scale is a pass more."""
+    parts = np.ascontiguousarray(iq).view(np.float32)
+    with np.errstate(over="ignore", under="ignore"):
+        energy = np.vecdot(parts, parts)
+    least, most = _SAFE_ENERGY
+    safe = (energy > least) & (energy < most)
+    if np.count_nonzero(safe) == energy.size:
+        return ones(energy.size).reshape(*energy.shape, 1)
+    return np.where(safe[..., None], np.float32(1), unit_scale(iq))
+
+
+def scaled(iq: NDArray[np.complex64], scale: NDArray[np.float32]) -> NDArray[np.complex64]:
+    """Samples times a real factor a record: part by part, for half the price of a complex product."""
+    if np.count_nonzero(scale == _ONE) == scale.size:
+        return np.ascontiguousarray(iq)
+    return (np.ascontiguousarray(iq).view(np.float32) * scale).view(np.complex64)
