@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from bladewing.features import INPUT_SHAPES, schema_hash
-from bladewing.models import LADDER
+from bladewing.models import LADDER, TEACHER
 from bladewing.simulate.dataset import KIND_CLASS
 from numpy.typing import NDArray
 
@@ -121,14 +121,12 @@ def _train_all(
         models: dict[str, dict[str, Any]] = {}
 
         @cache
-        def told_by(teacher: str) -> NDArray[np.float32]:
-            """What a trained network says of the training records, once for all of its pupils."""
-            return Classifier(files[f"{teacher}.onnx"], source=teacher).kind_shares(sets.train.inputs)
+        def told() -> NDArray[np.float32]:
+            """What the teacher says of the training records, once for all of its pupils."""
+            return Classifier(files[f"{TEACHER}.onnx"], source=TEACHER).kind_shares(sets.train.inputs)
 
-        teachers_first = sorted(settings.models, key=lambda name: bool(LADDER[name].teacher))
-        for name in teachers_first:
-            teacher = LADDER[name].teacher
-            taught = partial(told_by, teacher) if teacher in models else None
+        for name in sorted(settings.models, key=lambda name: name != TEACHER):
+            taught = told if TEACHER in models else None
             with bars.phase(f"train {name}", 1) as on_fraction:
                 files[f"{name}.onnx"], models[name] = _take_or_train(name, settings, sets, on_fraction, parts, taught)
         models = {name: models[name] for name in settings.models}

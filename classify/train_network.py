@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from bladewing.features import INPUT_SHAPES
-from bladewing.models import LADDER
+from bladewing.models import LADDER, TEACHER
 from bladewing.simulate.dataset import KIND_CLASS
 from numpy.typing import NDArray
 
@@ -71,7 +71,7 @@ def train_net(
     net.compact()
     detail = {
         "device": result.device,
-        "teacher": LADDER[name].teacher if taught else "",
+        "teacher": TEACHER if taught else "",
         "best_epoch": result.best_epoch,
         "stopped_early": result.stopped_early,
         "seconds": round(result.seconds, 1),  # of all epochs, those before an interruption too

@@ -5,6 +5,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from bladewing.models import TEACHER
 from bladewing.models.calibration import expected_calibration_error
 from bladewing.simulate import Radar, draw_records
 from scipy import fft
@@ -44,17 +45,18 @@ def add_costs(
     -------
     dict or None
         The names of its two models, how many test records the second is asked about, its figures on them, its cost and
-        its thresholds; None where one model is both the cheapest and the best.
+        its thresholds; None where one model is both the cheapest and the best. The teacher is none of them.
     """
     classifiers = {name: Classifier(files[f"{name}.onnx"], source=name) for name in models}
     for name, cost in costs_ffts(classifiers).items():
         models[name][COST_KEY] = round(cost, 1)
     chosen_by = {}
     for name, classifier in classifiers.items():
-        said, accept = classifier.from_inputs(calibrate.inputs), np.asarray(classifier.accept)
-        chosen_by[name] = models[name] | {"test": figures(said, calibrate.labels, accept, false_alarm)}
-    stages = [by_place(place, chosen_by) for place in ("fast", "best")]
-    if stages[0] == stages[1]:
+        if name != TEACHER:  # which is asked by nobody else
+            said, accept = classifier.from_inputs(calibrate.inputs), np.asarray(classifier.accept)
+            chosen_by[name] = models[name] | {"test": figures(said, calibrate.labels, accept, false_alarm)}
+    stages = [by_place(place, chosen_by) for place in ("fast", "best") if chosen_by]
+    if len(set(stages)) < 2:
         return None
     first, second = ((files[f"{name}.onnx"], name) for name in stages)
     cascade = Cascade(first, second)

@@ -1,4 +1,4 @@
-"""Take every model out of models/pretrained that another beats in accuracy at less cost: python docs/keep_front.py.
+"""Take out of models/pretrained the teacher and what another beats in accuracy at less cost: python docs/keep_front.py.
 
 `train.json` keeps the accounts of all, so that the front can be read there.
 """
@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 from bladewing.classify.ladder import CASCADE, STAGES_KEY, front
+from bladewing.models import TEACHER
 
 PRETRAINED = Path(__file__).parents[1] / "models" / "pretrained"
 
@@ -14,7 +15,7 @@ PRETRAINED = Path(__file__).parents[1] / "models" / "pretrained"
 def main() -> None:
     """Remove the files."""
     told = json.loads((PRETRAINED / "train.json").read_text(encoding="utf-8"))
-    kept = {name for name, _ in front(told["models"])}
+    kept = {name for name, _ in front({name: model for name, model in told["models"].items() if name != TEACHER})}
     if told[CASCADE]:
         kept |= set(told[CASCADE][STAGES_KEY])
     beaten = [file for file in PRETRAINED.glob("*.onnx") if file.stem not in kept]

@@ -75,9 +75,10 @@ class Measurements:
     gear_reason : ndarray of str
         Why there is no second comb; empty where there is one.
     band_reason : ndarray of str
-        Why there is a comb but no band, tip speed and blade length: its lines fill the unambiguous span, where they end
-        is lost in the noise, or a single channel has both sides of the body folded onto one. Or why there is a band but
-        neither tip speed nor blade length: at the beta given the tips were faster than any blade's. Else empty.
+        Why there is a comb but no band, tip speed and blade length: its lines fill the unambiguous span, or blades
+        still flash past them; they reach further from the body than any blade's tip; where they end is lost in the
+        noise; or a single channel has both sides of the body folded onto one. Or why there is a band but neither tip
+        speed nor blade length: at the beta given the tips were faster than any blade's. Else empty.
     """
 
     body_velocity_mps: NDArray[np.float64]

@@ -42,26 +42,29 @@ class Rung:
         Names of what it reads; a network's signal first.
     widen
         Factor on the channels of a network.
-    teacher
-        Network whose answers it learns from besides the labels, where that is trained in the same run; "": none.
     """
 
     learner: Literal["linear", "boosted", "network"]
     inputs: tuple[str, ...]
     widen: float = 1.0
-    teacher: str = ""
 
+
+_ALL_EVIDENCE = ("spectrum", "cadence", "combs", "features")
 
 LADDER: dict[str, Rung] = {
     "features-linear": Rung("linear", ("features",)),
     "features-boosted": Rung("boosted", ("features",)),
-    "spectrum-cnn-fast": Rung("network", ("levels", "cadence", "combs"), teacher="spectrum-cnn-wide"),
-    "spectrum-cnn": Rung("network", ("spectrum", "cadence", "combs", "features"), teacher="spectrum-cnn-wide"),
-    "spectrum-cnn-wide": Rung("network", ("spectrum", "cadence", "combs", "features"), widen=3),
+    "spectrum-cnn-fast": Rung("network", ("levels", "cadence", "combs")),
+    "spectrum-cnn": Rung("network", _ALL_EVIDENCE),
+    "spectrum-cnn-wide": Rung("network", _ALL_EVIDENCE, widen=2),
+    "spectrum-cnn-teacher": Rung("network", _ALL_EVIDENCE, widen=3),
     "joint-boosted": Rung("boosted", ("joint_features",)),
-    "image-cnn": Rung("network", ("image", "joint_features"), teacher="spectrum-cnn-wide"),
+    "image-cnn": Rung("network", ("image", "joint_features")),
 }
 """Name of a model (the stem of its file) to what it is."""
+
+TEACHER = "spectrum-cnn-teacher"
+"""The network whose answers the others learn from besides the labels, where it is trained in the same run."""
 
 DEFAULT_MODEL = "spectrum-cnn-wide"
 """The model that is used where none is named."""

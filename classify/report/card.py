@@ -174,8 +174,8 @@ def _training(report: Mapping[str, Any]) -> str:
     )
     if given is None:
         return f"{drawn} There is no account of how these models were trained."
+    took = "" if given.get("resumed") else f"; {number(given['seconds'])} s"  # what went before is not in it
     return (
         f"{drawn} {count(given['records']['train'])} records, seed {given['settings']['seed']}, and "
-        f"{count(given['records']['calibrate'])} others to calibrate; {number(given['seconds'])} s"
-        f"{' since an interruption' if given.get('resumed') else ''}."
+        f"{count(given['records']['calibrate'])} others to calibrate{took}."
     )

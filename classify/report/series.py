@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from bladewing.models import LADDER as _KNOWN
+from bladewing.models import TEACHER
 
 from ..ladder import CASCADE
 from .svg import MARKERS, SERIES
 
 # From cheap to dear, as the tables list them. A known model keeps its look whatever else is on the page.
-LADDER = (*_KNOWN, CASCADE)
+LADDER = (*(name for name in _KNOWN if name != TEACHER), CASCADE)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from bladewing.classify.cli import main
 FOLDER = Path(__file__).parents[3] / "shared" / "recordings"
 RECORDINGS = sorted(FOLDER.glob("*.sigmf-meta"))
 
-pytestmark = pytest.mark.skipif(not RECORDINGS, reason=f"no measured recordings in ../shared/{FOLDER.name}: not tested")
+pytestmark = pytest.mark.skipif(not RECORDINGS, reason="no measured recordings: not tested")
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bladewing.classify import Classifier, train
+from bladewing.classify import Classifier, train, training_costs
 from bladewing.classify.cli import main
 from bladewing.classify.errors import BadInput
 from bladewing.classify.gather import Gathered, TrainingSets, gather
@@ -20,7 +20,7 @@ from bladewing.classify.train_network import CLASS_OF_KIND, kinds_of, train_net
 from bladewing.classify.training_account import figures
 from bladewing.classify.training_config import TrainingConfig, training_config
 from bladewing.features import INPUT_SHAPES
-from bladewing.models import tabular, training
+from bladewing.models import TEACHER, tabular, training
 from bladewing.models.operating import least_named
 from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.dataset import KIND_CLASS
@@ -224,17 +224,32 @@ def _same_models(names, *folders):
 
 
 def test_a_pupil_learns_from_its_teacher_after_it_and_an_interruption_changes_nothing(whole, tmp_path):
-    names = ("spectrum-cnn", "spectrum-cnn-wide")
+    names = ("spectrum-cnn", "spectrum-cnn-teacher")
     outs = tmp_path / "straight", tmp_path / "interrupted"
     for out in outs:
         out.mkdir()
     straight = _run(outs[0], models=names)["models"]
     assert list(straight) == list(names)
-    assert [straight[name]["teacher"] for name in names] == ["spectrum-cnn-wide", ""]
+    assert [straight[name]["teacher"] for name in names] == ["spectrum-cnn-teacher", ""]
     taught = (outs[0] / "spectrum-cnn.onnx").read_bytes()
     assert taught != (whole / "spectrum-cnn.onnx").read_bytes()
-    assert "spectrum-cnn-wide" in _stopped_once(outs[1], "spectrum-cnn-epochs", after=2, models=names)
+    assert "spectrum-cnn-teacher" in _stopped_once(outs[1], "spectrum-cnn-epochs", after=2, models=names)
     _same_models(names, *outs)
+
+
+def test_the_teacher_has_costs_and_stands_in_no_cascade(whole, monkeypatch):
+    sets, linear = _few_sets(), (whole / "features-linear.onnx").read_bytes()
+    # the classes lie apart so evenly here that the line, which is called dear, is the more accurate
+    prices = {"features-linear": 9.0, "spectrum-cnn": 5.0, TEACHER: 5.0, "cascade": 7.0}
+    monkeypatch.setattr(training_costs, "costs_ffts", lambda asked: {name: prices[name] for name in asked})
+    stages = {}
+    for name in ("spectrum-cnn", TEACHER):
+        files = {"features-linear.onnx": linear, f"{name}.onnx": (whole / "spectrum-cnn.onnx").read_bytes()}
+        models = {"features-linear": {}, name: {}}
+        cascade = training_costs.add_costs(files, models, sets.calibrate, sets.test, SETTINGS.false_alarm)
+        stages[name] = cascade["stages"] if cascade else None
+        assert models[name] == {"cost_ffts": prices[name]}
+    assert stages == {"spectrum-cnn": ["spectrum-cnn", "features-linear"], TEACHER: None}
 
 
 def test_what_a_model_tells_of_kinds_adds_up_to_its_classes_and_noise_is_one_of_them(whole):

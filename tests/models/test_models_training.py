@@ -220,13 +220,15 @@ def test_training_is_the_same_to_the_bit_for_a_seed_and_differs_for_another():
     assert not torch.equal(first.head[0].weight, other.head[0].weight)
 
 
-def test_one_thread_works_however_many_there_are_and_all_are_given_back():
+@pytest.mark.parametrize(("wide", "held"), [(10**9, 1), (1, 2)])
+def test_few_threads_work_however_many_there_are_and_all_are_given_back(wide, held, monkeypatch):
     threads, seen = torch.get_num_threads(), []
+    monkeypatch.setattr(training, "WIDE", wide)
     try:
         torch.set_num_threads(3)
         net, _ = _trained(on_epoch=lambda *_: seen.append(torch.get_num_threads()))
         network_scores(net, _spectra(10, 4)[0])
-        assert set(seen) == {1}
+        assert set(seen) == {held}
         assert torch.get_num_threads() == 3
     finally:
         torch.set_num_threads(threads)
