@@ -16,7 +16,7 @@ from bladewing.models import DEFAULT_MODEL
 from .errors import BadInput, Interrupted
 from .exits import complain, exit_code, mend_streams
 from .files import no_empty_folder
-from .limits import LEAST_RECORDS
+from .limits import DWELL_S, LEAST_RECORDS
 from .terminal import console
 
 app = typer.Typer(
@@ -114,7 +114,7 @@ def predict(
             show_default=False,
         ),
     ] = None,
-    dwell: DwellS = 0.08,
+    dwell: DwellS = DWELL_S,
     carrier_hz: CarrierHz = None,
     prf_hz: PrfHz = None,
     variable: Variable = None,
@@ -165,7 +165,7 @@ def measure(
             show_default=False,
         ),
     ] = None,
-    dwell: MeasuredDwellS = 0.08,
+    dwell: MeasuredDwellS = DWELL_S,
     plot: Annotated[
         Path | None,
         _path_option("FILE.svg", "Draw the clearest dwell: spectrum, comb, band and notch."),

@@ -1,4 +1,4 @@
-"""Limits of what is read and asked for: what a file may hold, what a packed one may unpack to, the fewest records."""
+"""What is asked for where nothing is said, and limits: of files, what packed ones unpack to, records and seeds."""
 
 import bz2
 import io
@@ -20,6 +20,9 @@ MOST_TEXT_BYTES = 16 << 20
 
 #: Largest model [bytes].
 MOST_MODEL_BYTES = 1 << 28
+
+#: Length of a dwell where none is asked for [s]; the paper's.
+DWELL_S = 0.08
 
 #: Fewest records that can be trained on: of every kind the other three sets must hold some.
 LEAST_RECORDS = 600

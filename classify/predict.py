@@ -14,6 +14,7 @@ from .envelope import require_hertz
 from .errors import BadInput, one_line
 from .fusion import LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
+from .limits import DWELL_S
 from .recording import Recording
 from .samples import positive
 from .terminal import counted, print_table, print_words
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from .inference import Classifier, Prediction
-
-DWELL_S = 0.08
-"""Default length of a dwell [s]."""
 
 LONG_S = 5.0
 """How much of a recording, from its start, what only a long look shows is sought in [s]."""

@@ -14,18 +14,12 @@ from scipy.special import gammaln, spherical_jn
 
 from .blades import row_m
 from .exact import hub_range_m
+from .fidelity import CLOSED_FORM, Fidelity, centre_range_m
 from .motion import TWO_PI
 from .parts import BirdPart, RotorPart, UavPart
 from .radar import Radar
 from .render_bird import bird_echo, bird_parts_echo, heave_range_m, members
-from .render_uav import (
-    UAV_EFFECTS,
-    Fidelity,
-    centre_range_m,
-    rotor_angle_rad,
-    uav_echo,
-    vibration_rad,
-)
+from .render_uav import rotor_angle_rad, uav_echo, vibration_rad
 
 Amplitude = NDArray[np.float64]
 
@@ -87,7 +81,7 @@ class UavBounds:
         self.centre_m = centre_range_m(part, self.times_s, True)
 
     def of(self, effect: str) -> Amplitude:
-        """Bound of leaving out one of `render_uav.UAV_EFFECTS`."""
+        """Bound of leaving out one of `fidelity.UAV_EFFECTS`."""
         bounds = {
             "blade_curvature": self.blade_curvature,
             "hub_curvature": self.hub_curvature,
@@ -153,8 +147,7 @@ class UavBounds:
     @cached_property
     def level(self) -> Amplitude:
         """Most that the whole echo's amplitude can be, with every effect."""
-        straight = Fidelity(frozenset(UAV_EFFECTS) - {"blade_curvature"}, None)
-        return np.abs(uav_echo(self.part, self.radar, self.times_s, straight)) + self.blade_curvature()
+        return np.abs(uav_echo(self.part, self.radar, self.times_s, CLOSED_FORM)) + self.blade_curvature()
 
     def _apart(self, path_rad: Amplitude) -> Amplitude:
         """What scatterers off the line of sight add to a turn of the whole echo: they move a little less than it."""
@@ -270,11 +263,11 @@ def gauss_error(points: int, half_phase_rad: Amplitude) -> Amplitude:
 
 
 def bird_bound(part: BirdPart, radar: Radar, effect: str, times_s: Amplitude | None = None) -> Amplitude:
-    """Bound of leaving out one of `render_bird.BIRD_EFFECTS`, shape (pulses,), at even instants or at these."""
+    """Bound of leaving out one of `fidelity.BIRD_EFFECTS`, shape (pulses,), at even instants or at these."""
     times = radar.times_s if times_s is None else times_s
     wavenumber = 2 * TWO_PI / radar.wavelength_m
     if effect == "acceleration":
-        echo = bird_echo(part, radar, times, Fidelity(frozenset({"heave"}), None))
+        echo = bird_echo(part, radar, times, Fidelity(frozenset({"heave"})))
         return np.abs(echo) * chord(wavenumber * part.acceleration_mps2 * times**2 / 2)
     out = np.zeros(len(times))
     for bird in members(part):

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bounds import Amplitude, UavBounds
+from .fidelity import CLOSED_FORM, WHOLE_BIRD
 from .reception import Reception, clutter_echo, pulse_times_s
-from .render_bird import BIRD_EFFECTS, bird_echo
-from .render_uav import UAV_EFFECTS, Fidelity, uav_echo
+from .render_bird import bird_echo
+from .render_uav import uav_echo
 from .setting import Setting
 
 #: Effects of a receiver in the order in which a signal meets them.
@@ -63,12 +64,11 @@ class ReceiverBounds:
 
     def _signal_at(self, times: NDArray[np.float64]) -> NDArray[np.complex64]:
         scene, radar = self._scene, self._scene.sight
-        straight = Fidelity(frozenset(UAV_EFFECTS) - {"blade_curvature"}, None)
         signal = np.zeros(radar.pulses, np.complex128)
         for uav in scene.uavs:
-            signal += uav_echo(uav, radar, times, straight)
+            signal += uav_echo(uav, radar, times, CLOSED_FORM)
         for bird in scene.birds:
-            signal += bird_echo(bird, radar, times, Fidelity(frozenset(BIRD_EFFECTS), None))
+            signal += bird_echo(bird, radar, times, WHOLE_BIRD)
         for part in scene.clutters:
             signal += clutter_echo(part, radar, self._seed)[0]
         return signal.astype(np.complex64)
@@ -140,9 +140,8 @@ class ReceiverBounds:
         radar = self._scene.sight
         even, true = radar.times_s, pulse_times_s(self._scene, self._seed)
         changed = sum((bounds.jitter(even) for bounds in self._uavs.values()), np.zeros(radar.pulses))
-        every = Fidelity(frozenset(BIRD_EFFECTS), None)
         for bird in self._scene.birds:
-            changed += np.abs(bird_echo(bird, radar, true, every) - bird_echo(bird, radar, even, every))
+            changed += np.abs(bird_echo(bird, radar, true, WHOLE_BIRD) - bird_echo(bird, radar, even, WHOLE_BIRD))
         before = tuple(effect for effect in self.effects if effect != "converter")
         seen = self.reception.receive(self._signal, before) - self.reception.receive(self._signal_at(even), before)
         return min(self.total_gain * _norm(changed), _norm(seen) + 2 * self.total_gain * self._missed)

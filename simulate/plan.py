@@ -16,11 +16,11 @@ import numpy as np
 
 from .bounds import UavBounds, bird_bound
 from .bounds_receiver import ReceiverBounds
+from .fidelity import BIRD_EFFECTS, UAV_EFFECTS, Fidelity
 from .parts import UavPart
 from .radar import Radar, whole
 from .reception import pulse_times_s
-from .render_bird import BIRD_EFFECTS
-from .render_uav import UAV_EFFECTS, Fidelity, full_fidelity
+from .render_uav import full_fidelity
 from .setting import Setting
 
 #: Without receiver noise, what is compared with: the digits of complex64, this far under the strongest target.
@@ -185,7 +185,7 @@ def make_plan(scene: Setting, seed: int = 0, *, tolerance_db: float = -10.0) -> 
         notes += [_renderer(uav, radar, points), _aliasing(uav, radar)]
     for bird in scene.birds:
         kept = frozenset(effect for effect in BIRD_EFFECTS if (bird.name, effect) not in dropped)
-        fidelity[bird.name] = Fidelity(kept, None)
+        fidelity[bird.name] = Fidelity(kept)
     decisions = tuple(Decision(*key, _db(error**2), key not in dropped) for key, error in errors.items())
     kept_by_receiver = frozenset(effect for part, effect in errors.keys() - dropped if part == "receiver")
     return Plan(tolerance_db, _db(used**2), decisions, fidelity, kept_by_receiver, tuple(notes))

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .fidelity import WHOLE_BIRD
 from .plan import Plan
 from .radar import Radar, whole
 from .reception import Reception, clutter_echo, pulse_times_s
-from .render_bird import BIRD_EFFECTS, bird_echo, bird_truth
-from .render_uav import Fidelity, full_fidelity, uav_echo, uav_truth
+from .render_bird import bird_echo, bird_truth
+from .render_uav import full_fidelity, uav_echo, uav_truth
 from .setting import Setting
 
 
@@ -79,7 +80,7 @@ def render(
         signal += uav_echo(uav, radar, times, how)
         rendered(uav_truth(uav))
     for bird in scene.birds:
-        how = plan.fidelity[bird.name] if plan else Fidelity(frozenset(BIRD_EFFECTS), None)
+        how = plan.fidelity[bird.name] if plan else WHOLE_BIRD
         signal += bird_echo(bird, radar, times, how)
         rendered(bird_truth(bird))
     warnings = scene.warnings()

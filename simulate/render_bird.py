@@ -8,14 +8,11 @@ from numpy.typing import NDArray
 
 from .bird import wing_echo, wing_size, wingbeat_hz
 from .exact import range_echo
+from .fidelity import Fidelity, centre_range_m
 from .generator import generator
 from .motion import TWO_PI
 from .parts import BirdPart
 from .radar import Radar
-from .render_uav import Fidelity, centre_range_m
-
-#: Effects that a plan may leave out of a bird.
-BIRD_EFFECTS = ("acceleration", "heave")
 
 
 def bird_wingbeat_hz(part: BirdPart) -> float:

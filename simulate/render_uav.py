@@ -1,6 +1,5 @@
 """Rendering of a scene's UAVs: exact or far ranges, closed-form or dense blades, as a fidelity says."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,30 +7,11 @@ from numpy.typing import NDArray
 
 from .blades import row_m
 from .exact import BladePoints, blade_points, dense_rotor_echo, hub_range_m, range_echo
+from .fidelity import UAV_EFFECTS, Fidelity, centre_range_m
 from .motion import TWO_PI, range_phasor
-from .parts import BirdPart, RotorPart, UavPart
+from .parts import RotorPart, UavPart
 from .radar import Radar
 from .rotor import RotorMotion, rotor_echo
-
-#: Effects that a plan may leave out of a UAV.
-UAV_EFFECTS = ("blade_curvature", "hub_curvature", "acceleration", "vibration", "wander")
-
-
-@dataclass(frozen=True)
-class Fidelity:
-    """How one target is rendered.
-
-    Parameters
-    ----------
-    effects : frozenset of str
-        Which of its effects are kept.
-    points : int or None
-        Point scatterers that stand for a line, in float64 (a row has its own); None for the closed form of a blade,
-        which has no range curvature along it.
-    """
-
-    effects: frozenset[str]
-    points: int | None
 
 
 def full_fidelity(part: UavPart, radar: Radar) -> Fidelity:
@@ -39,12 +19,6 @@ def full_fidelity(part: UavPart, radar: Radar) -> Fidelity:
     longest = max((r.blade_length_m - r.root_m for r in part.rotors if not r.points), default=0.0)
     phase = 2 * TWO_PI * longest / radar.wavelength_m
     return Fidelity(frozenset(UAV_EFFECTS), int(phase / 4 + 6 * np.cbrt(phase)) + 30)
-
-
-def centre_range_m(part: UavPart | BirdPart, times_s: NDArray[np.float64], accelerates: bool) -> NDArray[np.float64]:
-    """Range of a target's centre [m], shape (pulses,)."""
-    acceleration = part.acceleration_mps2 if accelerates else 0.0
-    return part.range_m + times_s * (part.velocity_mps + 0.5 * acceleration * times_s)
 
 
 def rotor_angle_rad(rotor: RotorPart, times_s: NDArray[np.float64], wanders: bool) -> NDArray[np.float64]:

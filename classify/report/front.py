@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..labels import CLASSES
 from ..ladder import non_dominated
+from ..limits import DWELL_S
 from ..parts import Parts
 from ..timing import Work, quote, ratio, time_in_turns
 from . import choices, metrics
@@ -35,8 +36,6 @@ from .storage import RECORDS_QUOTED
 BUDGETS_US = (50.0, 200.0, 1000.0)
 #: "Time to declare": the dwell at which so many of the UAVs over this SNR [dB] are found.
 DECLARED_SHARES, DECLARED_SNR_DB = (0.5, 0.8), 0.0
-#: The dwell whose peak memory is quoted [s].
-QUOTED_DWELL_S = 0.08
 
 Phase = Callable[[str, float], AbstractContextManager[OnDone]]
 
@@ -108,8 +107,8 @@ def measure_front(
         "test_records": config.front_test,
         "epochs": config.front_epochs,
         "declared": {"shares": list(DECLARED_SHARES), "snr_db": DECLARED_SNR_DB},
-        "quoted_dwell_s": QUOTED_DWELL_S,
-        "bounds": detection_bounds(choices.radar_of(QUOTED_DWELL_S, reference).pulses),
+        "quoted_dwell_s": DWELL_S,
+        "bounds": detection_bounds(choices.radar_of(DWELL_S, reference).pulses),
         "choices": rows,
         "budgets": [_budget(rows, place, budget_us) for place in range(len(BATCHES)) for budget_us in BUDGETS_US],
         "stored": [{**row, "front": keep} for row, keep in zip(stored, kept, strict=True)],
@@ -195,7 +194,7 @@ def _by_dwell(test: FrontSet, probabilities: NDArray[np.floating]) -> dict[str, 
         # the same false alarms, but only UAVs that show something
         strong = (labels != 0) | (test.snr_db[here] > DECLARED_SNR_DB)
         declared.append(_scores(labels[strong], mine[strong])["uav_found"]["value"])
-    here = test.dwell == DWELLS_S.index(QUOTED_DWELL_S)
+    here = test.dwell == DWELLS_S.index(DWELL_S)
     by_snr = _found_by_snr(test.labels[here], probabilities[here, 0], test.snr_db[here])
     times = [
         next((dwell for dwell, share in zip(DWELLS_S, declared, strict=True) if (share or 0.0) >= wanted), None)
@@ -233,7 +232,7 @@ def _costs(
     done: OnDone,
 ) -> dict[str, Any]:
     """What every choice costs, by its name."""
-    quoted = choices.radar_of(QUOTED_DWELL_S, reference)
+    quoted = choices.radar_of(DWELL_S, reference)
     batch = draw_records(quoted, BATCHES[-1], config.seed, purpose="bench").iq
     found: dict[str, Any] = {}
     for place, (kind, name) in enumerate(entries):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..limits import DWELL_S
 from . import metrics
 
 # Answers are class numbers; this one stands for "unknown".
@@ -19,8 +20,8 @@ SNR_STEP_DB = 5.0
 #: Beyond lie records that hardly have noise, and moving parts that nobody could see.
 SNR_RANGE_DB = (-20.0, 50.0)
 BETA_STEP_DEG = 10.0
-#: The dwell rate that false UAVs are quoted at: one range cell looked at without a pause, 80 ms at a time [1/h].
-DWELLS_PER_HOUR = 3600 / 0.08
+#: The dwell rate that false UAVs are quoted at: one range cell looked at without a pause, a dwell at a time [1/h].
+DWELLS_PER_HOUR = 3600 / DWELL_S
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,13 @@ import pytest
 from bladewing.simulate.bounds import UavBounds, bird_bound, gauss_error, moment_envelope
 from bladewing.simulate.bounds_receiver import CHAIN
 from bladewing.simulate.exact import blade_points
+from bladewing.simulate.fidelity import BIRD_EFFECTS, UAV_EFFECTS, Fidelity
 from bladewing.simulate.parts import BirdPart, RotorPart, UavPart
 from bladewing.simulate.plan import make_plan
 from bladewing.simulate.radar import Radar
 from bladewing.simulate.render import render
-from bladewing.simulate.render_bird import BIRD_EFFECTS, bird_echo
-from bladewing.simulate.render_uav import UAV_EFFECTS, Fidelity, full_fidelity, uav_echo
+from bladewing.simulate.render_bird import bird_echo
+from bladewing.simulate.render_uav import full_fidelity, uav_echo
 from bladewing.simulate.scene import Scene, shipped
 
 SCENES = 40

@@ -9,11 +9,10 @@ from bladewing.simulate.catalogue import AIRFRAMES, BIRDS
 from bladewing.simulate.clutter import billingsley, process_velocities, slow_velocities
 from bladewing.simulate.dataset import PURPOSES, TRUTH_UNITS
 from bladewing.simulate.discretes import DISCRETES, LIMBS
+from bladewing.simulate.fidelity import BIRD_EFFECTS, UAV_EFFECTS
 from bladewing.simulate.laws import LAWS
 from bladewing.simulate.plan import WORDS
 from bladewing.simulate.receiver import FAULT_CHANCE
-from bladewing.simulate.render_bird import BIRD_EFFECTS
-from bladewing.simulate.render_uav import UAV_EFFECTS
 from bladewing.simulate.scene import Scene
 from bladewing.simulate.uav import ROTORS
 
