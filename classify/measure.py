@@ -14,7 +14,7 @@ from bladewing.features.measure import MOST_BLADES_GIVEN
 from bladewing.features.measurements import BODY, EACH_ROTOR, Measurements
 from bladewing.features.one_channel import half_empty, made_analytic
 from bladewing.features.samples import scaled, unit_scale
-from bladewing.features.spectrum import centred_power
+from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS, centred_power
 from bladewing.features.window import KAISER
 from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
@@ -212,7 +212,7 @@ class Measured:
         The median of their values, each weighed by its own variance: where several lines may be the body's a dwell says
         little. Where they differ by more than their deviations the mean's grows by as much (Birge 1932).
         """
-        value, std = self.values.body_velocity_mps[dwells], self.values.body_velocity_mps_std[dwells]
+        value, std = self._course(dwells)
         known = np.isfinite(value) & np.isfinite(std)
         if not known.any():
             return dict.fromkeys(BODY)
@@ -223,13 +223,31 @@ class Measured:
         pair = np.searchsorted(upto, [0.5 - 1e-9, 0.5 + 1e-9])
         middle = float(value[np.minimum(pair, len(value) - 1)].mean())
         unlike = float((weight * (value - middle) ** 2).sum()) / max(len(value) - 1, 1)
+        middle -= self._span_mps * round(middle / self._span_mps)
         return dict(zip(BODY, (middle, float(np.sqrt(max(unlike, 1.0) / weight.sum()))), strict=True))
 
     def body_range(self, dwells: np.ndarray) -> list[float] | None:
-        """Lowest and highest velocity of the body in single dwells, of some of them; None where none knows it well."""
-        values, stds = self.values.body_velocity_mps[dwells], self.values.body_velocity_mps_std[dwells]
+        """Lowest and highest velocity of the body in single dwells, of some of them; None where none knows it well.
+
+        Of a body that passes the end of the unambiguous velocities one of both lies beyond.
+        """
+        values, stds = self._course(dwells)
         known = values[np.isfinite(values) & (stds < KNOWN_MPS)]
         return [float(edge) for edge in np.quantile(known, [ENDS, 1 - ENDS])] if len(known) else None
+
+    @property
+    def _span_mps(self) -> float:
+        """All unambiguous velocities [m/s]."""
+        return SPEED_OF_LIGHT_MPS / self.recording.carrier_hz * self.recording.prf_hz / 2
+
+    def _course(self, dwells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The body's velocity in some of the dwells and its deviation, all in the span about the best known."""
+        value, std = self.values.body_velocity_mps[dwells], self.values.body_velocity_mps_std[dwells]
+        known = np.isfinite(value) & np.isfinite(std)
+        if known.any():
+            best = value[known][std[known].argmin()]
+            value = value - self._span_mps * np.rint((value - best) / self._span_mps)
+        return value, std
 
     def over_all(self) -> dict[str, Any]:
         """Wingbeat and acceleration over the whole recording; nothing where that is too short.

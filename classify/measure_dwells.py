@@ -37,13 +37,13 @@ def measure_dwells(iq: NDArray[np.complex64], *, on_record: Callable[[float], No
         Of all of them, in their order.
     """
     work: Callable[[NDArray[np.complex64]], Measurements] = partial(measure, **given)
-    started, runs, done = time.monotonic(), [], 0
-    while done < len(iq) and time.monotonic() - started < ALONE_S:
+    started, runs, done = time.perf_counter(), [], 0
+    while done < len(iq) and time.perf_counter() - started < ALONE_S:
         runs.append(work(iq[done : done + 1]))
         done += 1
         on_record(done)
-    each_s = (time.monotonic() - started) / done
-    some = max(1, round(TASK_S / each_s))
+    each_s = (time.perf_counter() - started) / done
+    some = max(1, round(TASK_S / max(each_s, 1e-6)))
     shared = (len(iq) - done) * each_s > ALONE_S
     tasks = [iq[first : first + some] for first in range(done, len(iq), some)]
     for run in in_order(work, tasks, None if shared else 1):

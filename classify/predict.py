@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from bladewing.features.heave import heave
+from bladewing.features.one_channel import made_analytic
 from bladewing.features.steady_comb import steady_comb
 from bladewing.features.wingbeat import wingbeat
 
@@ -228,10 +229,11 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
 def long_look(iq: np.ndarray, carrier_hz: float, prf_hz: float) -> dict[str, float]:
     """What a long look shows of one target and a single dwell does not [Hz], by the keys of `ODDS`."""
     radar = {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
-    body = heave(iq, **radar)
+    whole = made_analytic(iq)  # of one channel both sides rise and fall alike; a comb shows in it better as it is
+    body = heave(whole, **radar)
     rates_hz = {
         "comb": steady_comb(iq, **radar).chopping_hz,
-        "wings": wingbeat(iq, **radar).wingbeat_hz,
+        "wings": wingbeat(whole, **radar).wingbeat_hz,
         "steps" if body.walks else "heaves": body.heave_hz,
     }
     return {name: float(rate_hz) for name, rate_hz in rates_hz.items() if np.isfinite(rate_hz)}

@@ -3,7 +3,7 @@
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
@@ -34,13 +34,13 @@ class Recording:
     name
         As it was asked for.
     iq
-        Shape (pulses,), one sample a pulse.
+        Shape (pulses,), one sample a pulse; pulses that were lost are filled in from those beside them.
     carrier_hz, prf_hz
         Carrier and pulse repetition frequency [Hz].
     start_s
         Time of the first sample [s]; above 0 where a SigMF file says that it goes on from an earlier one.
     filled_in
-        How many pulses were lost, and are filled in from those beside them.
+        How many these are.
 
     Raises
     ------
@@ -54,12 +54,16 @@ class Recording:
     carrier_hz: float
     prf_hz: float
     start_s: float = 0.0
-    filled_in: int = 0
+    filled_in: int = field(init=False, default=0)
 
     def __post_init__(self) -> None:
         iq = complex_samples(self.iq, self.name)
         if iq.ndim != 1 or not len(iq):
             raise BadInput(f"{self.name}: samples of shape {iq.shape}: give those of one range cell, (pulses,)")
+        lost = lost_pulses(iq)
+        if lost.any():
+            iq = filled(iq, lost)
+            object.__setattr__(self, "filled_in", int(np.count_nonzero(iq[lost])))
         object.__setattr__(self, "iq", iq)
         for name in ("carrier_hz", "prf_hz"):
             object.__setattr__(self, name, positive(getattr(self, name), f"{self.name}: {name}"))
@@ -217,9 +221,7 @@ def load_recording(
         options = {"--carrier-hz": carrier, "--prf-hz": prf}
         give = " and ".join(option for option, value in options.items() if value is None)
         raise BadInput(f"{name}: {says}: give {give} [Hz]")
-    lost = lost_pulses(iq)
-    whole = filled(iq, lost) if lost.any() else iq
-    return Recording(name, whole, carrier, prf, first / prf, int(np.count_nonzero(whole[lost])))
+    return Recording(name, iq, carrier, prf, first / prf)
 
 
 def find_recording(path: str | os.PathLike[str]) -> Path:

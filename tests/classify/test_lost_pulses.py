@@ -6,6 +6,7 @@ from bladewing.classify import Classifier, answer, load_recording
 from bladewing.classify.predict import long_look
 from bladewing.classify.recording import Recording
 from bladewing.features.dropouts import longest_silence
+from bladewing.simulate import Scene
 
 from ..features.signals import white
 
@@ -55,7 +56,10 @@ def test_a_recording_tells_of_them_and_how_many() -> None:
     iq[100:110] = 0
     recording = Recording("walk", iq, 24e9, 1e4)
     (said,) = recording.remarks(0.1, recording.dwells(0.1))
-    assert said.startswith("lost: 10 of 2000 pulses are exactly 0")
+    assert said.startswith("lost: 10 of 2000 pulses were exactly 0")
+    assert recording.filled_in == 10
+    assert np.all(recording.iq[100:110] != 0)
+    np.testing.assert_array_equal(np.delete(recording.iq, range(100, 110)), np.delete(iq, range(100, 110)))
 
 
 def test_lost_pulses_of_a_recording_draw_no_rotor(tmp_path) -> None:
@@ -71,6 +75,30 @@ def test_lost_pulses_of_a_recording_draw_no_rotor(tmp_path) -> None:
     (said,) = given.remarks
     assert said.startswith("lost: 207 of 20000 pulses were exactly 0")
     assert said.endswith("filled in from those beside them")
+
+
+def test_a_recording_made_of_samples_is_filled_in_as_one_that_is_read(tmp_path) -> None:
+    """Of a gull whose every 40th pulse was lost, a comb that stays was once counted, and no wingbeat."""
+    bird = {"name": "gull", "species": "herring_gull", "velocity_mps": -8.0, "heave_m": 0.02}
+    scene = Scene.build({"radar": {"carrier_hz": 9.85e9, "prf_hz": 6e3, "pulses": 24000}, "bird": [bird]})
+    spoilt = scene.render(1).iq.copy()
+    spoilt[11::40] = 0
+    np.save(tmp_path / "gull.npy", spoilt)
+    radar = {"carrier_hz": 9.85e9, "prf_hz": 6e3}
+    recordings = Recording("gull", spoilt, **radar), load_recording(tmp_path / "gull.npy", **radar)
+    given, read = (answer(recording, Classifier.load("fast")) for recording in recordings)
+    assert given.shown == read.shown
+    assert "comb" not in given.shown
+    assert given.shown["wings"] == pytest.approx(3.69, abs=0.1)
+    np.testing.assert_array_equal(given.dwells.probabilities, read.dwells.probabilities)
+
+
+def test_of_one_channel_a_wingbeat_is_found_too() -> None:
+    bird = {"name": "gull", "species": "herring_gull", "velocity_mps": -8.0, "heave_m": 0.02}
+    scene = Scene.build({"radar": {"carrier_hz": 9.85e9, "prf_hz": 6e3, "pulses": 24000}, "bird": [bird]})
+    both = scene.render(1).iq
+    assert "wings" in long_look(both, 9.85e9, 6e3)
+    assert "wings" in long_look(both.real.astype(np.complex64), 9.85e9, 6e3)
 
 
 def test_nor_do_those_of_records_from_python() -> None:

@@ -193,6 +193,22 @@ def test_a_dwell_that_hardly_tells_the_body_does_not_speak_for_the_recording(fol
         assert found == pytest.approx(dict(zip(("body_velocity_mps", "body_velocity_mps_std"), expected, strict=True)))
 
 
+def test_a_body_that_passes_the_end_of_the_unambiguous_velocities_has_one_velocity(tmp_path, capsys):
+    """At 2 kHz that end is 15.22 m/s; the dwells on either side of it once made a deviation of 4 m/s."""
+    body = {"name": "b", "velocity_mps": -14.9, "acceleration_mps2": -0.3, "body": [{"level_db": 20.0}]}
+    scene = Scene.build({"radar": {"carrier_hz": 9.85e9, "prf_hz": 2e3, "pulses": 4000}, "uav": [body]})
+    np.save(tmp_path / "passes.npy", scene.render(4).iq)
+    assert main(["measure", str(tmp_path / "passes.npy"), "--carrier-hz", "9.85e9", "--prf-hz", "2000", "--json"]) == 0
+    together = json.loads(capsys.readouterr().out.splitlines()[-1])["recording"]
+    span = 299_792_458.0 / 9.85e9 * 2e3 / 2
+    assert abs(together["body_velocity_mps"]) <= span / 2
+    off = together["body_velocity_mps"] - -15.2
+    assert abs(off - span * round(off / span)) < 0.1
+    assert together["body_velocity_mps_std"] < 0.1
+    low, high = together["body_velocity_range_mps"]
+    assert high - low == pytest.approx(0.9 * 0.6, abs=0.1)
+
+
 def test_what_is_shorter_than_a_dwell_is_said_to_be_left_out(folder, capsys):
     given = ["measure", str(folder / "drone.npy"), *RADAR, "--dwell", "0.08"]
     left_out_s = 2 * PULSES / PRF_HZ - 2 * 0.08
