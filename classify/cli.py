@@ -29,9 +29,16 @@ app = typer.Typer(
 Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all randomness.", show_default="0")]
 
 
+def _path(given: str | Path) -> Path:
+    """A path as it was given; an empty one, as of a shell's empty variable, would be the current folder."""
+    if given == "":
+        raise typer.BadParameter("it is empty: give a name")
+    return Path(given)
+
+
 def _path_option(metavar: str, what: str, **more: Any) -> Any:
     """An option that is a path; whether it can be read says who reads it, better than typer does."""
-    return typer.Option(metavar=metavar, readable=False, help=what, **more)
+    return typer.Option(metavar=metavar, parser=_path, help=what, **more)
 
 
 Config = Annotated[Path | None, _path_option("FILE.toml", "Settings; the options given here come first.")]
@@ -41,7 +48,7 @@ Recordings = Annotated[
     list[Path],
     typer.Argument(
         metavar="RECORDING",
-        readable=False,
+        parser=_path,
         help="SigMF (.sigmf-meta, .sigmf-data, their stem, or an archive .sigmf), .npy, .npz or .mat. "
         "One named twice is answered once.",
         show_default=False,
@@ -229,7 +236,7 @@ def train(
 @app.command(short_help="Write the records of a training to disk.")
 def dataset(
     out: Annotated[
-        Path, typer.Argument(metavar="OUT", readable=False, help="Folder of the data set: new, or to be gone on with.")
+        Path, typer.Argument(metavar="OUT", parser=_path, help="Folder of the data set: new, or to be gone on with.")
     ],
     records: Annotated[
         int, typer.Option(metavar="N", min=LEAST_RECORDS, help="Records to train on; the other sets follow from it.")
@@ -249,7 +256,7 @@ def dataset(
 @app.command(short_help="Write one self-contained ONNX graph for a radar.")
 def export(
     out: Annotated[
-        Path, typer.Argument(metavar="OUT.onnx", readable=False, help="The graph to write.", show_default=False)
+        Path, typer.Argument(metavar="OUT.onnx", parser=_path, help="The graph to write.", show_default=False)
     ],
     carrier_hz: Annotated[float, typer.Option(metavar="F", help="Carrier [Hz].", show_default=False)],
     prf_hz: Annotated[float, typer.Option(metavar="F", help="PRF [Hz].", show_default=False)],

@@ -1,6 +1,7 @@
 """Writing a file, or several as one, whole or not at all."""
 
 import contextlib
+import errno
 import json
 import os
 import secrets
@@ -32,11 +33,14 @@ def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:
     Raises
     ------
     OSError
-        The folder is missing or not writable, or the disk is full. The old file, if any, is untouched.
+        The folder is missing or not writable, or the disk is full; what stands there is no regular file. The old file,
+        if any, is untouched.
     """
     target = Path(os.path.realpath(path))
     if target.is_dir():
         raise IsADirectoryError(f"{path} is a directory")
+    if target.exists() and not target.is_file():
+        raise FileExistsError(errno.EEXIST, "a pipe or a device stands there, which is not replaced", os.fspath(path))
     beside = target.with_name(f".bladewing-{secrets.token_hex(8)}.tmp")
     try:
         _write_new(beside, content)

@@ -312,11 +312,16 @@ def checked_plot(path: Path | None) -> None:
         return
     if path.suffix.lower() != ".svg":
         raise BadInput(f"--plot {path}: the drawing is SVG: name a file that ends in .svg")
-    if not path.parent.is_dir():
-        raise BadInput(f"--plot {path}: there is no folder {path.parent}: name a file in an existing folder")
-    taken = os.path.isdir(path)  # of a locked folder it is False, where `Path` raises
-    if taken or not os.access(path.parent, os.W_OK):
-        what = "is a directory" if taken else f"nothing can be written into {path.parent}"
+    target = Path(os.path.realpath(path))  # a link is followed
+    try:
+        what = "is a directory" if target.is_dir() else "is no regular file"
+        if target.is_file() or not target.exists():
+            what = "" if os.access(target.parent, os.W_OK) else f"nothing can be written into {target.parent}"
+        if not target.parent.is_dir():
+            raise BadInput(f"--plot {path}: there is no folder {target.parent}: name a file in an existing folder")
+    except OSError as error:  # a name that is too long, a folder that is locked
+        what = str(error.strerror)
+    if what:
         raise BadInput(f"--plot {path}: {what}: name a file that can be written")
 
 

@@ -80,6 +80,30 @@ def test_usage_errors_are_one_line(calls, capsys, arguments, said):
     assert calls == []
 
 
+@pytest.mark.parametrize(
+    "arguments", [["predict", ""], ["measure", ""], ["train", "--out", ""], ["report", "--models", ""]], ids=" ".join
+)
+def test_an_empty_name_is_no_folder(arguments, capsys):
+    """As of a shell's variable that is not set; a path made of it would be the current folder."""
+    assert main(arguments) == 2
+    assert "it is empty: give a name" in capsys.readouterr().err
+
+
+def test_an_interrupt_while_the_program_loads_is_one_line():
+    python = (
+        "import sys\n"
+        "class Stopped:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'typer':\n"
+        "            raise KeyboardInterrupt\n"
+        "sys.meta_path.insert(0, Stopped())\n"
+        "from bladewing.classify.__main__ import main\n"
+        "sys.exit(main())\n"
+    )
+    told = subprocess.run([sys.executable, "-c", python], capture_output=True, text=True, check=False)
+    assert (told.returncode, told.stdout, told.stderr) == (130, "", "bladewing: stopped: interrupted\n")
+
+
 def test_an_option_without_its_value_points_to_no_other_help(capsys):
     assert main(["train", "--records"]) == 2
     assert capsys.readouterr().err.endswith(" (see --help)\n")

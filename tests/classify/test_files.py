@@ -95,6 +95,13 @@ def test_a_link_goes_on_pointing_at_the_file(tmp_path):
     assert real.read_text() == "new"
 
 
+def test_a_pipe_is_not_replaced(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(FileExistsError, match="a pipe or a device stands there"):
+        write_whole(tmp_path / "pipe", "x")
+    assert [path.is_fifo() for path in tmp_path.iterdir()] == [True]
+
+
 def test_a_missing_folder_and_a_directory_are_refused(tmp_path):
     with pytest.raises(FileNotFoundError):
         write_whole(tmp_path / "no" / "file", "x")

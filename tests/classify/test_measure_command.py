@@ -1,6 +1,7 @@
 import json
 import os
 import re
+import stat
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from types import SimpleNamespace
@@ -466,6 +467,17 @@ def test_a_value_is_written_to_the_second_digit_of_its_error():
     assert with_error(0.123456, 0.0456) == "0.123 +- 0.046"
     assert with_error(12345.6, 789) == "12346 +- 789"
     assert with_error(1.0, float("nan")) == "-"
+
+
+def test_a_drawing_is_not_written_over_a_pipe_or_behind_a_link_to_nowhere(folder, tmp_path, capsys):
+    os.mkfifo(tmp_path / "pipe.svg")
+    os.symlink(tmp_path / "gone" / "drawing.svg", tmp_path / "link.svg")
+    for name, said in {"pipe": "is no regular file", "link": "there is no folder", 300 * "x": "too long"}.items():
+        assert main(["measure", str(folder / "drone.npy"), *RADAR, "--plot", str(tmp_path / f"{name}.svg")]) == 2
+        out, error = capsys.readouterr()
+        assert (out, error.count("\n")) == ("", 1)
+        assert said in error
+    assert stat.S_ISFIFO((tmp_path / "pipe.svg").stat().st_mode)
 
 
 def test_a_drawing_that_cannot_be_written_is_told_before_anything_is_measured(folder, tmp_path, capsys, monkeypatch):
