@@ -344,5 +344,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     for number in sorted({1, per_turn}):
         if of_mains(fit, data, start.score, number):
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"
-    is_sure = per_turn > 1 and not may_come_back(start.last, fit.spacing)  # further lines fall on every so many-th
+    # further lines fall on every so many-th; and of a comb that is sought less, a fraction may be what was found
+    few = fit.spacing * per_turn * data.prf_hz > CHOPPING_RANGE_HZ[1]
+    is_sure = per_turn > 1 and not few and not may_come_back(start.last, fit.spacing)
     return Comb(fit, fitted[1], start.last, per_turn, open_orders * fit.spacing, has_line, per_turn, is_sure), ""

@@ -19,6 +19,10 @@ from .periodogram import Periodogram
 #: Lines nearer than this are not told apart [bins].
 MIN_SPACING_BINS = 3.0
 
+#: A rotor chops at this at most [Hz]: four blades at 60 000 rpm, as the smallest drones have them. Beyond the range of
+#: the cepstrum a comb is believed where it speaks louder than any within, which may be a fraction of it.
+FASTEST_HZ = 4000.0
+
 #: The largest spacing sought is so many times the smallest, or none is sought.
 SEARCHED_RATIO = 1.5
 
@@ -142,9 +146,11 @@ def spacing_limits(pulses: int, prf_hz: float) -> tuple[float, float]:
     return max(low / prf_hz, MIN_SPACING_BINS / pulses), min(high / prf_hz, 0.2)
 
 
-def coarse_spacings(data: Periodogram, evidence: Evidence, centre: float) -> NDArray[np.float64]:
-    """Spacings worth a closer look [cycles a sample], best of every band first, with their octaves."""
-    low, high = spacing_limits(data.pulses, data.prf_hz)
+def coarse_spacings(
+    data: Periodogram, evidence: Evidence, centre: float, limits: tuple[float, float]
+) -> NDArray[np.float64]:
+    """Spacings within limits that are worth a closer look [cycles a sample], best of every band, with their octaves."""
+    low, high = limits
     grid = _grid(data.pulses, low, high)
     size = len(data.power)
     offset = np.arange(size) / size - centre
@@ -170,13 +176,12 @@ def _correlations(
     return np.asarray(fft.rfft(part)[:, :lags].conj() / np.float32(len(ripple)), np.complex64)
 
 
-def free_spacings(data: Periodogram, evidence: Evidence) -> list[tuple[float, float]]:
+def free_spacings(data: Periodogram, evidence: Evidence, limits: tuple[float, float]) -> list[tuple[float, float]]:
     """Spacings and centres of combs whose body line hides in the static background [cycles a sample each].
 
     The phase of the autocorrelation at multiples of the period tells the centre, up to whole spacings.
     """
-    low, high = spacing_limits(data.pulses, data.prf_hz)
-    grid = _grid(data.pulses, low, high)
+    grid = _grid(data.pulses, *limits)
     size = len(data.power)
     offset = np.arange(size) / size
     distance = np.abs(offset - np.rint(offset))
@@ -381,12 +386,22 @@ def best_candidate(data: Periodogram) -> Candidate | None:
     Any line of the comb may pass for its centre: see `comb_centre`.
     """
     low, high = spacing_limits(data.pulses, data.prf_hz)
+    found = _best_within(data, (low, high))
+    if found is None:
+        return None
+    faster = _best_within(data, (max(low, CHOPPING_RANGE_HZ[1] / data.prf_hz), min(FASTEST_HZ / data.prf_hz, 0.2)))
+    return faster if faster is not None and faster.score > found.score else found
+
+
+def _best_within(data: Periodogram, limits: tuple[float, float]) -> Candidate | None:
+    """The spacing within limits whose lines speak loudest; None where these lie too near to each other."""
+    low, high = limits
     if low * SEARCHED_RATIO >= high:
         return None
     evidence = data.contrast
-    tried = [(coarse_spacings(data, evidence, centre), centre) for centre in data.strong.centres]
+    tried = [(coarse_spacings(data, evidence, centre, limits), centre) for centre in data.strong.centres]
     if data.rest_half > 0:
-        for spacing, centre in free_spacings(data, evidence):
+        for spacing, centre in free_spacings(data, evidence, limits):
             if abs(centre) < data.rest_half:
                 octaves = spacing * np.array(OCTAVES)
                 octaves = octaves[(octaves >= low) & (octaves <= high)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bladewing.features import measure
 from bladewing.features.rotor.periodogram import prepare
-from bladewing.simulate import rotor_echo
+from bladewing.simulate import Scene, rotor_echo
 
 from ...benchmarks import records
 from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, white
@@ -111,3 +111,18 @@ def test_lines_of_rotors_not_found_yet_neither_halve_a_rate_nor_make_one_up():
             np.testing.assert_allclose(found.rotor_rates_hz[:4], 2 * rates_hz, rtol=1e-4)
             assert found.chopping_hz == pytest.approx(2 * rates_hz.mean(), abs=4 * found.chopping_hz_std)
     assert right >= 10
+
+
+@pytest.mark.parametrize(("chopping_hz", "blades"), [(1500, 3), (1610, 3), (1700, 4), (2100, 4), (2700, 3)])
+def test_the_smallest_drones_chop_beyond_the_cepstrum(chopping_hz, blades):
+    """Blades of 2 cm at 25 000 to 54 000 rpm: a half or a third of the spacing was found, and blades named by it."""
+    for seed in range(2):
+        rotor = {"blade_length_m": 0.02, "root_m": 0.004, "rotation_hz": (chopping_hz + 1.3 * seed) / blades}
+        drone = {"name": "drone", "velocity_mps": 3.0, "body": [{"level_db": 25.0}]}
+        drone["rotors"] = [rotor | {"blades": blades, "flash_db": 20.0}]
+        scene = Scene.build({"radar": records.RADAR | {"pulses": records.PULSES}, "uav": [drone]})
+        found = measure(scene.render(seed, full=False).iq, **records.RADAR)
+        assert found.chopping_hz == pytest.approx(chopping_hz + 1.3 * seed, rel=2e-3)
+        assert np.isnan(found.rotation_hz)
+        told = found.alternatives(())
+        assert {"blades": blades} in [{"blades": round(choice["blades"])} for choice in told]
