@@ -12,12 +12,14 @@ from .comb_centre import centred
 from .comb_fit import CombFit, fit_combs
 from .comb_search import (
     FINE_STEPS,
+    LEAST_FRACTION_HZ,
     MIN_SPACING_BINS,
     SEARCHED_RATIO,
     best_candidate,
     factors_about,
     heights,
     spacing_limits,
+    with_faster,
 )
 from .common_fraction import of_one_rotor
 from .flash_rate import of_flashes
@@ -312,6 +314,8 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     start = best_candidate(data)
     if start is None:
         return None, _too_short(data)
+    if start.score < threshold(data) or start.spacing * data.prf_hz >= LEAST_FRACTION_HZ:
+        start = with_faster(data, start)
     if start.score < threshold(data):
         return None, f"no comb: evidence {start.score:.1f} nats, {threshold(data):.0f} are needed"
     start = of_flashes(data, of_one_rotor(data, beside_line(data, start)))

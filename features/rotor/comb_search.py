@@ -20,8 +20,9 @@ from .periodogram import Periodogram
 MIN_SPACING_BINS = 3.0
 
 #: A rotor chops at this at most [Hz]: four blades at 60 000 rpm, as the smallest drones have them. Beyond the range of
-#: the cepstrum a comb is believed where it speaks louder than any within, which may be a fraction of it.
-FASTEST_HZ = 4000.0
+#: the cepstrum a comb is believed where it speaks louder than that found within, which may be a fraction of it: a fifth
+#: and more, so that it is not sought where that found is finer.
+FASTEST_HZ, LEAST_FRACTION_HZ = 4000.0, 300.0
 
 #: The largest spacing sought is so many times the smallest, or none is sought.
 SEARCHED_RATIO = 1.5
@@ -385,10 +386,12 @@ def best_candidate(data: Periodogram) -> Candidate | None:
 
     Any line of the comb may pass for its centre: see `comb_centre`.
     """
-    low, high = spacing_limits(data.pulses, data.prf_hz)
-    found = _best_within(data, (low, high))
-    if found is None:
-        return None
+    return _best_within(data, spacing_limits(data.pulses, data.prf_hz))
+
+
+def with_faster(data: Periodogram, found: Candidate) -> Candidate:
+    """The loudest comb beyond the cepstrum's range where it speaks louder than that found, which else stays."""
+    low, _ = spacing_limits(data.pulses, data.prf_hz)
     faster = _best_within(data, (max(low, CHOPPING_RANGE_HZ[1] / data.prf_hz), min(FASTEST_HZ / data.prf_hz, 0.2)))
     return faster if faster is not None and faster.score > found.score else found
 
