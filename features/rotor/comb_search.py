@@ -382,7 +382,7 @@ def _families(
 
 
 def best_candidate(data: Periodogram) -> Candidate | None:
-    """The spacing whose lines speak loudest; None where the dwell is too short to search.
+    """The spacing in the cepstrum's range whose lines speak loudest; None where the dwell is too short to search.
 
     Any line of the comb may pass for its centre: see `comb_centre`.
     """
