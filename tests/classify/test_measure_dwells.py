@@ -1,4 +1,5 @@
 from dataclasses import fields
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -44,3 +45,12 @@ def test_an_error_of_a_dwell_is_told(dwells, monkeypatch):
     monkeypatch.setattr(module, "ALONE_S", 1e-3)
     with pytest.raises(ValueError, match="blades is 0"):
         measure_dwells(dwells, on_record=lambda _: None, **RADAR, blades=0)
+
+
+def test_a_clock_that_stands_still_stops_nothing(monkeypatch):
+    """Some count in steps of 16 ms, in which a dwell of noise is measured."""
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: 0.0, perf_counter=lambda: 0.0))
+    done = []
+    iq = white(np.random.default_rng(3), 3, 600).astype(np.complex64)
+    assert len(measure_dwells(iq, on_record=done.append, **RADAR).reason) == 3
+    assert done == [1, 2, 3]
