@@ -14,6 +14,7 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
+from bladewing.models import TEACHER
 from scipy import fft
 
 from .errors import BadInput
@@ -75,11 +76,14 @@ def non_dominated(costs: Sequence[float], values: Sequence[float]) -> list[bool]
 def front(account: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, float]]:
     """Names and costs of the models that none is both cheaper and more accurate than, cheapest first.
 
+    The teacher, which is not shipped, is none of them.
+
     Raises
     ------
     BadInput
         The account holds no costs.
     """
+    account = {name: model for name, model in account.items() if name != TEACHER}
     if not account or any(COST_KEY not in model for model in account.values()):
         raise BadInput(f"the shipped train.json holds no {COST_KEY!r}: name a model, or train the models again")
     costs = [float(model[COST_KEY]) for model in account.values()]

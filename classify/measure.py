@@ -314,11 +314,12 @@ def checked_plot(path: Path | None) -> None:
         raise BadInput(f"--plot {path}: the drawing is SVG: name a file that ends in .svg")
     target = Path(os.path.realpath(path))  # a link is followed
     try:
-        what = "is a directory" if target.is_dir() else "is no regular file"
-        if target.is_file() or not target.exists():
-            what = "" if os.access(target.parent, os.W_OK) else f"nothing can be written into {target.parent}"
         if not target.parent.is_dir():
             raise BadInput(f"--plot {path}: there is no folder {target.parent}: name a file in an existing folder")
+        if target.exists() and not target.is_file():
+            what = "is a directory" if target.is_dir() else "is no regular file"
+        else:
+            what = "" if os.access(target.parent, os.W_OK) else f"nothing can be written into {target.parent}"
     except OSError as error:  # a name that is too long, a folder that is locked
         what = str(error.strerror)
     if what:

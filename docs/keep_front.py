@@ -7,7 +7,6 @@ import json
 from pathlib import Path
 
 from bladewing.classify.ladder import CASCADE, STAGES_KEY, front
-from bladewing.models import TEACHER
 
 PRETRAINED = Path(__file__).parents[1] / "models" / "pretrained"
 
@@ -15,7 +14,7 @@ PRETRAINED = Path(__file__).parents[1] / "models" / "pretrained"
 def main() -> None:
     """Remove the files."""
     told = json.loads((PRETRAINED / "train.json").read_text(encoding="utf-8"))
-    kept = {name for name, _ in front({name: model for name, model in told["models"].items() if name != TEACHER})}
+    kept = {name for name, _ in front(told["models"])}
     if told[CASCADE]:
         kept |= set(told[CASCADE][STAGES_KEY])
     beaten = [file for file in PRETRAINED.glob("*.onnx") if file.stem not in kept]
