@@ -125,14 +125,19 @@ def test_workers_end_with_a_killed_parent(tmp_path):
     parent.kill()
     parent.stdout.close()
     parent.wait()
+    require_ended(parent.pid)
+
+
+def require_ended(group: int) -> None:
+    """Fail where processes of a group live on for a minute, and end them."""
     deadline = time.monotonic() + 60
     while time.monotonic() < deadline:
         try:
-            os.killpg(parent.pid, 0)
+            os.killpg(group, 0)
         except ProcessLookupError:
             return
         time.sleep(0.2)
-    os.killpg(parent.pid, signal.SIGKILL)
+    os.killpg(group, signal.SIGKILL)
     pytest.fail("workers outlived their parent")
 
 
@@ -156,3 +161,16 @@ def test_an_interrupt_is_the_parent_s_alone(tmp_path):
     script.write_text(INTERRUPTED)
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, start_new_session=True, timeout=120)
     assert (done.stdout, done.stderr, done.returncode) == ("stopped\n", "", 0)
+
+
+def test_a_program_told_to_end_does_so_as_after_ctrl_c(tmp_path):
+    """In one line, and without a word of those of its workers, where `timeout` or a service ends it."""
+    command = [sys.executable, "-m", "bladewing.classify", "train", "--records", "3000", "--out", tmp_path / "out"]
+    told = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    assert told.stderr is not None
+    assert told.stderr.readline().startswith("draw 4800 records: ")  # the workers are under way
+    told.terminate()
+    *progress, said = told.communicate(timeout=60)[1].splitlines()
+    assert (said, told.returncode) == ("bladewing: stopped: interrupted", 130)
+    assert all(line.startswith("draw ") for line in progress)
+    require_ended(told.pid)
