@@ -11,7 +11,7 @@ from typing import NoReturn
 
 import numpy as np
 from bladewing.features.allocator import keep_freed
-from bladewing.features.dropouts import mended
+from bladewing.features.dropouts import BEYOND_FILLING_IN, mended
 from bladewing.features.inputs import dwells_of
 from bladewing.features.samples import LEAST_PART, largest_part
 from bladewing.models import KIND_SCORES
@@ -328,10 +328,12 @@ class Classifier:
             ends[row] = stretch.start, stretch.stop
         for begin, end in np.unique(ends, axis=0):  # padded records are alike
             rows, pulses = np.flatnonzero((ends == (begin, end)).all(axis=1)), end - begin
-            if outside := self.envelope.reason(carrier_hz, prf_hz, pulses):
+            if not pulses:
+                reasons[rows] = BEYOND_FILLING_IN
+            elif outside := self.envelope.reason(carrier_hz, prf_hz, pulses):
                 reasons[rows] = f"silence: no more than {pulses} pulses in a row are not 0: {outside}"
-                continue
-            told[rows], labels[rows], reasons[rows] = self._answers(records[rows, begin:end], carrier_hz, prf_hz)
+            else:
+                told[rows], labels[rows], reasons[rows] = self._answers(records[rows, begin:end], carrier_hz, prf_hz)
         return told, labels, reasons.astype(np.str_)
 
     def _told(

@@ -61,8 +61,9 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
     if given.dtype != _COMPLEX64:
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows is found below, with its index
             iq = given.astype(np.complex64)
-        if iq.size and not iq.any() and given.any():
-            largest = float(np.abs(given).max())
+        vanished = np.atleast_1d(given)[~np.atleast_1d(iq).any(axis=-1)]
+        if vanished.any():
+            largest = float(np.abs(vanished).max())
             raise BadInput(f"{name}: samples of at most {largest:.2g}, which complex64 holds as 0: raise the gain")
     if not np.isfinite(np.ascontiguousarray(iq).view(np.float32)).all():  # real numbers: a quarter of the time
         finite = np.isfinite(iq)

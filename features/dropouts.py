@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from .one_thread import one_thread
+
 #: Samples no further from 0 than so many steps of the converter are nearly 0, and zeros are lost pulses where they are
 #: more than this share of these. Samples without steps differ by next to nothing, and next to none is nearly 0.
 NEAR_STEPS, NEAR_SHARE = 2.1, 0.5
@@ -23,11 +25,19 @@ MOST_ORDERS, BLOCK, STRETCHES = 32, 8192, 6
 #: Share of the mean power that holds a law's coefficients back: next to nothing beside any noise.
 RIDGE = 1e-10
 
+#: Why nothing is told of a record of which no law can be had.
+BEYOND_FILLING_IN = "lost pulses: so many are exactly 0 that they cannot be filled in"
+
 #: Two truths beside each other, as one number.
 _TWO_TRUE = np.array([True, True]).view(np.uint16)
 
 #: Fewer sizes that differ are a converter's that hardly steps at all: it gives 0 most of the time.
 LEAST_DISTINCT = 8
+
+#: A converter's steps that were turned in phase, or whose channels were set right, show about 0 alone: the smallest
+#: samples have one size, to so much of it, no more than so many times as far from 0 as from another sample, or the next
+#: size is larger by so much. Zeros that are no more than so many times as frequent are as common as their neighbours.
+SAME_SIZE, AS_NEAR, NEXT_SIZE, LIKE_NEIGHBOURS = 1e-4, 1.5, 1.2, 4
 
 
 def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
@@ -53,7 +63,7 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     held = np.sort(size[~zero])
     steps = np.diff(held)
     steps = steps[steps > 0]
-    if len(steps) + 1 < LEAST_DISTINCT:
+    if len(steps) + 1 < LEAST_DISTINCT or _steps_about_zero(iq, zero):
         return none
     nearly = np.float32(NEAR_STEPS) * np.median(steps)
     near = int(np.searchsorted(held, nearly, side="right"))
@@ -78,6 +88,21 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     return lost if no_chance else none
 
 
+def _steps_about_zero(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> bool:
+    """Whether zeros are as common as what lies a converter's step away, whichever way its steps are turned."""
+    held = iq[~zero]
+    sizes = np.abs(held)
+    smallest = sizes.min()
+    one_size = sizes <= (1 + SAME_SIZE) * smallest
+    ring = np.count_nonzero(one_size)
+    if ring < 2 or LIKE_NEIGHBOURS * ring < np.count_nonzero(zero):
+        return False
+    apart = np.abs(held - held[sizes.argmin()])
+    nearest = apart[apart > SAME_SIZE * smallest].min(initial=np.inf)
+    following = sizes[~one_size].min(initial=np.inf)
+    return bool(smallest <= AS_NEAR * nearest or following >= NEXT_SIZE * smallest)
+
+
 def mended(iq: NDArray[np.complex64]) -> tuple[NDArray[np.complex64], dict[tuple[int, ...], slice]]:
     """Records with the pulses that each has lost filled in, and of those that a silence still breaks what is whole.
 
@@ -91,7 +116,8 @@ def mended(iq: NDArray[np.complex64]) -> tuple[NDArray[np.complex64], dict[tuple
     records : ndarray of complex64, same shape
         Those that are there are returned as they are.
     stretches : dict of tuple of int to slice
-        Of each broken record, by its index, the longest stretch that is not (see `unbroken`).
+        Of each broken record, by its index, the longest stretch that is not (see `unbroken`): an empty one where so
+        many pulses were lost that no law tells of them.
     """
     zeros, out = _zeros(iq), iq
     stretches: dict[tuple[int, ...], slice] = {}
@@ -102,7 +128,7 @@ def mended(iq: NDArray[np.complex64]) -> tuple[NDArray[np.complex64], dict[tuple
         if lost.any():
             out = iq.copy() if out is iq else out
             out[index] = filled(iq[index], lost)
-        stretch = unbroken(out[index])
+        stretch = unbroken(out[index]) if out[index][lost].all() else slice(0, 0)
         if stretch != slice(0, iq.shape[-1]):
             stretches[index] = stretch
     return out, stretches
@@ -197,12 +223,13 @@ def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.com
     processes", IEEE Trans. ASSP 34 (1986).
     """
     out = iq.copy()
-    for block in np.array_split(np.arange(len(iq)), max(len(iq) // BLOCK, 1)):
-        own = lost[block]
-        if own.any():
-            start = max(block[0] - 2 * MOST_ORDERS, 0)
-            part = slice(start, block[-1] + 1 + 2 * MOST_ORDERS)
-            out[block[own]] = _filled_block(iq[part].astype(np.complex128), lost[part])[block[own] - start]
+    with one_thread:
+        for block in np.array_split(np.arange(len(iq)), max(len(iq) // BLOCK, 1)):
+            own = lost[block]
+            if own.any():
+                start = max(block[0] - 2 * MOST_ORDERS, 0)
+                part = slice(start, block[-1] + 1 + 2 * MOST_ORDERS)
+                out[block[own]] = _filled_block(iq[part].astype(np.complex128), lost[part])[block[own] - start]
     for found, given in ((out.real, iq.real), (out.imag, iq.imag)):
         found[lost] = np.clip(found[lost], given.min(), given.max())
     return out

@@ -13,8 +13,9 @@ from .notch import body_line
 from .samples import finite_complex, require_radar, scaled, unit_scale
 from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum
 
-#: Dwells by which the body is followed [s].
-BODY_DWELL_S = 0.1
+#: Dwells by which the body is followed [s], each over the next two: of dwells side by side a heave of their rate would
+#: make one slow slope.
+BODY_DWELL_S, OVERLAP = 0.1, 3
 
 #: Fewest pulses of such a dwell: a radar slower than that sees no body.
 LEAST_PULSES = 16
@@ -95,15 +96,17 @@ def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> Cours
     length = round(BODY_DWELL_S * prf_hz)
     if length < LEAST_PULSES:
         return np.nan, np.nan, np.nan
-    count = len(iq) // length
-    spectrum = doppler_spectrum(iq[: count * length].reshape(count, length), carrier_hz=carrier_hz, prf_hz=prf_hz)
+    starts = np.arange(0, len(iq) - length + 1, max(length // OVERLAP, 1))
+    dwells = np.lib.stride_tricks.sliding_window_view(iq, length)[starts]
+    spectrum = doppler_spectrum(dwells, carrier_hz=carrier_hz, prf_hz=prf_hz)
     body = body_line(spectrum)
     if np.median(body.level_db) < LINE_DB:
         return np.nan, np.nan, np.nan
     velocity = body.velocity_mps.astype(np.float64)
     ambiguous = prf_hz * spectrum.wavelength_m / 2
     velocity = np.unwrap(velocity, period=ambiguous)
-    when = ((np.arange(count) + 0.5) * length - (len(iq) - 1) / 2) / prf_hz
+    count = len(starts)
+    when = (starts + (length - len(iq)) / 2) / prf_hz
     # a dwell whose strongest line is a wing's must not turn the line: medians of slopes (Theil and Sen)
     some = np.unique(np.linspace(0, count - 1, min(count, MOST_DWELLS)).astype(np.intp))
     first, second = some[np.stack(np.triu_indices(len(some), 1))]
@@ -111,4 +114,4 @@ def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> Cours
     rest = velocity - slope * when
     middle = float(np.median(rest))
     spread = 1.4826 * float(np.median(np.abs(rest - middle)))
-    return middle, slope, spread / float(np.sqrt(((when - when.mean()) ** 2).sum()))
+    return middle, slope, spread * float(np.sqrt(OVERLAP / ((when - when.mean()) ** 2).sum()))

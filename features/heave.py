@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .dropouts import unbroken
 from .following import by_recording, followed, normed, standing
 from .lines import squared
 from .spectrum import SPEED_OF_LIGHT_MPS
@@ -85,6 +86,7 @@ def heave(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float) 
 def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[float, float, bool]:
     """The fields of `Heave` of one recording."""
     nothing = (np.nan, np.nan, False)
+    iq = iq[unbroken(iq)]
     if len(iq) < LEAST_S * prf_hz or not iq.any():
         return nothing
     shown, course = followed(normed(iq), carrier_hz, prf_hz)

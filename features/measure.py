@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .allocator import keep_freed
-from .dropouts import mended
-from .measure_record import measure_record
+from .dropouts import BEYOND_FILLING_IN, mended
+from .measure_record import measure_record, unmeasured
 from .measurements import EACH_ROTOR, Measurements
 from .one_channel import made_analytic
 from .one_thread import one_thread
@@ -87,8 +87,12 @@ def measure(
     with one_thread:
         for index in np.ndindex(some.shape[:-1]):
             record, own = some[index], spectrum.rows(index)
-            if index in stretches:
-                record = made_analytic(given[index][stretches[index]])
+            stretch = stretches.get(index)
+            if stretch is not None and stretch.start == stretch.stop:
+                rows.append(unmeasured(BEYOND_FILLING_IN))
+                continue
+            if stretch is not None:
+                record = made_analytic(given[index][stretch])
                 own = doppler_spectrum(record, carrier_hz=carrier_hz, prf_hz=prf_hz)
             rows.append(measure_record(record, own, blades, beta_rad))
             if on_record and samples.size:

@@ -56,6 +56,13 @@ MOST_RADARS = 2
 WIDEST_INDEX = 0.04
 
 
+def unmeasured(reason: str) -> dict[str, Any]:
+    """A value for each array of `Measurements` of a record of which nothing is told, and why."""
+    out: dict[str, Any] = {field.name: np.nan for field in fields(Measurements)}
+    out |= dict.fromkeys(EACH_ROTOR, np.full(MAX_ROTORS, np.nan))
+    return out | {"rotors_resolved": False, "gear_reason": "no comb", "band_reason": "", "reason": reason}
+
+
 def measure_record(
     iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | None, beta_rad: float | None
 ) -> dict[str, Any]:
@@ -75,15 +82,13 @@ def measure_record(
     dict
         A value for each array of `Measurements`.
     """
-    out: dict[str, Any] = {field.name: np.nan for field in fields(Measurements)}
-    out |= dict.fromkeys(EACH_ROTOR, np.full(MAX_ROTORS, np.nan))
-    out |= {"rotors_resolved": False, "gear_reason": "no comb", "band_reason": ""}
     if 0 < largest_part(iq) < LEAST_PART:
-        return out | {"reason": "no digits left in samples this small: raise the gain"}
+        return unmeasured("no digits left in samples this small: raise the gain")
     spectrum = with_free_side(spectrum)
     data = prepared(iq, spectrum)
     if data is None:
-        return out | {"reason": "no signal"}
+        return unmeasured("no signal")
+    out = unmeasured("")
     iq, data, spectrum, family, why = _found(iq, data, spectrum, blades)
     body = body_line(spectrum)
     mask = notch_mask(spectrum, body.index)

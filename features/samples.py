@@ -20,6 +20,9 @@ NOT_FINITE = f"iq holds values that are not finite: {FILL_IN}"
 #: What is said of samples that are finite, but not in complex64.
 TOO_LARGE = "iq holds values that are too large for complex64: lower the gain"
 
+#: What is said of a record that is none in complex64.
+TOO_SMALL = "iq holds a record that complex64 holds as 0: raise the gain"
+
 #: A record whose largest part is below this has lost its digits among float32's denormal numbers: 9 bits are left here.
 LEAST_PART = 2.0**-140
 
@@ -61,11 +64,14 @@ def finite_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
     Raises
     ------
     ValueError
-        If they are not complex or not finite, some are masked, or the last axis holds fewer than `least` pulses.
+        If they are not complex or not finite, some are masked, a record is 0 in complex64 alone, or the last axis
+        holds fewer than `least` pulses.
     """
     samples = as_complex(iq, least)
     if not np.isfinite(samples).all():
         raise ValueError(NOT_FINITE if not np.isfinite(iq).all() else TOO_LARGE)
+    if samples is not iq and np.asarray(iq)[~samples.any(axis=-1)].any():
+        raise ValueError(TOO_SMALL)
     return samples
 
 

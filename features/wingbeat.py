@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .dropouts import unbroken
 from .following import by_recording, followed, normed, standing
 from .repetition import HARMONICS, LevelSpectrum, Repetition, level_spectrum, repetition
 from .spectrum import LEAST_FLOOR, SPEED_OF_LIGHT_MPS
@@ -141,6 +142,11 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     velocity = body[0]
     if np.isnan(velocity):
         return (*nothing, "no wingbeat: no body line")
+    whole = unbroken(iq)
+    if whole != slice(0, len(iq)):  # silences repeat, and what is there comes and goes with them
+        if whole.stop - whole.start < LEAST_S * prf_hz:
+            return (np.nan, np.nan, np.nan, *body, f"no wingbeat: silences leave less than {LEAST_S:g} s in one piece")
+        return _one(iq[whole], carrier_hz, prf_hz)
     steady = standing(shown, body, carrier_hz, prf_hz)
     frame_s = float(np.clip(wavelength_m / 2 / CELL_MPS, *FRAME_S))
     frames = stft(steady, carrier_hz=carrier_hz, prf_hz=prf_hz, window_s=frame_s, overlap=1 - HOP_S / frame_s)

@@ -17,6 +17,7 @@ from .comb_search import (
     SEARCHED_RATIO,
     best_candidate,
     factors_about,
+    fastest_chopping,
     heights,
     spacing_limits,
     with_faster,
@@ -344,7 +345,14 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
         )
     power = powers_over_noise(data, fit, fitted[1])
     within = (fit.orders >= start.low) & (fit.orders <= start.high)
-    per_turn = strong_multiple(fit.orders[within], power[within], blade_numbers(blades))
+    most = int(fastest_chopping(data) / fit.spacing)
+
+    def strong(numbers: range) -> int:
+        return strong_multiple(fit.orders[within], power[within], range(numbers.start, min(numbers.stop, most + 1)))
+
+    per_turn = strong(blade_numbers(blades))
+    if per_turn == 1 and blades is not None and blades > 1:  # a fraction of the comb of so many may have been found
+        per_turn = strong(blade_numbers(None))
     for number in sorted({1, per_turn}):
         if of_mains(fit, data, start.score, number):
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"

@@ -24,6 +24,9 @@ MIN_SPACING_BINS = 3.0
 #: and more, so that it is not sought where that found is finer.
 FASTEST_HZ, LEAST_FRACTION_HZ = 4000.0, 300.0
 
+#: No lines further apart than this share of the PRF are a comb's: five fit into the span.
+MOST_SPACING = 0.2
+
 #: The largest spacing sought is so many times the smallest, or none is sought.
 SEARCHED_RATIO = 1.5
 
@@ -144,7 +147,12 @@ def factors_about(pulses: int, steps: int, per_bin: int) -> NDArray[np.float64]:
 def spacing_limits(pulses: int, prf_hz: float) -> tuple[float, float]:
     """Smallest and largest spacing sought [cycles a sample]; empty where the first is not below the second."""
     low, high = CHOPPING_RANGE_HZ
-    return max(low / prf_hz, MIN_SPACING_BINS / pulses), min(high / prf_hz, 0.2)
+    return max(low / prf_hz, MIN_SPACING_BINS / pulses), min(high / prf_hz, MOST_SPACING)
+
+
+def fastest_chopping(data: Periodogram) -> float:
+    """The highest chopping frequency that is told [cycles a sample]."""
+    return min(FASTEST_HZ / data.prf_hz, MOST_SPACING)
 
 
 def coarse_spacings(
@@ -392,7 +400,7 @@ def best_candidate(data: Periodogram) -> Candidate | None:
 def with_faster(data: Periodogram, found: Candidate) -> Candidate:
     """The loudest comb beyond the cepstrum's range where it speaks louder than that found, which else stays."""
     low, _ = spacing_limits(data.pulses, data.prf_hz)
-    faster = _best_within(data, (max(low, CHOPPING_RANGE_HZ[1] / data.prf_hz), min(FASTEST_HZ / data.prf_hz, 0.2)))
+    faster = _best_within(data, (max(low, CHOPPING_RANGE_HZ[1] / data.prf_hz), fastest_chopping(data)))
     return faster if faster is not None and faster.score > found.score else found
 
 

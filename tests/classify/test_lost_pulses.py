@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from bladewing.classify import Classifier, answer, load_recording
+from bladewing.classify import BadInput, Classifier, answer, load_recording
 from bladewing.classify.predict import long_look
 from bladewing.classify.recording import Recording
-from bladewing.features.dropouts import longest_silence
+from bladewing.features import measure
+from bladewing.features.dropouts import BEYOND_FILLING_IN, longest_silence
 from bladewing.simulate import Scene
 
 from ..features.signals import white
@@ -178,3 +179,23 @@ def test_records_of_a_batch_are_broken_each_in_its_way() -> None:
         np.testing.assert_array_equal(given.probabilities[:, cell], alone.probabilities)
         assert given.labels[:, cell].tolist() == alone.labels.tolist()
         assert given.reasons[:, cell].tolist() == alone.reasons.tolist()
+
+
+def test_what_lost_more_pulses_than_can_be_filled_in_is_unknown() -> None:
+    """One pulse in ten of a bird that glides was a UAV in a third of the records."""
+    iq = (30 * np.exp(0.3j * np.arange(1600)) + noise(np.random.default_rng(8), 1600)).astype(np.complex64)
+    few = np.where(np.arange(1600) % 10 == 0, iq, 0)
+    answers = Classifier.load().predict(np.stack([iq, few]), carrier_hz=10e9, prf_hz=20e3)
+    assert not answers.reasons[0].startswith("lost")
+    assert (answers.labels[1], answers.reasons[1]) == ("unknown", BEYOND_FILLING_IN)
+    np.testing.assert_allclose(answers.probabilities[1], 1 / 3, atol=1e-6)
+
+
+def test_a_record_too_weak_for_complex64_is_told_of_alone_and_among_others() -> None:
+    iq = np.stack([np.ones(2048, complex), np.full(2048, 1e-50j)])
+    radar = {"carrier_hz": 10e9, "prf_hz": 20e3}
+    for given in (iq, iq[1]):
+        with pytest.raises(BadInput, match=r"at most 1e-50, which complex64 holds as 0: raise the gain"):
+            Classifier.load().predict(given, **radar)
+        with pytest.raises(ValueError, match="complex64 holds as 0: raise the gain"):
+            measure(given, **radar)

@@ -5,7 +5,16 @@ import re
 import numpy as np
 import pytest
 from bladewing.features import measure
-from bladewing.features.dropouts import LEAST_DISTINCT, MOST_IN_A_ROW, filled, lost_pulses, mended, unbroken
+from bladewing.features.dropouts import (
+    BEYOND_FILLING_IN,
+    LEAST_DISTINCT,
+    MOST_IN_A_ROW,
+    filled,
+    lost_pulses,
+    mended,
+    unbroken,
+)
+from bladewing.features.one_thread import one_thread
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -182,3 +191,42 @@ def test_measure_fills_lost_pulses_in() -> None:
     assert every.chopping_hz == pytest.approx(2 * 58.61, rel=1e-3)
     assert every.tip_speed_mps[1] == pytest.approx(every.tip_speed_mps[0], rel=0.03)
     assert every.chopping_hz[0] == measure(whole, **radar).chopping_hz
+
+
+@pytest.mark.parametrize("sigma", [0.4, 0.7, 1.0, 3.0])
+@pytest.mark.parametrize("turn", ["phase", "channels set right", "motion taken out"])
+def test_a_converter_s_zeros_stay_its_own_whichever_way_its_steps_are_turned(sigma: float, turn: str) -> None:
+    held = np.round(sigma * noise(np.random.default_rng(3), 2000) * 2**0.5)
+    turned = {
+        "phase": held * np.exp(0.7j),
+        "channels set right": held.real + 1j * (1.03 * held.imag + 0.02 * held.real),
+        "motion taken out": held * np.exp(0.01j * np.arange(2000)),
+    }[turn].astype(np.complex64)
+    assert not turned.all()
+    assert not lost_pulses(turned).any()
+
+
+@pytest.mark.parametrize("every", [2, 3, 6, 10])
+def test_of_a_record_that_lost_too_many_nothing_is_told(every: int) -> None:
+    """What is left was once read as it was: lines that the losses draw, and rotors of them."""
+    given = np.zeros((2, 1600), np.complex64)
+    given[:, ::every] = (30 * np.exp(0.3j * np.arange(1600)) + noise(np.random.default_rng(4), 1600))[::every]
+    given[1] = 30 * np.exp(0.3j * np.arange(1600)) + noise(np.random.default_rng(4), 1600)
+    records, stretches = mended(given)
+    np.testing.assert_array_equal(records, given)
+    assert stretches == {(0,): slice(0, 0)}
+    found = measure(given, carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
+    assert found.reason[0] == BEYOND_FILLING_IN
+    assert np.isnan(found.body_velocity_mps[0])
+    assert np.isfinite(found.body_velocity_mps[1])
+
+
+def test_pulses_are_filled_in_on_one_thread(monkeypatch) -> None:
+    """On several, which wait for one another, a record of 1600 pulses took up to 13 s."""
+    whole = np.exp(0.3j * np.arange(700)).astype(np.complex64)
+    lost = np.arange(700) % 20 == 11
+    held = []
+    solve = np.linalg.solve
+    monkeypatch.setattr(np.linalg, "solve", lambda *a: (held.append(one_thread._inside), solve(*a))[1])
+    filled(np.where(lost, 0, whole), lost)
+    assert held == [1]

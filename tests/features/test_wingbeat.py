@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from bladewing.features.heave import heave
 from bladewing.features.wingbeat import wingbeat
 from bladewing.simulate import Scene
 
@@ -115,3 +116,32 @@ def test_a_gull_flies_as_far_a_beat_as_a_wheel_rolls_a_turn_but_flashes(heading_
     iq, truth = bird("herring_gull", 10.0, heading_deg=heading_deg, velocity_mps=velocity_mps)
     found = wingbeat(iq, **LONG)
     assert found.wingbeat_hz == pytest.approx(truth["wingbeat_hz"], abs=0.3), found.reason
+
+
+@pytest.mark.parametrize("level", [3.0, 500.0])
+def test_silences_do_not_beat(level):
+    """A quarter of each tenth of a second is silent; where 1.5 s are whole, these are looked at."""
+    count = 16_000
+    steady = level * tone(-10 / WAVELENGTH_M, count, prf_hz=8e3) + white(np.random.default_rng(1), count)
+    gated = np.where(np.arange(count) % 800 < 200, 0, steady).astype(np.complex64)
+    found = wingbeat(gated, carrier_hz=CARRIER_HZ, prf_hz=8e3)
+    assert np.isnan(found.wingbeat_hz)
+    assert "silences leave less than 1.5 s in one piece" in str(found.reason)
+    assert found.velocity_mps == pytest.approx(5.0, abs=0.05)
+    assert np.isnan(heave(gated, carrier_hz=CARRIER_HZ, prf_hz=8e3).heave_hz)
+    once = np.where(np.arange(count) // 200 == 5, 0, steady).astype(np.complex64)
+    assert "silences" not in str(wingbeat(once, carrier_hz=CARRIER_HZ, prf_hz=8e3).reason)
+
+
+@pytest.mark.parametrize("wingbeat_hz", [9.9, 10.05, 12.2, 19.9])
+def test_a_heave_makes_no_slope(wingbeat_hz):
+    """Dwells of a tenth of a second side by side made one of a heave of that rate, hundreds of deviations off."""
+    radar = {"carrier_hz": CARRIER_HZ, "prf_hz": 8e3}
+    bird = {"name": "bird", "species": "starling", "wingbeat_hz": wingbeat_hz, "heave_m": 0.004, "elevation_deg": 30.0}
+    bird |= {"velocity_mps": 5.0, "acceleration_mps2": 1.0, "heading_deg": 40.0, "body_db": 25.0}
+    birds = [bird | {"phase_deg": phase} for phase in (0.0, 135.0, 225.0)]
+    scenes = [Scene.build({"radar": {**radar, "pulses": 20_000}, "bird": [one]}) for one in birds]
+    iq = [one.render(1, full=True).iq for one in scenes]
+    found = wingbeat(np.stack(iq), **radar)
+    np.testing.assert_array_less(np.abs(found.acceleration_mps2 - 1), 2.5 * found.acceleration_mps2_std)
+    np.testing.assert_array_less(found.acceleration_mps2_std, 0.1)

@@ -245,6 +245,13 @@ def test_a_prf_in_khz_is_warned_of():
     assert said == ["radar.prf_hz is 25: in Hz, so that 25 kHz is 25e3"]
 
 
+def test_a_rotor_s_own_angle_stands_in_the_truth():
+    rotor = {"blade_length_m": 0.15, "rotation_hz": 58.0, "flash_db": 15.0}
+    uav = {"name": "x", "beta_deg": 20.0, "rotors": [rotor, rotor | {"beta_deg": 60.0}]}
+    truth = Scene.build({"radar": RADAR, "uav": [uav]}).render().truth[0]
+    assert (truth["beta_deg"], truth["rotor_beta_deg"]) == (20.0, [20.0, 60.0])
+
+
 def test_rpm_and_grams_are_warned_of():
     rotor = {"blade_length_m": 0.15, "rotation_hz": 3500.0, "flash_db": 15.0, "beta_deg": 90.0}
     bird = {"name": "b", "mass_kg": 350.0, "wing_db": 10.0, "body_db": 20.0}

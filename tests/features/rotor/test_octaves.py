@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bladewing.features import measure
 from bladewing.features.rotor.comb import find_comb, strong_multiple
 from bladewing.features.rotor.octaves import coarsest, over_neighbours
 from bladewing.features.rotor.periodogram import prepare
@@ -85,3 +86,38 @@ def test_the_parity_of_a_tip_s_lines_makes_no_unlike_blades():
         orders = np.arange(-int(reach), int(reach) + 1)
         power = 1e4 * special.jv(orders, reach) ** 2 + rng.exponential(size=len(orders))
         assert strong_multiple(orders, power, range(2, 5)) == 1
+
+
+@pytest.fixture(scope="module")
+def five_tips():
+    """Records of a rotor of five tips of which two or three lines show to a side."""
+    prf_hz, pulses, beta_rad, turn_hz = 12_792.0, 1321, np.radians(73), 149.9
+    time_s = np.arange(pulses) / prf_hz
+
+    def one(seed):
+        rng = np.random.default_rng(seed)
+        phase, velocity_mps, *turns = rng.uniform(0, 6.28), rng.uniform(-15, 15), rng.random(), rng.random()
+        wave = 2j * np.pi * 2 * 7.6e9 / 299_792_458
+        angles = phase + 2 * np.pi * (turn_hz * time_s[:, None] + np.arange(5) / 5)
+        tips = np.exp(wave * 0.1271 * np.cos(beta_rad) * np.cos(angles)).sum(axis=1)
+        tips *= np.sqrt(10**2.26 / np.mean(np.abs(tips) ** 2)) * np.exp(2j * np.pi * turns[0])
+        echo = (tips + 10 ** (46.1 / 20) * np.exp(2j * np.pi * turns[1])) * np.exp(-wave * velocity_mps * time_s)
+        noise = rng.standard_normal(pulses) + 1j * rng.standard_normal(pulses)
+        return (echo + noise / 2**0.5).astype(np.complex64)
+
+    return lambda *seeds: (np.stack([one(seed) for seed in seeds]), {"carrier_hz": 7.6e9, "prf_hz": prf_hz})
+
+
+def test_no_multiple_of_a_comb_is_told_beyond_what_is_sought(five_tips):
+    """Once 6021 Hz, where up to 4 kHz and a fifth of the PRF are sought."""
+    iq, radar = five_tips(7, 37)
+    assert (measure(iq, **radar).chopping_hz < 12_792 / 5).all()
+
+
+def test_blades_that_are_given_leave_no_fraction_of_their_comb(five_tips):
+    """Found at half the spacing, it was told so where five blades were given, and right where they were not."""
+    iq, radar = five_tips(13, 24, 38)
+    found = measure(iq, **radar, blades=5, beta_rad=np.radians(73))
+    np.testing.assert_allclose(found.chopping_hz, 749.5, rtol=1e-3)
+    np.testing.assert_allclose(found.rotation_hz, 149.9, rtol=1e-3)
+    np.testing.assert_allclose(found.blade_length_m, 0.1271, rtol=0.03)
