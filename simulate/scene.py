@@ -106,15 +106,15 @@ class Scene(Setting):
         """
         return make_plan(self, seed, tolerance_db=tolerance_db)
 
-    def render(self, seed: int = 0, *, tolerance_db: float = -10.0, full: bool = False) -> Rendering:
-        """Render to slow-time IQ (see `render.render`).
+    def render(self, seed: int = 0, *, full: bool = False) -> Rendering:
+        """Render to slow-time IQ (see `render.render`), as planned, or leaving nothing out.
 
         Raises
         ------
         ValueError
-            As for `plan`.
+            If the seed is no whole number, or negative.
         """
-        return render(self, seed, plan=None if full else self.plan(seed, tolerance_db=tolerance_db))
+        return render(self, seed, plan=None if full else self.plan(seed))
 
 
 def shipped() -> list[str]:
