@@ -13,7 +13,7 @@ from bladewing.features import model_inputs
 from bladewing.simulate import Radar, draw_records
 from scipy import fft
 
-from .ratios import cpu_seconds, table
+from .ratios import cpu_seconds, repeated, table
 
 RADAR = Radar(9.85e9, 25e3, 2048)
 AXES = {"carrier_hz": RADAR.carrier_hz, "prf_hz": RADAR.prf_hz}
@@ -32,16 +32,8 @@ def costs(iq, candidates: dict[str, Callable[[], object]], title: str) -> None:
     """Write a table of the candidates' cost a record beside one complex64 FFT of it."""
     records = len(iq)
     repeats = 200 // records + 1
-
-    def again(call: Callable[[], object], times: int) -> Callable[[], None]:
-        def calls() -> None:
-            for _ in range(times):
-                call()
-
-        return calls
-
-    timed = {name: again(call, repeats) for name, call in candidates.items()}
-    spent = cpu_seconds({"one FFT": again(lambda: fft.fft(iq), 10 * repeats), **timed})
+    timed = {name: repeated(call, repeats) for name, call in candidates.items()}
+    spent = cpu_seconds({"one FFT": repeated(lambda: fft.fft(iq), 10 * repeats), **timed})
     each = {name: seconds / repeats / records for name, seconds in spent.items()}
     each["one FFT"] /= 10
     rows = [(name, f"{cost / each['one FFT']:.1f}", f"{cost * 1e6:.0f}") for name, cost in each.items()]
