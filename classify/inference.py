@@ -121,7 +121,8 @@ class Classifier:
     ------
     BadInput
         Not a bladewing model, altered after it was written, or made for other inputs or another version; or its
-        calibration records do not support the false-alarm rate, or it stores no prediction sets of that coverage.
+        calibration records do not support the false-alarm rate, or it stores no prediction sets of that coverage. Or
+        `threads` is no whole number of 1 or more, or `max_false_alarm` or `coverage` no number above 0.
     """
 
     classes: tuple[str, str, str] = CLASSES

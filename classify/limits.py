@@ -62,7 +62,13 @@ def require_size(path: Path) -> int:
 
 
 def require_unpacked(path: Path, unpacked: int) -> None:
-    """Refuse a packed file that says it unpacks to more than it may."""
+    """Refuse a packed file that says it unpacks to more than it may.
+
+    Raises
+    ------
+    BadInput
+        It does.
+    """
     most = most_unpacked(path.stat().st_size)
     if unpacked > most:
         raise BadInput(

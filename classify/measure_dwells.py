@@ -35,6 +35,11 @@ def measure_dwells(iq: NDArray[np.complex64], *, on_record: Callable[[float], No
     -------
     Measurements
         Of all of them, in their order.
+
+    Raises
+    ------
+    ValueError
+        As for `measure`.
     """
     work: Callable[[NDArray[np.complex64]], Measurements] = partial(measure, **given)
     started, runs, done = time.perf_counter(), [], 0

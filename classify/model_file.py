@@ -122,7 +122,13 @@ def open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.In
 
 
 def checked_metadata(metadata: Mapping[str, str], source: str) -> tuple[Envelope, tuple[float, float, float]]:
-    """Check what a model says of itself against what this version can serve."""
+    """Check what a model says of itself against what this version can serve.
+
+    Raises
+    ------
+    BadInput
+        It is no bladewing model, of another format or schema, or its metadata are damaged.
+    """
     product = metadata.get("product")
     if product != "bladewing":
         exported = "an exported graph, for onnxruntime alone: give the model that it was made of"
@@ -151,7 +157,13 @@ def checked_metadata(metadata: Mapping[str, str], source: str) -> tuple[Envelope
 
 
 def point_of_curve(metadata: Mapping[str, str], max_false_alarm: float, source: str, models: int) -> OperatingPoint:
-    """The point of the model's curve that keeps to its part of a false-alarm rate."""
+    """The point of the model's curve that keeps to its part of a false-alarm rate.
+
+    Raises
+    ------
+    BadInput
+        It holds no curve or a damaged one, or its calibration records do not support the rate.
+    """
     if CURVE_KEY not in metadata:
         raise BadInput(f"{source}: holds no operating curve, so no false-alarm rate can be chosen: train it again")
     try:
@@ -161,7 +173,13 @@ def point_of_curve(metadata: Mapping[str, str], max_false_alarm: float, source: 
 
 
 def prediction_sets(metadata: Mapping[str, str], coverage: float, source: str) -> tuple[float, ...]:
-    """The thresholds of the model's prediction sets of one coverage."""
+    """The thresholds of the model's prediction sets of one coverage.
+
+    Raises
+    ------
+    BadInput
+        It holds no sets, damaged ones, or none of that coverage.
+    """
     if SETS_KEY not in metadata:
         raise BadInput(f"{source}: holds no prediction sets, so no coverage can be chosen: train it again")
     try:
@@ -177,7 +195,13 @@ def prediction_sets(metadata: Mapping[str, str], coverage: float, source: str) -
 
 
 def checked_inputs(session: onnxruntime.InferenceSession, source: str) -> tuple[str, ...]:
-    """Names of the graph's inputs, checked against what the features give."""
+    """Names of the graph's inputs, checked against what the features give.
+
+    Raises
+    ------
+    BadInput
+        An input is another, there is none, or the graph gives no probabilities.
+    """
     for node in session.get_inputs():
         if INPUT_SHAPES.get(node.name) != tuple(node.shape[1:]):
             raise BadInput(
@@ -192,7 +216,13 @@ def checked_inputs(session: onnxruntime.InferenceSession, source: str) -> tuple[
 
 
 def checked_kinds(metadata: Mapping[str, str], session: onnxruntime.InferenceSession, source: str) -> Mapping[str, str]:
-    """The kinds that a model tells apart inside, name to class; none where it knows none."""
+    """The kinds that a model tells apart inside, name to class; none where it knows none.
+
+    Raises
+    ------
+    BadInput
+        They are damaged, or the graph does not give the scores of as many.
+    """
     try:
         kinds = json.loads(metadata.get(KINDS_KEY, "{}"))
         if not isinstance(kinds, dict) or list(kinds.values()) != sorted(kinds.values(), key=CLASSES.index):

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .lines import from_whole
 from .notch import LOBE_BINS, Body, body_line
 from .spectrum import Spectrum
 
@@ -23,8 +24,7 @@ ACROSS_DB, ACROSS_BINS = 13.0, 1
 
 def within(size: int, centre: float, half: float) -> NDArray[np.bool_]:
     """True in the bins of a spectrum in FFT order so near to a place [cycles a sample]."""
-    away = np.arange(size) / size - centre
-    return np.abs(away - np.rint(away)) <= half
+    return np.asarray(np.abs(from_whole(np.arange(size) / size - centre)) <= half)
 
 
 def turns_of(spectrum: Spectrum, line: Body) -> float:

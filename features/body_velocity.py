@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bodies import LINE_DB, tops
+from .lines import from_whole
 from .notch import LOBE_BINS
 from .rotor.comb_centre import AT_REST_BINS
 from .rotor.comb_fit import CombFit
@@ -156,8 +157,7 @@ def _lobe(bins: NDArray[np.floating]) -> NDArray[np.floating]:
 
 def _bins_from(spectrum: Spectrum, place: float) -> NDArray[np.float64]:
     """Distance of each bin from a frequency [cycles a sample], around the circle [bins]."""
-    away = spectrum.frequency_hz / spectrum.prf_hz - place
-    return np.asarray((away - np.rint(away)) * spectrum.bins, np.float64)
+    return np.asarray(from_whole(spectrum.frequency_hz / spectrum.prf_hz - place) * spectrum.bins, np.float64)
 
 
 def _pulled_bins(spectrum: Spectrum, own: float) -> float:

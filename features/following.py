@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .bodies import LINE_DB
+from .lines import from_whole
 from .notch import body_line
 from .samples import finite_complex, require_radar, scaled, unit_scale
 from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum
@@ -88,7 +89,7 @@ def standing(iq: NDArray[np.complex64], course: Course, carrier_hz: float, prf_h
     velocity, acceleration, _ = course
     time_s = (np.arange(len(iq)) - (len(iq) - 1) / 2) / prf_hz
     turns = 2 * carrier_hz / SPEED_OF_LIGHT_MPS * (velocity * time_s + acceleration / 2 * time_s**2)
-    return iq * np.exp(2j * np.pi * (turns - np.rint(turns))).astype(np.complex64)
+    return iq * np.exp(2j * np.pi * from_whole(turns)).astype(np.complex64)
 
 
 def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> Course:

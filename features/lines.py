@@ -24,6 +24,11 @@ def squared(amplitude: NDArray[np.complexfloating]) -> NDArray[np.floating]:
     return np.asarray(amplitude.real**2 + amplitude.imag**2)
 
 
+def from_whole(turns: NDArray[np.floating]) -> NDArray[np.floating]:
+    """How far turns are from the nearest whole ones, -0.5 to 0.5: folds frequencies [cycles a sample] into the span."""
+    return np.asarray(turns - np.rint(turns))
+
+
 def middle_times(pulses: int) -> NDArray[np.float64]:
     """Of each pulse, its time from the middle of the record [samples]."""
     return np.asarray(np.arange(pulses) - (pulses - 1) / 2, np.float64)

@@ -76,7 +76,13 @@ def finite_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
 
 
 def require_radar(carrier_hz: float, prf_hz: float) -> tuple[float, float]:
-    """Both frequencies [Hz] in float64, as phases need them; what is none is refused."""
+    """Both frequencies [Hz] in float64, as phases need them; what is none is refused.
+
+    Raises
+    ------
+    ValueError
+        If one is no finite number above 0.
+    """
     for name, value in (("carrier_hz", carrier_hz), ("prf_hz", prf_hz)):
         is_one = isinstance(value, Real) or (isinstance(value, np.ndarray) and value.ndim == 0)
         if not (is_one and math.isfinite(value) and value > 0):

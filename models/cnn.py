@@ -147,6 +147,11 @@ class EvidenceNet(nn.Module):
         along W of a signal of one axis (H is 1), along H of an image.
     kinds
         Class of each kind that the network tells apart inside, 0 to 2, rising.
+
+    Raises
+    ------
+    ValueError
+        Where the kinds do not rise, or a class has none.
     """
 
     bands: Tensor

@@ -108,6 +108,11 @@ class Course:
         Compute the scores and their gradients in bfloat16, weights and steps in float32 as ever: on processors that
         multiply such numbers in hardware (AVX-512 BF16, AMX) a step takes 0.6 of the time, and networks of 96 000
         records learned no worse (docs/ablation.md); on others it takes longer.
+
+    Raises
+    ------
+    ValueError
+        Where there are too few epochs or records a step, or `patience` is negative.
     """
 
     epochs: int

@@ -62,7 +62,7 @@ def rotors_echo(
     radar : Radar
         The radar that looks.
     rotors : sequence of Rotor
-        The rotors.
+        The rotors, at least one.
     records : int
         Aircraft in the batch.
     velocity_mps, acceleration_mps2 : array_like, shape (records,)
@@ -79,7 +79,7 @@ def rotors_echo(
     Raises
     ------
     ValueError
-        If a blade is a row of more points than float32 can tell apart, or too many wavelengths long for it.
+        If a blade is a row of no points, or of more than float32 can tell apart, or too many wavelengths long for it.
     """
     most = max((rotor.points or 0 for rotor in rotors), default=0)
     if most > MOST_FLOAT32_POINTS:

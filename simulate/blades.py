@@ -57,7 +57,13 @@ class Blades:
         edge_asymmetry: ArrayLike,
         points: int | None = None,
     ) -> "Blades":
-        """From the parameters of `rotor_echo`, for records of the leading shape `lead`."""
+        """From the parameters of `rotor_echo`, for records of the leading shape `lead`.
+
+        Raises
+        ------
+        ValueError
+            If `points` is below 1.
+        """
         if points is not None and points < 1:
             raise ValueError(f"points is {points!r}: a blade has at least 1, or None for a line")
 

@@ -35,6 +35,11 @@ class RotorMotion:
         Linear change of the rate [Hz/s].
     wander_hz, wander_rate_hz, wander_phase_rad : array_like
         Amplitude [Hz], rate [Hz] and phase [rad] of a slow sinusoidal wander of the rate (governor and gusts).
+
+    Raises
+    ------
+    ValueError
+        If a rate of the wander is not above 0.
     """
 
     rotation_hz: ArrayLike

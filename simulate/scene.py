@@ -87,16 +87,34 @@ class Scene(Setting):
         return cls.build(values, name)
 
     def without(self, *names: str) -> "Scene":
-        """Give the same scene with these parts or receiver effects off."""
+        """Give the same scene with these parts or receiver effects off.
+
+        Raises
+        ------
+        SceneError
+            If a name is none of the scene's parts, nor of its effects, nor "noise".
+        """
         return self.build({**dict(self), "off": (*self.off, *names)})
 
     def plan(self, seed: int = 0, *, tolerance_db: float = -10.0) -> Plan:
-        """Decide what this scene requires (see `plan.make_plan`)."""
+        """Decide what this scene requires (see `plan.make_plan`).
+
+        Raises
+        ------
+        ValueError
+            If the tolerance is NaN, or the seed no whole number or negative.
+        """
         return make_plan(self, seed, tolerance_db=tolerance_db)
 
-    def render(self, seed: int = 0, *, tolerance_db: float = -10.0, full: bool = False) -> Rendering:
-        """Render to slow-time IQ (see `render.render`)."""
-        return render(self, seed, plan=None if full else self.plan(seed, tolerance_db=tolerance_db))
+    def render(self, seed: int = 0, *, full: bool = False) -> Rendering:
+        """Render to slow-time IQ (see `render.render`), as planned, or leaving nothing out.
+
+        Raises
+        ------
+        ValueError
+            If the seed is no whole number, or negative.
+        """
+        return render(self, seed, plan=None if full else self.plan(seed))
 
 
 def shipped() -> list[str]:

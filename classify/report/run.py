@@ -257,7 +257,13 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
 
 
 def training_account(folder: Path | None) -> dict[str, Any] | None:
-    """Read what `train.json` beside the models says of their training; None where there is none."""
+    """Read what `train.json` beside the models says of their training; None where there is none.
+
+    Raises
+    ------
+    BadInput
+        It cannot be read, is not JSON, or not the account of a training.
+    """
     file = (SHIPPED if folder is None else folder).joinpath(ACCOUNT)
     try:
         content = file.read_bytes() if folder is None else read_bounded(folder / ACCOUNT, MOST_TEXT_BYTES)

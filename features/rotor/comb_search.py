@@ -10,6 +10,7 @@ from scipy import fft
 
 from ..chopping import CHOPPING_RANGE_HZ
 from ..evidence import MOST_SNRS, Evidence
+from ..lines import from_whole
 from .comb_sums import running_sums
 from .flashes import flash_evidence
 from .folding import FOLDED_TIMES, comes_back, fastest_tip, outermost_orders
@@ -162,8 +163,7 @@ def coarse_spacings(
     low, high = limits
     grid = _grid(data.pulses, low, high)
     size = len(data.power)
-    offset = np.arange(size) / size - centre
-    distance = np.abs(offset - np.rint(offset))
+    distance = np.abs(from_whole(np.arange(size) / size - centre))
     turn = np.exp(-2j * np.pi * centre * np.arange(data.pulses))
     found: list[float] = []
     for correlation in _correlations(evidence.rows[0], distance, BANDS, data.pulses):
@@ -192,8 +192,7 @@ def free_spacings(data: Periodogram, evidence: Evidence, limits: tuple[float, fl
     """
     grid = _grid(data.pulses, *limits)
     size = len(data.power)
-    offset = np.arange(size) / size
-    distance = np.abs(offset - np.rint(offset))
+    distance = np.abs(from_whole(np.arange(size) / size))
     number = np.arange(1, MAX_PERIODS + 1)
     steering = np.exp(-2j * np.pi * np.outer(np.arange(48) / 48, number))
     found = []
@@ -362,7 +361,7 @@ def from_mirror_bins(
 ) -> NDArray[np.float64]:
     """How far a comb's lines lie from those of its mirror image about velocity zero [bins]."""
     off = 2 * np.asarray(centre) / spacing
-    return np.asarray(np.abs(off - np.rint(off)) * spacing * pulses)
+    return np.asarray(np.abs(from_whole(off)) * spacing * pulses)
 
 
 def _mirrored(data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..lines import from_whole
 from .comb_search import FINE_STEPS, FLASH_SHARE, Candidate, factors_about, heights, loudest_of_each, spacing_limits
 from .flashes import flash_evidence
 from .folding import may_come_back
@@ -137,8 +138,7 @@ def _told_by_presence(data: Periodogram, comb: Candidate) -> _Presence:
     there = own > 0
     lines, of_lines = _up_to_order(np.abs(order[seen]), there, comb.last)
     size = len(row)
-    away = np.arange(size) / size - comb.centre
-    turns = (away - np.rint(away)) / comb.spacing
+    turns = from_whole(np.arange(size) / size - comb.centre) / comb.spacing
     near = data.seen & (turns > comb.low - 0.5) & (turns < comb.high + 0.5)
     places, of_places = _up_to_order(np.rint(np.abs(turns[near])).astype(np.intp), row[near] > 0, comb.last)
     least = 0.5 / np.maximum(lines, 1)

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from ..lines import from_whole
 from .periodogram import Periodogram
 
 #: No blade's tip is faster [m/s]; a radar of a wide span sees further, but what stands there is another's or noise.
@@ -35,7 +36,7 @@ def fastest_tip(data: Periodogram) -> float:
 
 def _beside_bins(ends: NDArray[np.float64], turns: NDArray[np.float64], pulses: int) -> NDArray[np.float64]:
     """How far ends of spans lie from a line of a comb [bins]: given in its spacings, as `turns`, one span, is."""
-    return np.asarray(np.abs(ends - np.rint(ends)) / turns * pulses, np.float64)
+    return np.asarray(np.abs(from_whole(ends)) / turns * pulses, np.float64)
 
 
 def comes_round(spacing: float, pulses: int, within_bins: float = FOLDED_BINS) -> bool:

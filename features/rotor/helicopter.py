@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..evidence import MOST_SNRS, Evidence, line_evidence
-from ..lines import sum_of_lines
+from ..lines import from_whole, sum_of_lines
 from .comb import Comb, powers_over_noise, strong_multiple
 from .comb_fit import MARGIN_ORDERS, CombFit, fit_combs
 from .comb_search import FINE_STEPS, Candidate, factors_about, heights, score, spacing_limits
@@ -198,9 +198,8 @@ def _left_over(data: Periodogram, comb: Comb) -> tuple[Periodogram, NDArray[np.b
 def _hidden(rest: Periodogram, first: CombFit) -> NDArray[np.bool_]:
     """True in the bins that the first comb or what was taken out hides."""
     bins = np.arange(len(rest.power)) / len(rest.power)
-    away = bins - first.centre
-    away = (away - np.rint(away)) / first.spacing
-    near = np.abs(away - np.rint(away)) * first.spacing * rest.pulses < SHADOW_BINS
+    orders = from_whole(bins - first.centre) / first.spacing
+    near = np.abs(from_whole(orders)) * first.spacing * rest.pulses < SHADOW_BINS
     return np.asarray(near | ~rest.usable(bins), np.bool_)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, special
 
-from ..lines import squared
+from ..lines import from_whole, squared
 from .comb_fit import CombFit
 from .periodogram import PADDING, Periodogram
 from .slow_lines import remove_bands
@@ -111,8 +111,7 @@ def past_edge(
         The edge and its standard deviation [cycles a sample from the centre].
     """
     frequency = fft.fftfreq(data.pulses)
-    away = np.abs(frequency - centre)
-    away = np.abs(away - np.rint(away))
+    away = np.abs(from_whole(np.abs(frequency - centre)))
     usable, spacing = data.usable(frequency), float(rates.mean())
     end = edge[0] + EDGE_DEVIATIONS * edge[1] + ROLL_OFF * spacing * max(edge[0] / spacing, 1.0) ** (1 / 3)
     past = usable & (away > max(edge[0], min(end, LAST)))

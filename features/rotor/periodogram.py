@@ -11,7 +11,7 @@ from scipy import fft
 
 from ..bodies import within
 from ..evidence import Evidence, line_evidence
-from ..lines import LineSpace, squared
+from ..lines import LineSpace, from_whole, squared
 from ..one_channel import half_empty
 from ..spectrum import Spectrum, doppler_spectrum
 from .clicks import without_clicks
@@ -148,8 +148,7 @@ class Periodogram:
         """True where a line at this frequency [cycles a sample] is not touched by what was taken out."""
         ok = np.ones(np.shape(frequency), bool)
         for centre, half in self.blocked:
-            away = frequency - centre
-            ok &= np.abs(away - np.rint(away)) > half + 1.5 / self.pulses
+            ok &= np.abs(from_whole(frequency - centre)) > half + 1.5 / self.pulses
         return ok
 
     @cached_property
@@ -174,7 +173,7 @@ class Periodogram:
         That falls from velocity zero to both sides, and no level further out is higher; where lines fill their band it
         rises towards the tips.
         """
-        return np.asarray(np.abs(frequency - np.rint(frequency)) < self._skirt_half, np.bool_)
+        return np.asarray(np.abs(from_whole(frequency)) < self._skirt_half, np.bool_)
 
     def in_band(self, frequency: NDArray[np.floating]) -> NDArray[np.bool_]:
         """True where the receiver lets noise through: past its filter there is less than anywhere within."""
@@ -184,8 +183,7 @@ class Periodogram:
         """True where a line at this frequency [cycles a sample] was taken out."""
         out = np.zeros(np.shape(frequency), bool)
         for centre, half in self.blocked:
-            away = frequency - centre
-            out |= np.abs(away - np.rint(away)) < half - 3.0 / self.pulses
+            out |= np.abs(from_whole(frequency - centre)) < half - 3.0 / self.pulses
         return out
 
     def level_of(self, rest: NDArray[np.complex128], *, evened: bool = False) -> Level:

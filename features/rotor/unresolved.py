@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from ..lines import squared
+from ..lines import from_whole, squared
 from .comb import Comb, blade_numbers
 from .comb_fit import CombFit
 from .flash_count import FLASH_PADDING, FLASH_WIDTH, flashes_in_period
@@ -133,13 +133,13 @@ def power_about(data: Periodogram, rest: NDArray[np.complex128], centre: float) 
     outweigh all others by chance.
     """
     frequency = fft.fftfreq(data.pulses)
-    away = np.abs(frequency - centre)
+    away = np.abs(from_whole(np.abs(frequency - centre)))
     seen = data.usable(frequency) & data.in_band(frequency)
     power = squared(fft.fft(rest)) / data.pulses
     skirt = data.in_skirt(frequency)
     if skirt.any():
         power[skirt] /= np.maximum(data.level_of(rest)(frequency[skirt]), 1.0)
-    return np.abs(away - np.rint(away)), power, seen
+    return away, power, seen
 
 
 class Left(NamedTuple):

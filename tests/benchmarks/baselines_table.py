@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .baselines import BASELINES
-from .ratios import cpu_seconds
+from .ratios import cpu_seconds, repeated
 
 OURS = ("features-boosted", "spectrum-cnn-fast", "spectrum-cnn", "spectrum-cnn-wide")
 TIMED = Radar(9.85e9, 25e3, 2048)
@@ -56,16 +56,8 @@ def costs_ffts(
     answers: dict[str, Callable[[NDArray[np.complex64]], object]], iq: NDArray[np.complex64], repeats: int
 ) -> dict[str, float]:
     """Cost of each answer over the bare FFT of the same records."""
-
-    def times(call: Callable[[NDArray[np.complex64]], object], count: int) -> Callable[[], None]:
-        def calls() -> None:
-            for _ in range(count):
-                call(iq)
-
-        return calls
-
-    calls = {"": times(fft.fft, 20 * repeats)} | {name: times(call, repeats) for name, call in answers.items()}
-    spent_s = cpu_seconds(calls, rounds=7)
+    calls = {name: repeated(partial(call, iq), repeats) for name, call in answers.items()}
+    spent_s = cpu_seconds({"": repeated(partial(fft.fft, iq), 20 * repeats)} | calls, rounds=7)
     return {name: 20 * spent_s[name] / spent_s[""] for name in answers}
 
 

@@ -24,6 +24,16 @@ def cpu_seconds(candidates: Mapping[str, Callable[[], object]], *, rounds: int =
     return {name: median(values) for name, values in spent.items()}
 
 
+def repeated(call: Callable[[], object], times: int) -> Callable[[], None]:
+    """What calls so many times: a single call may be too short for the clock."""
+
+    def calls() -> None:
+        for _ in range(times):
+            call()
+
+    return calls
+
+
 def table(title: str, head: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
     """Write a table to `FOLDER` as Markdown and keep it for the end of the run."""
     widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]

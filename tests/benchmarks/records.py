@@ -30,6 +30,11 @@ def white(rng: np.random.Generator, *shape: int) -> np.ndarray:
     return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) * np.sqrt(0.5)
 
 
+def moving_at(velocity_mps: float, times_s: np.ndarray = TIMES_S, wavelength_m: float = WAVELENGTH_M) -> np.ndarray:
+    """Echo of unit amplitude of what moves away at a velocity."""
+    return np.exp(-4j * np.pi * velocity_mps * times_s / wavelength_m)
+
+
 def apart(rng: np.random.Generator, count: int, least: float, low: float, high: float) -> np.ndarray:
     """Rates of chance within a range, rising, each at least so far from the next, any unit."""
     while True:
@@ -92,7 +97,7 @@ def record(
         blades += tail
         blades /= np.sqrt(np.mean(np.abs(blades) ** 2))
     target = blades + 10 ** (body_db / 20) * np.exp(2j * np.pi * rng.uniform())
-    iq = amplitude * target * np.exp(-4j * np.pi * velocity_mps * TIMES_S / WAVELENGTH_M)
+    iq = amplitude * target * moving_at(velocity_mps)
     if ground_db is not None:
         iq = iq + amplitude * 10 ** (ground_db / 20) * ground(rng)
     return (iq * gain + white(rng, PULSES)).astype(np.complex64)

@@ -8,12 +8,13 @@ import onnxruntime
 import pytest
 from bladewing.classify import Classifier
 from bladewing.classify.export import export_raw_iq
+from bladewing.classify.labels import CLASSES, UNKNOWN
 from bladewing.classify.model_file import model_names
 from bladewing.features import model_inputs
 from bladewing.simulate import Radar, draw_records
 from scipy import fft
 
-from .ratios import cpu_seconds, table
+from .ratios import cpu_seconds, repeated, table
 
 RADAR = Radar(9.85e9, 25e3, 2048)
 AXES = {"carrier_hz": RADAR.carrier_hz, "prf_hz": RADAR.prf_hz}
@@ -32,16 +33,8 @@ def costs(iq, candidates: dict[str, Callable[[], object]], title: str) -> None:
     """Write a table of the candidates' cost a record beside one complex64 FFT of it."""
     records = len(iq)
     repeats = 200 // records + 1
-
-    def again(call: Callable[[], object], times: int) -> Callable[[], None]:
-        def calls() -> None:
-            for _ in range(times):
-                call()
-
-        return calls
-
-    timed = {name: again(call, repeats) for name, call in candidates.items()}
-    spent = cpu_seconds({"one FFT": again(lambda: fft.fft(iq), 10 * repeats), **timed})
+    timed = {name: repeated(call, repeats) for name, call in candidates.items()}
+    spent = cpu_seconds({"one FFT": repeated(lambda: fft.fft(iq), 10 * repeats), **timed})
     each = {name: seconds / repeats / records for name, seconds in spent.items()}
     each["one FFT"] /= 10
     rows = [(name, f"{cost / each['one FFT']:.1f}", f"{cost * 1e6:.0f}") for name, cost in each.items()]
@@ -52,6 +45,10 @@ def costs(iq, candidates: dict[str, Callable[[], object]], title: str) -> None:
 def test_model_inputs_against_one_fft(records):
     iq = draw_records(RADAR, records, 0, purpose="bench").iq
     candidates = {title: partial(model_inputs, iq, **AXES, names=names) for title, names in INPUTS.items()}
+    together = model_inputs(iq, **AXES, names={name for names in INPUTS.values() for name in names})
+    for made in candidates.values():  # what is cheaper alone is the same alone
+        for name, rows in made().items():
+            np.testing.assert_array_equal(rows, together[name])
     costs(iq, candidates, f"Features of {records}: batches of {records} x 2048 pulses")
 
 
@@ -63,10 +60,13 @@ def test_answers_against_one_fft(records, tmp_path):
     options.intra_op_num_threads = 1
     candidates = {}
     for name in model_names():
-        candidates[name] = partial(Classifier.load(name).predict, iq, **AXES)
+        candidates[name] = predict = partial(Classifier.load(name).predict, iq, **AXES)
         graph = tmp_path / f"{name}.onnx"
         export_raw_iq(graph, **AXES, pulses=RADAR.pulses, model=name)
         exported = onnxruntime.InferenceSession(graph, options)
-        candidates[f"{name}, exported"] = partial(exported.run, None, packed)
+        candidates[f"{name}, exported"] = run = partial(exported.run, ["probabilities", "label"], packed)
+        answer, (probabilities, label) = predict(), run()
+        np.testing.assert_allclose(probabilities, answer.probabilities, atol=0.002)
+        assert np.array([*CLASSES, UNKNOWN])[label].tolist() == answer.labels.tolist()
     goal = f"IQ to probabilities, goal of the cheapest {GOALS[records]} x"
     costs(iq, candidates, f"Answers of {records}: batches of {records} x 2048 pulses, {goal}")

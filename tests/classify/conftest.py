@@ -1,10 +1,10 @@
-"""Small models and recordings that the tests of classify share."""
+"""Small models, recordings and stand-ins that the tests of classify share."""
 
 import json
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
@@ -29,6 +29,27 @@ front_epochs = 1
 front_s = 1e-3
 family_train = 600
 """
+
+
+def noise(pulses: int, records: tuple[int, ...] = (), seed: int = 0) -> np.ndarray:
+    """Complex noise, shape (*records, pulses)."""
+    parts = np.random.default_rng(seed).normal(size=(*records, pulses, 2)).astype(np.float32)
+    return parts.view(np.complex64)[..., 0]
+
+
+def interrupt(*_: object, **__: object) -> NoReturn:
+    """Stand in for any function, to stop a run there as Ctrl-C does."""
+    raise KeyboardInterrupt
+
+
+def no_constant(name: str) -> NoReturn:
+    """Read no NaN or infinity, which JSON does not know: what `json.loads` asks for as `parse_constant`."""
+    raise AssertionError(f"{name} is not JSON")
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """Names and contents of a folder's files."""
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 def model_bytes(
@@ -176,6 +197,14 @@ def report_folder(tmp_path_factory: pytest.TempPathFactory, tiny_models: Path, t
     return folder
 
 
+@pytest.fixture(scope="module")
+def report(report_folder: Path) -> dict[str, Any]:
+    """What that report's JSON holds."""
+    text = (report_folder / "report.json").read_text(encoding="utf-8")
+    found: dict[str, Any] = json.loads(text, parse_constant=no_constant)
+    return found
+
+
 @pytest.fixture
 def sigmf_pair(tmp_path: Path) -> Callable[..., Path]:
     """Write a SigMF recording, by default 4000 pulses of noise; keywords change the metadata, None drops a field."""
@@ -189,7 +218,7 @@ def sigmf_pair(tmp_path: Path) -> Callable[..., Path]:
         annotations: object = (),
         **fields: object,
     ) -> Path:
-        samples = np.random.default_rng(0).normal(size=8000).astype(np.float32).view(np.complex64) if iq is None else iq
+        samples = noise(4000) if iq is None else iq
         general = {"datatype": "cf32_le", "sample_rate": PRF_HZ, "version": "1.2.0"} | fields
         metadata = {
             "global": {f"core:{key}": value for key, value in general.items() if value is not None},

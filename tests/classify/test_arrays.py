@@ -12,7 +12,9 @@ from bladewing.classify.recording import load_recording
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-IQ = np.random.default_rng(0).normal(size=400).astype(np.float32).view(np.complex64)
+from .conftest import noise
+
+IQ = noise(200)
 REAL = np.arange(5.0)
 
 

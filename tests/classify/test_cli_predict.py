@@ -14,14 +14,11 @@ from bladewing.classify import BadInput, Classifier, Recording, answer, load_rec
 from bladewing.classify import recording as recordings
 from bladewing.classify.cli import main
 
-PRF_HZ = 20e3
+from .conftest import PRF_HZ, interrupt, no_constant, noise
+
 NAMES = ["uav", "bird", "clutter"]
 
 STILL = {"comb_hz": None, "wingbeat_hz": None, "heave_hz": None, "steps": False}  # without rotors, wings and limbs
-
-
-def noise(pulses: int) -> np.ndarray:
-    return np.random.default_rng(0).normal(size=2 * pulses).astype(np.float32).view(np.complex64)
 
 
 @pytest.fixture
@@ -41,10 +38,6 @@ def run_json(run):
     def predict(*arguments: object, **options: object) -> list[dict]:
         code, out, err = run("--json", *arguments, **options)
         assert (code, err) == (0, "")
-
-        def no_constant(name):
-            raise AssertionError(f"{name} is not JSON")
-
         return [json.loads(line, parse_constant=no_constant) for line in out.splitlines()]
 
     return predict
@@ -347,9 +340,6 @@ def test_bad_models(run, sigmf_pair, tmp_path, uav_model):
 
 
 def test_interrupted_by_the_user(run, sigmf_pair, monkeypatch):
-    def interrupt(*_, **__):
-        raise KeyboardInterrupt
-
     monkeypatch.setattr(recordings, "load_recording", interrupt)
     assert run("--json", sigmf_pair()) == (130, "", "bladewing: stopped: interrupted\n")
 

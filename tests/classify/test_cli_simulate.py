@@ -12,6 +12,8 @@ from bladewing.classify.cli import main
 from bladewing.classify.recording import load_recording
 from bladewing.simulate.scene import Scene
 
+from .conftest import content
+
 SCENE = """
 title = "test"
 [radar]
@@ -74,10 +76,10 @@ def test_a_recording_that_was_not_simulated_is_not_written_over(scene_file, tmp_
         (tmp_path / "rec.sigmf-data").write_bytes(b"measured")
     else:
         (tmp_path / held).write_bytes(b"measured")
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    before = content(tmp_path)
     assert main(["simulate", str(scene_file), "--out", str(tmp_path / "rec")]) == 2
     assert "was not simulated: it is not written over: give another --out NAME" in capsys.readouterr().err
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    assert content(tmp_path) == before
     # what was simulated is replaced
     assert main(["simulate", str(scene_file), "--out", str(tmp_path / "own")]) == 0
     assert main(["simulate", str(scene_file), "--out", str(tmp_path / "own"), "--seed", "2"]) == 0

@@ -9,6 +9,8 @@ from bladewing.classify.cli import main
 from bladewing.classify.labels import decide_by_sets
 from bladewing.models.operating import OperatingCurve, OperatingPoint
 
+from .conftest import noise
+
 SETS = json.dumps([[0.8, 0.5, 0.4, 0.4], [0.9, 0.3, 0.1, 0.1], [0.99, 0.0, 0.0, 0.0]])
 
 
@@ -21,8 +23,7 @@ def model(make_model, tmp_path_factory):
 
 
 def answer(classifier: Classifier) -> tuple[str, str]:
-    iq = np.random.default_rng(0).normal(size=(200, 2)).view(complex)[:, 0]
-    given = classifier.predict(iq, carrier_hz=10e9, prf_hz=20e3)
+    given = classifier.predict(noise(200), carrier_hz=10e9, prf_hz=20e3)
     return str(given.labels), str(given.reasons)
 
 

@@ -20,16 +20,14 @@ from bladewing.classify.progress import Progress
 from bladewing.classify.training_config import TrainingConfig
 from bladewing.simulate import stream
 
+from .conftest import content
+
 COUNTS = {"train": 100, "validate": 24, "calibrate": 30, "test": 24}
 PLAN = DataSetPlan(3, COUNTS)
 
 
 def write(folder, plan=PLAN):
     return write_dataset(folder, plan, Progress(visible=False), workers=1)
-
-
-def content(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 @pytest.fixture(autouse=True)

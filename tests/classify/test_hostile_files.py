@@ -226,9 +226,22 @@ def shipped(name="spectrum-cnn-fast"):
         return file.read()
 
 
-def test_a_model_that_refers_to_another_file_is_refused_before_it_is_opened(tmp_path, monkeypatch):
-    import onnx
+@pytest.fixture
+def unopened(tmp_path, monkeypatch):
+    """Write a model with a seal that fits, which nothing may open."""
     import onnxruntime
+
+    def write(model):
+        path = tmp_path / "x.onnx"
+        path.write_bytes(resealed(model.SerializeToString()))
+        return path
+
+    monkeypatch.setattr(onnxruntime, "InferenceSession", lambda *_, **__: pytest.fail("opened"))
+    return write
+
+
+def test_a_model_that_refers_to_another_file_is_refused_before_it_is_opened(unopened):
+    import onnx
 
     model = onnx.load_model_from_string(shipped())
     tensor = next(iter(model.graph.initializer))
@@ -236,9 +249,7 @@ def test_a_model_that_refers_to_another_file_is_refused_before_it_is_opened(tmp_
     tensor.ClearField("float_data")
     tensor.data_location = onnx.TensorProto.EXTERNAL
     tensor.external_data.add(key="location", value="../../../etc/passwd")
-    path = tmp_path / "x.onnx"
-    path.write_bytes(resealed(model.SerializeToString()))
-    monkeypatch.setattr(onnxruntime, "InferenceSession", lambda *_, **__: pytest.fail("opened"))
+    path = unopened(model)
     with pytest.raises(BadInput, match="refers to data outside its file"):
         Classifier.load(path)
 
@@ -246,17 +257,14 @@ def test_a_model_that_refers_to_another_file_is_refused_before_it_is_opened(tmp_
 @pytest.mark.parametrize(
     "change", [("product", "other"), ("format", "9"), ("classes", "[1]"), ("envelope", "[" * 9999)]
 )
-def test_a_foreign_model_with_a_seal_that_fits_is_refused_before_it_is_opened(tmp_path, monkeypatch, change):
+def test_a_foreign_model_with_a_seal_that_fits_is_refused_before_it_is_opened(unopened, change):
     import onnx
-    import onnxruntime
 
     model = onnx.load_model_from_string(shipped())
     for entry in model.metadata_props:
         if entry.key == change[0]:
             entry.value = change[1]
-    path = tmp_path / "x.onnx"
-    path.write_bytes(resealed(model.SerializeToString()))
-    monkeypatch.setattr(onnxruntime, "InferenceSession", lambda *_, **__: pytest.fail("opened"))
+    path = unopened(model)
     with pytest.raises(BadInput, match=r"x\.onnx") as caught:
         Classifier.load(path)
     assert "\n" not in str(caught.value)

@@ -16,12 +16,9 @@ from bladewing.simulate import Radar, draw_records
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from .conftest import noise
+
 RADAR = {"carrier_hz": 10e9, "prf_hz": 20e3}
-
-
-def noise(pulses: int, records: tuple[int, ...] = (), seed: int = 0) -> np.ndarray:
-    parts = np.random.default_rng(seed).normal(size=(*records, pulses, 2)).astype(np.float32)
-    return parts.view(np.complex64)[..., 0]
 
 
 @pytest.fixture(scope="module")

@@ -78,11 +78,15 @@ def test_lost_pulses_of_a_recording_draw_no_rotor(tmp_path) -> None:
     assert said.endswith("filled in from those beside them")
 
 
+def gull() -> np.ndarray:
+    """Four seconds of a gull that flaps and heaves, 6 kHz at 9.85 GHz."""
+    bird = {"name": "gull", "species": "herring_gull", "velocity_mps": -8.0, "heave_m": 0.02}
+    return Scene.build({"radar": {"carrier_hz": 9.85e9, "prf_hz": 6e3, "pulses": 24000}, "bird": [bird]}).render(1).iq
+
+
 def test_a_recording_made_of_samples_is_filled_in_as_one_that_is_read(tmp_path) -> None:
     """Of a gull whose every 40th pulse was lost, a comb that stays was once counted, and no wingbeat."""
-    bird = {"name": "gull", "species": "herring_gull", "velocity_mps": -8.0, "heave_m": 0.02}
-    scene = Scene.build({"radar": {"carrier_hz": 9.85e9, "prf_hz": 6e3, "pulses": 24000}, "bird": [bird]})
-    spoilt = scene.render(1).iq.copy()
+    spoilt = gull().copy()
     spoilt[11::40] = 0
     np.save(tmp_path / "gull.npy", spoilt)
     radar = {"carrier_hz": 9.85e9, "prf_hz": 6e3}
@@ -95,9 +99,7 @@ def test_a_recording_made_of_samples_is_filled_in_as_one_that_is_read(tmp_path) 
 
 
 def test_of_one_channel_a_wingbeat_is_found_too() -> None:
-    bird = {"name": "gull", "species": "herring_gull", "velocity_mps": -8.0, "heave_m": 0.02}
-    scene = Scene.build({"radar": {"carrier_hz": 9.85e9, "prf_hz": 6e3, "pulses": 24000}, "bird": [bird]})
-    both = scene.render(1).iq
+    both = gull()
     assert "wings" in long_look(both, 9.85e9, 6e3)
     assert "wings" in long_look(both.real.astype(np.complex64), 9.85e9, 6e3)
 

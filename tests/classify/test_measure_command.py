@@ -15,7 +15,7 @@ from bladewing.classify.recording import load_recording
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 from scipy.signal import hilbert
 
-from ..features.signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, white
+from ..features.signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, moving_at, white
 
 RADAR = ["--carrier-hz", "9.85e9", "--prf-hz", "35e3"]
 RATE_HZ, LENGTH_M, VELOCITY_MPS = 57.7, 0.15, -20.0
@@ -30,7 +30,7 @@ def spinning(rate_hz, pulses):
 
 def moving(pulses):
     """A line at `VELOCITY_MPS`, of unit power a sample."""
-    return np.exp(-4j * np.pi * VELOCITY_MPS * (np.arange(pulses) / PRF_HZ) / WAVELENGTH_M)
+    return moving_at(VELOCITY_MPS, np.arange(pulses) / PRF_HZ)
 
 
 @pytest.fixture(scope="module")
@@ -98,9 +98,7 @@ def test_a_body_that_grows_faster_has_no_single_velocity(tmp_path, capsys):
     """Of dwells an instant apart the median was told, with the error of a mean."""
     parts = [line * 10 for line in np.split(moving(6 * PULSES), 6)]
     times_s = np.arange(PULSES) / PRF_HZ
-    iq = [
-        part * np.exp(-4j * np.pi * n * times_s / WAVELENGTH_M) for n, part in enumerate(parts)
-    ]  # 1 m/s from each to each
+    iq = [part * moving_at(n, times_s) for n, part in enumerate(parts)]  # 1 m/s from each to each
     np.save(
         tmp_path / "off.npy", (np.concatenate(iq) + white(np.random.default_rng(4), 6 * PULSES)).astype(np.complex64)
     )
@@ -451,7 +449,7 @@ def test_a_comb_that_ends_where_the_body_s_speed_does_is_called_a_wheel_s(tmp_pa
     edge_mps = 16 * rate_hz * wavelength_m / 2
     said = {}
     for speed_mps in (edge_mps, 2 * edge_mps, 5.0):
-        moved = iq * np.exp(-4j * np.pi * speed_mps * times_s / wavelength_m)
+        moved = iq * moving_at(speed_mps, times_s, wavelength_m)
         noise = 0.1 * (rng.standard_normal(PULSES) + 1j * rng.standard_normal(PULSES))
         np.save(tmp_path / "comb.npy", (moved + noise).astype(np.complex64))
         assert main(["measure", str(tmp_path / "comb.npy"), *RADAR]) == 0

@@ -8,9 +8,7 @@ from bladewing.classify.measure_dwells import measure_dwells
 from bladewing.classify.workers import in_order
 from bladewing.features import measure
 
-from ..features.signals import CARRIER_HZ, PRF_HZ, PULSES, rotors, white
-
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+from ..features.signals import PULSES, RADAR, rotors, white
 
 
 @pytest.fixture(scope="module")

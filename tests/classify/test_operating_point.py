@@ -8,6 +8,8 @@ from bladewing.classify import BadInput, Classifier
 from bladewing.classify.cli import main
 from bladewing.models.operating import OperatingCurve, OperatingPoint
 
+from .conftest import noise
+
 CURVE = OperatingCurve(500, 2000, (OperatingPoint(0.1, 0.5, 0.9), OperatingPoint(0.01, 0.85, 0.4)))
 
 
@@ -20,8 +22,7 @@ def model(make_model, tmp_path_factory):
 
 
 def label(classifier: Classifier) -> str:
-    iq = np.random.default_rng(0).normal(size=(200, 2)).view(complex)[:, 0]
-    return str(classifier.predict(iq, carrier_hz=10e9, prf_hz=20e3).labels)
+    return str(classifier.predict(noise(200), carrier_hz=10e9, prf_hz=20e3).labels)
 
 
 def test_the_rate_sets_the_threshold_on_uav_and_no_other(model):

@@ -10,6 +10,8 @@ from bladewing.classify.errors import BadInput
 from bladewing.classify.files import only_writer
 from bladewing.classify.parts import Parts
 
+from .conftest import interrupt
+
 
 def test_parts_are_measured_once_and_only_for_the_same_run(tmp_path: Path) -> None:
     made: list[int] = []
@@ -30,9 +32,6 @@ def test_parts_are_measured_once_and_only_for_the_same_run(tmp_path: Path) -> No
 
 
 def test_an_interrupted_part_is_not_taken_for_a_finished_one(tmp_path: Path) -> None:
-    def interrupt() -> None:
-        raise KeyboardInterrupt
-
     parts = Parts(tmp_path / "parts", {})
     with pytest.raises(KeyboardInterrupt):
         parts.take("one", interrupt)

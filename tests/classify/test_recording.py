@@ -9,13 +9,9 @@ import pytest
 from bladewing.classify.errors import BadInput, unreadable
 from bladewing.classify.recording import Recording, find_recording, load_recording
 
-CARRIER_HZ, PRF_HZ = 10e9, 20e3
+from .conftest import CARRIER_HZ, PRF_HZ, noise
+
 RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
-
-
-def noise(pulses: int, records: tuple[int, ...] = ()) -> np.ndarray:
-    parts = np.random.default_rng(0).normal(size=(*records, pulses, 2)).astype(np.float32)
-    return parts.view(np.complex64)[..., 0]
 
 
 def refused(path, **options) -> str:

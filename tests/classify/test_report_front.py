@@ -1,7 +1,6 @@
 """The front's parts: pictures, bounds, operations, and what is marked as not beaten."""
 
 import copy
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,12 +17,6 @@ from bladewing.classify.timing import Laps, quote, ratio
 from bladewing.simulate import Radar
 
 RADAR = Radar(carrier_hz=9.85e9, prf_hz=25e3, pulses=2000)
-
-
-@pytest.fixture(scope="module")
-def report(report_folder: Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((report_folder / "report.json").read_text(encoding="utf-8"))
-    return found
 
 
 def noise(count: int, pulses: int, seed: int = 0) -> np.ndarray:

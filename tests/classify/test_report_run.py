@@ -20,16 +20,7 @@ from bladewing.classify.stability.cell import Cell
 from bladewing.classify.timing import Laps
 from bladewing.features.schema import INPUT_SHAPES
 
-
-@pytest.fixture(scope="module")
-def report(report_folder: Path) -> dict[str, Any]:
-    def refuse(name: str) -> None:
-        raise AssertionError(f"{name} is not JSON")
-
-    found: dict[str, Any] = json.loads(
-        (report_folder / "report.json").read_text(encoding="utf-8"), parse_constant=refuse
-    )
-    return found
+from .conftest import interrupt
 
 
 def test_report_holds_the_data_of_every_figure(report: dict[str, Any]) -> None:
@@ -197,9 +188,6 @@ def test_interrupted_run_leaves_the_old_files_whole(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def interrupt(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
     old = {name: (report_folder / name).read_bytes() for name in ("report.json", "report.html", "model-card.md")}
     for name, content in old.items():
         (tmp_path / name).write_bytes(content)
@@ -219,9 +207,6 @@ def test_an_interrupted_run_goes_on_where_it_stopped(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def interrupt(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
     def again(*_: object, **__: object) -> None:
         raise AssertionError("what was measured is measured again")
 

@@ -11,7 +11,8 @@ from bladewing.classify.recording import load_recording
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-CARRIER_HZ, PRF_HZ = 10e9, 20e3
+from .conftest import CARRIER_HZ, PRF_HZ
+
 MEASURED = Path(__file__).parents[2].parent / "shared" / "recordings"
 
 
@@ -210,13 +211,19 @@ def test_archives_are_read_like_pairs(sigmf_pair, tmp_path, suffix):
         load_recording(archive)
 
 
-def test_an_undeclared_namespace_in_an_archive_is_no_ones_trouble(sigmf_pair, tmp_path):
+def packed(meta: Path) -> Path:
+    """Put a pair into an archive beside it."""
+    archive = meta.with_name("packed.sigmf")
+    with tarfile.open(archive, "w") as file:
+        for path in (meta, meta.with_suffix(".sigmf-data")):
+            file.add(path, f"rec/{path.name}")
+    return archive
+
+
+def test_an_undeclared_namespace_in_an_archive_is_no_ones_trouble(sigmf_pair):
     meta = sigmf_pair()  # the library warns of it, and a warning is an error here
     meta.write_text(meta.read_text().replace('"core:version"', '"mine:note": "x", "core:version"'))
-    with tarfile.open(tmp_path / "packed.sigmf", "w") as archive:
-        for path in (meta, meta.with_suffix(".sigmf-data")):
-            archive.add(path, f"rec/{path.name}")
-    assert load_recording(tmp_path / "packed.sigmf").iq.size == 4000
+    assert load_recording(packed(meta)).iq.size == 4000
 
 
 @pytest.mark.parametrize(
@@ -228,12 +235,12 @@ def test_an_undeclared_namespace_in_an_archive_is_no_ones_trouble(sigmf_pair, tm
         (["notes.txt"], "holds 0 files .sigmf-meta and 0 files .sigmf-data"),
     ],
 )
-@pytest.mark.parametrize("packed", ["tar", "zip"])
-def test_an_archive_holds_one_recording(sigmf_pair, tmp_path, names, said, packed):
+@pytest.mark.parametrize("kind", ["tar", "zip"])
+def test_an_archive_holds_one_recording(sigmf_pair, tmp_path, names, said, kind):
     meta = sigmf_pair()
     files = {name: meta if name.endswith("meta") else meta.with_suffix(".sigmf-data") for name in names}
-    path = tmp_path / ("packed.sigmf" if packed == "tar" else "packed.sigmf.zip")
-    if packed == "tar":
+    path = tmp_path / ("packed.sigmf" if kind == "tar" else "packed.sigmf.zip")
+    if kind == "tar":
         with tarfile.open(path, "w") as archive:
             for name, file in files.items():
                 archive.add(file, name)
@@ -245,13 +252,10 @@ def test_an_archive_holds_one_recording(sigmf_pair, tmp_path, names, said, packe
         load_recording(path)
 
 
-def test_archives_obey_the_same_rules(sigmf_pair, tmp_path):
-    meta = sigmf_pair(datatype="rf32_le")
-    with tarfile.open(tmp_path / "packed.sigmf", "w") as archive:
-        for path in (meta, meta.with_suffix(".sigmf-data")):
-            archive.add(path, f"rec/{path.name}")
+def test_archives_obey_the_same_rules(sigmf_pair):
+    archive = packed(sigmf_pair(datatype="rf32_le"))
     with pytest.raises(BadInput, match=r"packed.sigmf: real samples"):
-        load_recording(tmp_path / "packed.sigmf")
+        load_recording(archive)
 
 
 JSON = st.recursive(

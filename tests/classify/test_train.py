@@ -25,6 +25,8 @@ from bladewing.models.operating import least_named
 from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.dataset import KIND_CLASS
 
+from .conftest import interrupt
+
 
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory):
@@ -109,10 +111,7 @@ def test_an_interrupted_training_leaves_the_old_files_and_says_how_it_goes_on(tr
     for name in ("features-linear.onnx", "train.json"):
         (tmp_path / name).write_bytes(b"old")
 
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(tabular, "train_boosted", interrupted)
+    monkeypatch.setattr(tabular, "train_boosted", interrupt)
     config = tmp_path / "tiny.toml"
     config.write_text('records = 600\nmodels = ["features-linear", "features-boosted"]\n')
     assert main(["train", "--out", str(tmp_path), "--config", str(config)]) == 130
@@ -162,10 +161,6 @@ def _run(out, *, after=None, then=None, **changed):
         return run_training(out, progress=False)
 
 
-def _interrupt():
-    raise KeyboardInterrupt
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """Models of a training that nothing interrupts."""
@@ -190,7 +185,7 @@ def test_a_killed_and_interrupted_training_goes_on_to_the_same_files(whole, tmp_
     monkeypatch.setattr(tabular, "train_linear", lambda *_, **__: pytest.fail("what was trained is trained again"))
     for after in (2, 3):  # the first epoch is not done again, else it would be the third that never comes
         with pytest.raises(KeyboardInterrupt):
-            _run(tmp_path, after=after, then=_interrupt)
+            _run(tmp_path, after=after, then=interrupt)
     account = _run(tmp_path)
     assert account["resumed"]
     for path in whole.glob("*.onnx"):
@@ -208,7 +203,7 @@ def _stopped_once(out, part, *, after, models):
 
     def once_it_lies_there():
         if list(out.glob(f"train-parts/*/{part}.npz")):
-            raise KeyboardInterrupt
+            interrupt()
 
     with pytest.raises(KeyboardInterrupt):
         _run(out, after=after, then=once_it_lies_there, models=models)
@@ -269,7 +264,7 @@ def test_what_a_model_tells_of_kinds_adds_up_to_its_classes_and_noise_is_one_of_
 
 def test_a_resumed_networks_seconds_hold_those_before_the_interruption(tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        _run(tmp_path, after=2, then=_interrupt)
+        _run(tmp_path, after=2, then=interrupt)
     (file,) = tmp_path.glob("train-parts/*/spectrum-cnn-epochs.npz")
     with np.load(file) as kept:
         arrays = dict(kept)
@@ -283,17 +278,17 @@ def test_other_settings_and_runs_of_other_lengths_do_not_take_what_was_kept(tmp_
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(train, "TASK_RECORDS", records)
         with pytest.raises(KeyboardInterrupt):
-            _run(tmp_path, after=2, then=_interrupt, **changed)
+            _run(tmp_path, after=2, then=interrupt, **changed)
     for after in (1, 2):
         with pytest.raises(KeyboardInterrupt):  # its first epoch comes, so nothing of the other was taken
-            _run(tmp_path, after=after, then=_interrupt)
+            _run(tmp_path, after=after, then=interrupt)
     assert len(list(tmp_path.glob("train-parts/*/spectrum-cnn-epochs.npz"))) == 2
 
 
 @pytest.mark.parametrize("name", ["features-linear", "spectrum-cnn-epochs"])
 def test_what_is_damaged_or_foreign_is_refused_in_one_line(tmp_path, name):
     with pytest.raises(KeyboardInterrupt):
-        _run(tmp_path, after=1, then=_interrupt)
+        _run(tmp_path, after=1, then=interrupt)
     (file,) = tmp_path.glob(f"train-parts/*/{name}.npz")
     kept = file.read_bytes()
     file.write_bytes(kept[: len(kept) // 2])

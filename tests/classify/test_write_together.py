@@ -85,12 +85,17 @@ def test_a_foreign_journal_changes_nothing_and_does_not_stay(tmp_path, journal):
     assert [path.name for path in tmp_path.iterdir()] == ["mine"]
 
 
+def wait_for(path):
+    """Wait until a file lies there, 20 s at most."""
+    deadline = time.monotonic() + 20
+    while not path.exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+
+
 def test_two_writers_never_mix_their_files(tmp_path):
     writers = [subprocess.Popen([sys.executable, "-c", KILL, str(tmp_path)]) for _ in range(2)]
     try:
-        deadline = time.monotonic() + 20
-        while not (tmp_path / "f").exists() and time.monotonic() < deadline:
-            time.sleep(0.01)
+        wait_for(tmp_path / "f")
         for _ in range(20):
             time.sleep(0.01)
             with only_writer(tmp_path):
@@ -119,9 +124,7 @@ while True:
 def test_killed_at_any_moment_the_files_agree(tmp_path):
     for delay_s in (0.02, 0.05, 0.09, 0.14):
         process = subprocess.Popen([sys.executable, "-c", KILL, str(tmp_path)])
-        deadline = time.monotonic() + 20
-        while not (tmp_path / "f").exists() and time.monotonic() < deadline:
-            time.sleep(0.01)
+        wait_for(tmp_path / "f")
         time.sleep(delay_s)
         process.send_signal(signal.SIGKILL)
         process.wait()

@@ -1,14 +1,15 @@
 """Signals of known spectra for the tests of this folder."""
 
 import numpy as np
+from bladewing.features import FEATURES, JOINT_FEATURES, model_inputs
 from bladewing.features.rotor.family import Family, find_family
 from bladewing.features.rotor.periodogram import Periodogram, prepared
 from bladewing.features.spectrum import doppler_spectrum
 from bladewing.simulate import RotorMotion, rotor_echo
 
-from ..benchmarks.records import CARRIER_HZ, PRF_HZ, PULSES, RADAR, TIMES_S, WAVELENGTH_M, white
+from ..benchmarks.records import CARRIER_HZ, PRF_HZ, PULSES, RADAR, TIMES_S, WAVELENGTH_M, moving_at, white
 
-__all__ = ["CARRIER_HZ", "PRF_HZ", "PULSES", "RADAR", "TIMES_S", "WAVELENGTH_M", "white"]
+__all__ = ["CARRIER_HZ", "PRF_HZ", "PULSES", "RADAR", "TIMES_S", "WAVELENGTH_M", "moving_at", "white"]
 
 
 def tone(frequency_hz, pulses: int = PULSES, prf_hz: float = PRF_HZ) -> np.ndarray:
@@ -28,7 +29,7 @@ def rotors(
             blade_amplitudes=amplitudes,
         )
     iq /= np.sqrt(np.mean(abs(iq) ** 2))
-    return (iq + body) * np.exp(-4j * np.pi * velocity_mps * TIMES_S / WAVELENGTH_M)
+    return (iq + body) * moving_at(velocity_mps)
 
 
 def rotors_by_chance(
@@ -60,7 +61,7 @@ def folded(
     prf_hz = 4 * tip_mps / times / WAVELENGTH_M * rng.uniform(0.95, 1.05)
     times_s = np.arange(int(0.1 * prf_hz)) / prf_hz
     echo = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=WAVELENGTH_M, length_m=0.15)
-    iq = (echo + body) * np.exp(-4j * np.pi * velocity_mps * times_s / WAVELENGTH_M)
+    iq = (echo + body) * moving_at(velocity_mps, times_s)
     iq = iq + 10 ** (-snr_db / 20) * white(rng, len(times_s))
     return iq.astype(np.complex64), {"carrier_hz": CARRIER_HZ, "prf_hz": prf_hz}, rates_hz, tip_mps
 
@@ -70,3 +71,15 @@ def family_of(iq: np.ndarray) -> tuple[Periodogram, Family]:
     spectrum = doppler_spectrum(iq, **RADAR)
     data = prepared(iq, spectrum)
     return data, find_family(data, spectrum)[0]
+
+
+def by_name(iq: np.ndarray, which: str = "features", **radar: float) -> dict[str, np.ndarray]:
+    """What a model is given of records of the paper's radar, or of another, by name: features or joint features."""
+    rows = model_inputs(iq, **(RADAR | radar), names=(which,))[which]
+    table = {"features": FEATURES, "joint_features": JOINT_FEATURES}[which]
+    return dict(zip([f.name for f in table], np.moveaxis(rows, -1, 0), strict=True))
+
+
+def cell_of(rate_hz: float, edges_hz: np.ndarray) -> int:
+    """Which cell of an axis holds a rate."""
+    return int(np.searchsorted(edges_hz, rate_hz, side="right")) - 1

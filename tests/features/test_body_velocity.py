@@ -5,7 +5,7 @@ from bladewing.features.body_velocity import NOISE_BINS
 from bladewing.features.window import KAISER_BETA
 from bladewing.simulate import RotorMotion, rotor_echo
 
-from .signals import CARRIER_HZ, PRF_HZ, RADAR, WAVELENGTH_M, rotors_by_chance, white
+from .signals import CARRIER_HZ, PRF_HZ, RADAR, WAVELENGTH_M, moving_at, rotors_by_chance, white
 
 PULSES = 700
 BIN_MPS = PRF_HZ / PULSES * WAVELENGTH_M / 2
@@ -91,7 +91,7 @@ def test_a_body_weaker_than_its_blades_stays_within_the_unambiguous_span(velocit
     prf_hz, times_s = 12e3, np.arange(1500) / 12e3
     rng = np.random.default_rng(3)
     span_mps = WAVELENGTH_M * prf_hz / 4
-    turn = np.exp(-4j * np.pi * velocity_mps * times_s / WAVELENGTH_M)
+    turn = moving_at(velocity_mps, times_s)
     for _ in range(8):
         angle_rad = RotorMotion(rng.uniform(50, 70), rng.uniform(0, 6)).angle_rad(times_s)
         blades = rotor_echo(angle_rad, wavelength_m=WAVELENGTH_M, blade_length_m=0.12)
@@ -109,7 +109,7 @@ def short_drone(seed, velocity_mps, body_db):
     rates_hz = tip_mps / (2 * np.pi * length_m) * (1 + rng.uniform(-0.06, 0.06, 4))
     echo = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=wavelength_m, length_m=length_m, points=1)
     echo = (echo + 10 ** (body_db / 20)) * 10 ** (rng.uniform(0, 25) / 20)
-    iq = echo * np.exp(-4j * np.pi * velocity_mps * times_s / wavelength_m) + white(rng, len(times_s))
+    iq = echo * moving_at(velocity_mps, times_s, wavelength_m) + white(rng, len(times_s))
     return iq.astype(np.complex64), {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
 
 
@@ -134,7 +134,7 @@ def test_an_offset_of_the_receiver_is_not_the_body_of_a_slow_drone():
         rng = np.random.default_rng(seed)
         velocity_mps = rng.uniform(0.6, 1.2) * rng.choice([-1, 1])
         blades = rotors_by_chance(rng, [58.3], times_s, wavelength_m=wavelength_m, length_m=0.08)
-        iq = (0.4 * blades + 5) * np.exp(-4j * np.pi * velocity_mps * times_s / wavelength_m)
+        iq = (0.4 * blades + 5) * moving_at(velocity_mps, times_s, wavelength_m)
         iq += 150 * np.exp(1j * rng.uniform(0, 6)) + white(rng, len(times_s))
         found = measure(iq, carrier_hz=94e9, prf_hz=100e3)
         assert found.chopping_hz == pytest.approx(116.6, rel=0.01)
@@ -147,7 +147,7 @@ def hovering_drone(seed, velocity_mps):
     wavelength_m = 299_792_458.0 / 3.3e9
     rates_hz, length_m = 75 * (1 + rng.uniform(-0.01, 0.01, 4)), rng.uniform(0.05, 0.08)
     echo = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=wavelength_m, length_m=length_m)
-    iq = 3 * (echo + 7) * np.exp(-4j * np.pi * velocity_mps * times_s / wavelength_m)
+    iq = 3 * (echo + 7) * moving_at(velocity_mps, times_s, wavelength_m)
     return iq + white(rng, 1024)
 
 

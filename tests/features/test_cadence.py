@@ -11,17 +11,13 @@ from bladewing.features.window import HANN
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, rotors, tone, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, cell_of, rotors, tone, white
 
 EDGES_HZ = cadence_edges_hz()
 
 
 def cadence(iq, **radar):
     return model_inputs(iq, **(RADAR | radar), names=("cadence",))["cadence"]
-
-
-def cell_of(rate_hz):
-    return int(np.searchsorted(EDGES_HZ, rate_hz, side="right")) - 1
 
 
 @pytest.mark.parametrize("pulses", [1024, 2048, PULSES])
@@ -40,8 +36,8 @@ def test_white_noise_is_flat_at_0_db(pulses):
 def test_flashes_stand_at_their_rate_and_its_multiples(rate_hz):
     iq = rotors([rate_hz], velocity_mps=-7.0) + white(np.random.default_rng(1), PULSES)
     peak = cadence(iq)[1]
-    lines = {cell_of(order * 2 * rate_hz) for order in (1, 2, 3)}
-    around = {cell_of(1.5 * 2 * rate_hz), cell_of(2.5 * 2 * rate_hz)}
+    lines = {cell_of(order * 2 * rate_hz, EDGES_HZ) for order in (1, 2, 3)}
+    around = {cell_of(1.5 * 2 * rate_hz, EDGES_HZ), cell_of(2.5 * 2 * rate_hz, EDGES_HZ)}
     assert min(peak[sorted(lines)]) > max(peak[sorted(around)]) + 6
 
 
@@ -50,7 +46,7 @@ def test_flashes_stand_out_where_the_cepstrum_sees_half_as_many():
 
     def told(iq):
         inputs = model_inputs(iq, **RADAR, names=("features", "cadence"))
-        return inputs["features"][:, strength], inputs["cadence"][:, 1, cell_of(60) :].max(axis=-1)
+        return inputs["features"][:, strength], inputs["cadence"][:, 1, cell_of(60, EDGES_HZ) :].max(axis=-1)
 
     rng = np.random.default_rng(2)
     count = 120
@@ -124,7 +120,7 @@ def test_it_is_what_its_definition_says():
 @pytest.mark.parametrize("iq", [np.zeros(PULSES, complex), np.full(PULSES, 2 - 1j), tone(1234.5)])
 def test_a_lone_line_or_silence_has_no_cadence(iq):
     """What rounding leaves outside the notches is no signal; the window's side lobes come and go slowly."""
-    assert cadence(iq)[:, cell_of(100) : cell_of(5000)].max() <= -6
+    assert cadence(iq)[:, cell_of(100, EDGES_HZ) : cell_of(5000, EDGES_HZ)].max() <= -6
 
 
 def test_one_spoilt_pulse_is_no_flash():

@@ -26,17 +26,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate, special
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, rotors, tone, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, cell_of, rotors, tone, white
 
 EDGES_HZ = comb_edges_hz()
 
 
 def combs(iq, **radar):
     return model_inputs(iq, **(RADAR | radar), names=("combs",))["combs"][..., 0, :]
-
-
-def cell_of(rate_hz):
-    return int(np.searchsorted(EDGES_HZ, rate_hz, side="right")) - 1
 
 
 def plan_of(pulses, carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ):
@@ -103,7 +99,7 @@ def test_bins_with_those_beside_them_are_the_spectrum_through_the_broad_window(p
 @pytest.mark.parametrize("rate_hz", [47.0, 58.6, 91.0])
 def test_a_comb_stands_at_its_spacing(rate_hz):
     iq = rotors([rate_hz], velocity_mps=-7.0) * 0.5 + white(np.random.default_rng(1), PULSES)
-    found, cell = combs(iq), cell_of(2 * rate_hz)
+    found, cell = combs(iq), cell_of(2 * rate_hz, EDGES_HZ)
     at_spacing = found[cell - 1 : cell + 2].max()
     # multiples of its period are periods as well: lower rates are as loud, higher ones are not
     assert at_spacing > max(12, found.max() - 1.5)

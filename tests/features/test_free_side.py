@@ -7,7 +7,7 @@ from bladewing.features.free_side import with_free_side
 from bladewing.features.spectrum import doppler_spectrum
 from scipy.signal import hilbert
 
-from .signals import rotors_by_chance, white
+from .signals import moving_at, rotors_by_chance, white
 
 CARRIER_HZ, PRF_HZ, PULSES = 24e9, 20e3, 2048
 WAVELENGTH_M = 299_792_458.0 / CARRIER_HZ
@@ -21,7 +21,7 @@ def quadcopter(seed: int, velocity_mps: float) -> np.ndarray:
     times_s = np.arange(PULSES) / PRF_HZ
     length_m = TIP_MPS / (2 * np.pi * rates_hz.max())
     echo = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=WAVELENGTH_M, length_m=length_m)
-    iq = 10 * (echo + 5) * np.exp(-4j * np.pi * velocity_mps * times_s / WAVELENGTH_M) + white(rng, PULSES)
+    iq = 10 * (echo + 5) * moving_at(velocity_mps, times_s, WAVELENGTH_M) + white(rng, PULSES)
     return iq.astype(np.complex64)
 
 

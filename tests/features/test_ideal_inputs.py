@@ -8,15 +8,10 @@ from bladewing.features import FEATURES, INPUT_SHAPES, model_inputs
 from bladewing.features.chopping import _evidence
 from bladewing.simulate.scene import Scene
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, WAVELENGTH_M, rotors, tone, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, WAVELENGTH_M, by_name, rotors, tone, white
 
 NAMES = [f.name for f in FEATURES]
 STEP_HZ = 240.0  # of the comb, off the bin
-
-
-def features(iq, **radar) -> dict[str, np.ndarray]:
-    rows = model_inputs(iq, **(RADAR | radar), names=("features",))["features"]
-    return dict(zip(NAMES, np.moveaxis(rows, -1, 0), strict=True))
 
 
 def noise(level: float = 1.0, count: int = 1, seed: int = 0) -> np.ndarray:
@@ -32,7 +27,7 @@ def comb(orders: int = 20, step_hz: float = STEP_HZ, centre_hz: float = 0.0) -> 
 
 
 def test_the_radar_columns_are_the_radar():
-    values = features(noise())
+    values = by_name(noise())
     assert values["velocity_step_log"] == pytest.approx(math.log10(WAVELENGTH_M / 2 / (PULSES / PRF_HZ)), abs=1e-5)
     assert values["unambiguous_log"] == pytest.approx(math.log10(WAVELENGTH_M * PRF_HZ / 4), abs=1e-5)
     assert values["dwell_log"] == pytest.approx(math.log10(PULSES / PRF_HZ), abs=1e-5)
@@ -40,7 +35,7 @@ def test_the_radar_columns_are_the_radar():
 
 
 def test_silence_has_no_body_band_comb_or_change():
-    values = features(np.zeros(PULSES, np.complex64))
+    values = by_name(np.zeros(PULSES, np.complex64))
     # Nothing at all is the lowest level of the seen bins, and 0 wherever there is nothing to measure.
     for name in ("body_level_db", "rest_level_db", "notch_residual_db", "weak_70_110_db"):
         assert values[name] == -20, name
@@ -52,7 +47,7 @@ def test_silence_has_no_body_band_comb_or_change():
 
 
 def test_noise_is_flat_even_and_unrepeating():
-    values = {name: np.median(value) for name, value in features(noise(count=60)).items()}
+    values = {name: np.median(value) for name, value in by_name(noise(count=60)).items()}
     for name in ("notch_residual_db", "empty_side_db"):
         assert abs(values[name]) < 0.7, name
     # means of levels, not of powers, of which the stronger and the weaker side are told apart
@@ -71,8 +66,8 @@ def test_noise_is_flat_even_and_unrepeating():
 
 def test_one_line_is_a_body_and_leaves_noise():
     velocity_mps = -37.3
-    lone = features(1e3 * tone(-2 * velocity_mps / WAVELENGTH_M) + noise(count=20))
-    empty = features(noise(count=20))
+    lone = by_name(1e3 * tone(-2 * velocity_mps / WAVELENGTH_M) + noise(count=20))
+    empty = by_name(noise(count=20))
     np.testing.assert_allclose(lone["body_speed_mps"], 37.3, atol=0.02)
     # amplitude 1000 over unit noise, 3000 pulses through a window of noise bandwidth 1.5 bins
     level_db = 60 + 10 * np.log10(PULSES / 1.5)
@@ -88,7 +83,7 @@ def test_one_line_is_a_body_and_leaves_noise():
 def test_two_lines_are_a_band_of_one_line():
     offset_mps, below_db = 60.0, 20.0
     second = 10 ** (-below_db / 20) * tone(-2 * offset_mps / WAVELENGTH_M)
-    values = features(300 * (tone(0.0) + second) + noise())
+    values = by_name(300 * (tone(0.0) + second) + noise())
     assert values["body_speed_mps"] == pytest.approx(0, abs=0.01)
     assert values["body_level_db"] == pytest.approx(values["rest_level_db"], abs=1e-3)
     # the residual: the second line alone, its energy in a few neighbouring bins, and no other side
@@ -105,7 +100,7 @@ def test_two_lines_are_a_band_of_one_line():
 
 @pytest.mark.parametrize("centre_hz", [0.0, 611.0, -1234.0])
 def test_a_perfect_comb_has_its_step_its_orders_and_no_smear(centre_hz):
-    values = features(10 * comb(centre_hz=centre_hz) + noise())
+    values = by_name(10 * comb(centre_hz=centre_hz) + noise())
     assert 10 ** values["chopping_log"] == pytest.approx(STEP_HZ, rel=0.003)
     assert values["chopping_step_mps"] == pytest.approx(STEP_HZ * WAVELENGTH_M / 2, rel=0.003)
     assert 10 ** values["chopping_turns"] == pytest.approx(STEP_HZ * PULSES / PRF_HZ, rel=0.003)
@@ -131,7 +126,7 @@ def test_a_ripple_of_the_band_does_not_outweigh_a_comb():
 def test_a_hexacopter_over_ground_is_not_taken_for_a_ripple_of_its_band():
     scene = Scene.load("hexacopter")
     iq = np.stack([scene.render(seed).iq.reshape(-1) for seed in range(6)])
-    values = features(iq, carrier_hz=scene.sight.carrier_hz, prf_hz=scene.sight.prf_hz)
+    values = by_name(iq, carrier_hz=scene.sight.carrier_hz, prf_hz=scene.sight.prf_hz)
     # Two blades at 35 Hz. The highest peak alone is right in about 3 of 24, and 500 Hz in the rest.
     right = np.abs(10 ** values["chopping_log"] / 70 - 1) < 0.04
     assert np.count_nonzero(right) >= 4
@@ -144,7 +139,7 @@ def test_a_short_cepstrum_has_evidence_for_every_period_sought(last):
 
 
 def test_a_constant_is_a_body_at_rest():
-    values = features(np.full(PULSES, 3 - 4j))
+    values = by_name(np.full(PULSES, 3 - 4j))
     assert values["body_speed_mps"] == pytest.approx(0, abs=1e-3)
     assert values["rest_level_db"] == values["body_level_db"] > 100
     assert values["notch_residual_share"] < 1e-6
@@ -186,7 +181,7 @@ def test_batch_equals_loop_on_unlike_records():
 
 def test_a_phase_changes_nothing():
     iq = rotors([58.6], velocity_mps=12.0) + noise(0.3)[0]
-    one, other = features(iq), features(iq * np.exp(2.1j))
+    one, other = by_name(iq), by_name(iq * np.exp(2.1j))
     for name in NAMES:
         assert other[name] == pytest.approx(one[name], rel=2e-3, abs=1e-2), name
 
@@ -194,7 +189,7 @@ def test_a_phase_changes_nothing():
 def test_time_reversed_and_conjugated_is_the_same_spectrum():
     """Running the pulses backwards mirrors the Doppler; conjugating mirrors it back."""
     iq = rotors([58.6], velocity_mps=12.0) + noise(0.3)[0]
-    one, other, mirrored = (features(x) for x in (iq, iq[::-1].conj(), iq[::-1]))
+    one, other, mirrored = (by_name(x) for x in (iq, iq[::-1].conj(), iq[::-1]))
     for name in NAMES:
         assert other[name] == pytest.approx(one[name], rel=2e-3, abs=0.05), name
         if name not in ("smearing_index", "chopping_repeats"):  # ratios of what the mirrored bins' floor moves
@@ -204,7 +199,7 @@ def test_time_reversed_and_conjugated_is_the_same_spectrum():
 def test_carrier_and_prf_scaled_together_change_times_and_no_velocity_or_level():
     iq = rotors([58.6], velocity_mps=12.0) + noise(0.3)[0]
     factor = 1.7
-    one, other = features(iq), features(iq, carrier_hz=factor * CARRIER_HZ, prf_hz=factor * PRF_HZ)
+    one, other = by_name(iq), by_name(iq, carrier_hz=factor * CARRIER_HZ, prf_hz=factor * PRF_HZ)
     moved = {"dwell_log": -1, "bandwidth_log": 1, "chopping_log": 1}
     for name in NAMES:
         expected = one[name] + moved.get(name, 0) * math.log10(factor)
@@ -218,7 +213,7 @@ def test_longer_looks_keep_what_is_not_about_resolution():
     rng = np.random.default_rng(3)
     rows = []
     for pulses in (1024, 4096):
-        values = features(white(rng, 60, pulses))
+        values = by_name(white(rng, 60, pulses))
         rows.append({name: np.median(value) for name, value in values.items()})
     for name in ("notch_residual_db", "ripple_db", "empty_side_db", "strong_6_12_db"):
         assert rows[0][name] == pytest.approx(rows[1][name], abs=0.8), name

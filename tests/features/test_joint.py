@@ -1,21 +1,18 @@
 """The numbers read off an STFT image, on inputs whose answer is known."""
 
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from bladewing.features import JOINT_FEATURES, model_inputs
 from bladewing.features.shape import SPEED_BANDS_MPS
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, TIMES_S, WAVELENGTH_M, tone, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, TIMES_S, WAVELENGTH_M, by_name, tone, white
 
 #: Cadences of frames over a dwell stand so far apart [Hz].
 CADENCE_HZ = PRF_HZ / PULSES
 
-
-def joint(iq, **radar) -> dict[str, np.ndarray]:
-    rows = model_inputs(iq, **(RADAR | radar), names=("joint_features",))["joint_features"]
-    return dict(zip([f.name for f in JOINT_FEATURES], np.moveaxis(rows, -1, 0), strict=True))
+joint = partial(by_name, which="joint_features")
 
 
 def line(velocity_mps: float, level: float = 30.0) -> np.ndarray:

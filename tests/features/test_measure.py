@@ -20,9 +20,7 @@ from scipy.signal import hilbert
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from ..benchmarks import records
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
-
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, WAVELENGTH_M, rotors, tone, white
 
 
 def drone(rates_hz, *, snr_db=0.0, seed=0, **options):
@@ -736,14 +734,19 @@ def test_blades_stronger_than_the_body_do_not_move_its_velocity_by_many_orders(b
     assert wrong <= 1
 
 
+def short_drone(rng, rate_hz, periods):
+    """The first so many flashes of one rotor."""
+    pulses = round(periods / (2 * rate_hz) * PRF_HZ)
+    return drone([rate_hz], snr_db=15, velocity_mps=rng.uniform(-25, 25), seed=rng.integers(1000))[:pulses]
+
+
 @pytest.mark.parametrize("periods", [1.6, 2.0, 2.3, 2.6, 2.9])
 def test_a_dwell_of_fewer_than_three_flashes_is_too_short_and_says_so(periods):
     # every second line was taken for the comb: an octave high, without a word
     rng = np.random.default_rng(int(10 * periods))
     for _ in range(8):
         rate_hz = rng.uniform(45, 110)
-        pulses = round(periods / (2 * rate_hz) * PRF_HZ)
-        iq = drone([rate_hz], snr_db=15, velocity_mps=rng.uniform(-25, 25), seed=rng.integers(1000))[:pulses]
+        iq = short_drone(rng, rate_hz, periods)
         found = measure(iq, **RADAR)
         assert np.isnan(found.chopping_hz)
         if "dwell too short" in str(found.reason):  # lines so near may also not be seen at all
@@ -757,8 +760,7 @@ def test_a_dwell_of_more_than_three_flashes_is_measured(periods):
     right = 0
     for _ in range(10):
         rate_hz = rng.uniform(55, 110)
-        pulses = round(periods / (2 * rate_hz) * PRF_HZ)
-        iq = drone([rate_hz], snr_db=15, velocity_mps=rng.uniform(-25, 25), seed=rng.integers(1000))[:pulses]
+        iq = short_drone(rng, rate_hz, periods)
         right += abs(measure(iq, **RADAR).chopping_hz - 2 * rate_hz) < 0.05 * rate_hz
     assert right >= 9
 

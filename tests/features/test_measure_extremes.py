@@ -7,10 +7,8 @@ from bladewing.features.rotor import rotors
 from bladewing.features.rotor.comb import LEAST_REACH_MPS
 from bladewing.simulate import Radar, draw_records
 
-from .signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, folded, rotors_by_chance, white
+from .signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, WAVELENGTH_M, folded, moving_at, rotors_by_chance, white
 from .signals import rotors as blades
-
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 
 
 def comb(prf_hz: float, pulses: int, spacing_hz: float, amplitudes: np.ndarray, seed: int = 0) -> np.ndarray:
@@ -81,7 +79,7 @@ def test_a_short_dwell_does_not_tell_a_moving_rotor_from_hum_and_so_does_not_ref
     for seed in range(12):
         rng = np.random.default_rng(seed)
         blades = rotors_by_chance(rng, [chopping_hz / 2], times_s, wavelength_m=WAVELENGTH_M, length_m=0.1)
-        iq = (blades + 3) * np.exp(-4j * np.pi * rng.uniform(3, 15) * times_s / WAVELENGTH_M)
+        iq = (blades + 3) * moving_at(rng.uniform(3, 15), times_s)
         found = measure(10 * iq + white(rng, len(times_s)), carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
         assert found.chopping_hz == pytest.approx(chopping_hz, rel=0.01)
 

@@ -4,7 +4,7 @@ from bladewing.features.heave import heave
 from bladewing.features.wingbeat import wingbeat
 from bladewing.simulate import Scene
 
-from .signals import CARRIER_HZ, PRF_HZ, WAVELENGTH_M, tone, white
+from .signals import CARRIER_HZ, PRF_HZ, WAVELENGTH_M, moving_at, tone, white
 
 LONG = {"carrier_hz": CARRIER_HZ, "prf_hz": 4e3}
 SECONDS = 2.5
@@ -84,7 +84,7 @@ def scatterers(rng, velocity_mps, swing_mps, rate_hz, body):
     """A body, and scatterers whose speed swings about its own, as limbs and wheels have them."""
     time_s = np.arange(10000) / LONG["prf_hz"]
     turn = 2 * np.pi * rate_hz
-    iq = body * np.exp(-4j * np.pi * velocity_mps * time_s / WAVELENGTH_M)
+    iq = body * moving_at(velocity_mps, time_s)
     for share in rng.uniform(0.5, 1.0, 8):
         path = velocity_mps * time_s + share * swing_mps / turn * np.sin(turn * time_s + rng.uniform(0, 2 * np.pi))
         iq = iq + np.exp(-4j * np.pi * path / WAVELENGTH_M + 2j * np.pi * rng.uniform())

@@ -17,7 +17,7 @@ from bladewing.features.rotor.turning_lines import TurningLines
 from bladewing.features.spectrum import doppler_spectrum
 
 from ...benchmarks import records
-from ..signals import family_of, white
+from ..signals import family_of, moving_at, white
 
 PULSES = records.PULSES
 TIME = middle_times(PULSES)
@@ -42,7 +42,7 @@ def helicopter(
     main_hz, signed = rng.uniform(35, 45), change * rng.choice([-1, 1])
     blades = main * records.rotors(rng, np.array([main_hz]), length_m=0.4, change=signed)
     blades = blades + tail * records.rotors(rng, np.array([gear * main_hz]), length_m=tail_m, change=signed)
-    iq = 10 * (blades + 3) * np.exp(-8j * np.pi * 3 * records.TIMES_S / records.WAVELENGTH_M)
+    iq = 10 * (blades + 3) * moving_at(6.0)
     return (iq + white(rng, PULSES)).astype(np.complex64), main_hz, signed
 
 

@@ -7,7 +7,7 @@ from bladewing.features.rotor.comb_search import best_candidate
 from bladewing.features.rotor.common_fraction import of_one_rotor
 from bladewing.features.rotor.periodogram import prepare
 
-from ..signals import CARRIER_HZ, PULSES, RADAR, TIMES_S, WAVELENGTH_M, rotors_by_chance, white
+from ..signals import CARRIER_HZ, PULSES, RADAR, TIMES_S, WAVELENGTH_M, moving_at, rotors_by_chance, white
 
 PRF_HZ = 20e3
 
@@ -19,7 +19,7 @@ def quad(seed):
         pass
     times_s = np.arange(int(PRF_HZ * rng.uniform(0.25, 0.5))) / PRF_HZ
     iq = 10 * rotors_by_chance(rng, rates_hz, times_s, wavelength_m=WAVELENGTH_M, length_m=0.12) + 30
-    iq = iq * np.exp(-4j * np.pi * 5.0 * times_s / WAVELENGTH_M) + white(rng, len(times_s))
+    iq = iq * moving_at(5.0, times_s) + white(rng, len(times_s))
     return iq.astype(np.complex64), 2 * rates_hz
 
 
@@ -40,7 +40,7 @@ def racer(seed):
     while np.diff(rates_hz := np.sort(middle_hz * (1 + rng.uniform(-0.06, 0.06, 4)))).min() < 4:
         pass
     iq = 10 * rotors_by_chance(rng, rates_hz, TIMES_S, wavelength_m=WAVELENGTH_M, length_m=0.04) + 30
-    iq = iq * np.exp(-4j * np.pi * rng.uniform(-20, 20) * TIMES_S / WAVELENGTH_M) + white(rng, PULSES)
+    iq = iq * moving_at(rng.uniform(-20, 20)) + white(rng, PULSES)
     return iq.astype(np.complex64), 2 * rates_hz
 
 

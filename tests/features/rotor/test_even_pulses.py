@@ -6,9 +6,7 @@ from bladewing.features import measure
 from bladewing.features.rotor.even_pulses import even_pulses
 from bladewing.features.rotor.periodogram import prepare
 
-from ..signals import CARRIER_HZ, PRF_HZ, PULSES, rotors, white
-
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+from ..signals import PRF_HZ, PULSES, RADAR, rotors, white
 
 
 def pulsed(iq: np.ndarray, period: float, amplitude: float, rng: np.random.Generator, *, coherent: bool) -> np.ndarray:

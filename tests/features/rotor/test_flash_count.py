@@ -6,7 +6,8 @@ from bladewing.features import measure
 from bladewing.features.rotor.comb_fit import CombFit
 from bladewing.features.rotor.flash_count import flashes_in_period
 
-from .test_weak_lines import RADAR, unlike
+from ..signals import RADAR
+from .test_weak_lines import unlike
 
 
 @pytest.mark.parametrize("phases_rad", [(0.0, 1.2), (0.0, 1.6), (0.0, 2.0), (0.0, 1.5, -1.5), (0.0, 1.2, -1.2, 2.4)])

@@ -10,7 +10,7 @@ from bladewing.features.rotor.flash_rate import of_flashes
 from bladewing.features.rotor.periodogram import prepare
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 
-from ..signals import CARRIER_HZ, PRF_HZ, WAVELENGTH_M, rotors, rotors_by_chance, white
+from ..signals import CARRIER_HZ, PRF_HZ, WAVELENGTH_M, moving_at, rotors, rotors_by_chance, white
 
 
 def come_round(seed, turns, *, dwell_s=0.1, blade_m=0.09):
@@ -20,7 +20,7 @@ def come_round(seed, turns, *, dwell_s=0.1, blade_m=0.09):
     prf_hz = 2 * rate_hz * float(turns) * (1 + rng.uniform(-1, 1) * 2e-4)
     times_s = np.arange(int(dwell_s * prf_hz)) / prf_hz
     echo = rotors_by_chance(rng, [rate_hz], times_s, wavelength_m=WAVELENGTH_M, length_m=blade_m)
-    iq = (echo + 5) * np.exp(-4j * np.pi * rng.uniform(-10, 10) * times_s / WAVELENGTH_M)
+    iq = (echo + 5) * moving_at(rng.uniform(-10, 10), times_s)
     iq = iq + 0.16 * white(rng, len(times_s))
     return iq.astype(np.complex64), {"carrier_hz": CARRIER_HZ, "prf_hz": prf_hz}, 2 * rate_hz
 
@@ -72,6 +72,6 @@ def test_flashes_of_several_rotors_take_no_comb_that_lacks_the_lines(seed):
     times_s = np.arange(512) / prf_hz
     length_m = tip_mps / (2 * np.pi * rates_hz.max())
     echo = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=wavelength_m, length_m=length_m) + 2
-    iq = echo * np.exp(-4j * np.pi * rng.uniform(-20, 20) * times_s / wavelength_m) + 0.3 * white(rng, 512)
+    iq = echo * moving_at(rng.uniform(-20, 20), times_s, wavelength_m) + 0.3 * white(rng, 512)
     found = measure(iq.astype(np.complex64), carrier_hz=carrier_hz, prf_hz=prf_hz)
     assert found.chopping_hz == pytest.approx(2 * rates_hz.mean(), rel=0.01)

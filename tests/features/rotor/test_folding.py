@@ -10,7 +10,7 @@ from bladewing.features.rotor.folding import FASTEST_TIP_MPS, FOLDED_BINS, outer
 from bladewing.features.rotor.periodogram import prepare
 from bladewing.simulate import RotorMotion, rotor_echo
 
-from ..signals import CARRIER_HZ, WAVELENGTH_M, folded, rotors_by_chance, tone, white
+from ..signals import CARRIER_HZ, WAVELENGTH_M, folded, moving_at, rotors_by_chance, tone, white
 
 
 @pytest.mark.parametrize(("times", "least"), [(1.2, 17), (1.6, 13), (1.9, 8)])
@@ -74,7 +74,7 @@ def test_slow_rotors_whose_lines_come_back_are_not_slower_ones():
         prf_hz = 4 * 2 * np.pi * rate_hz * blade_m / 2.3 / WAVELENGTH_M
         times_s = np.arange(int(0.3 * prf_hz)) / prf_hz
         echo = rotors_by_chance(rng, [rate_hz], times_s, wavelength_m=WAVELENGTH_M, length_m=blade_m)
-        iq = (4 * echo + 5) * np.exp(-4j * np.pi * 5 * times_s / WAVELENGTH_M) + white(rng, len(times_s))
+        iq = (4 * echo + 5) * moving_at(5, times_s) + white(rng, len(times_s))
         found = measure(iq.astype(np.complex64), carrier_hz=CARRIER_HZ, prf_hz=prf_hz)
         assert found.chopping_hz == pytest.approx(2 * rate_hz, rel=0.01)
 
@@ -87,7 +87,7 @@ def test_a_rotor_within_the_span_whose_rate_changes_is_not_folded():
         times_s = np.arange(3000) / prf_hz
         motion = RotorMotion(rate_hz, 0.0, drift_hz_per_s=rng.uniform(-0.05, 0.05) * rate_hz)
         echo = rotor_echo(motion.angle_rad(times_s), wavelength_m=WAVELENGTH_M, blade_length_m=blade_m)
-        iq = (4 * echo / np.sqrt(np.mean(np.abs(echo) ** 2)) + 4) * np.exp(-4j * np.pi * 2 * times_s / WAVELENGTH_M)
+        iq = (4 * echo / np.sqrt(np.mean(np.abs(echo) ** 2)) + 4) * moving_at(2, times_s)
         found = measure((iq + white(rng, len(times_s))).astype(np.complex64), carrier_hz=CARRIER_HZ, prf_hz=prf_hz)
         assert np.isnan(found.chopping_hz) or found.body_velocity_mps == pytest.approx(2.0, abs=0.5)
 

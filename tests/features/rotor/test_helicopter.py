@@ -5,9 +5,8 @@ from bladewing.features.rotor import helicopter as module
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 from bladewing.simulate.catalogue import AIRFRAMES
 
-from ..signals import CARRIER_HZ, PRF_HZ, PULSES, rotors, white
+from ..signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, rotors, white
 
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 MAIN_HZ, GEAR = 41.3, 4.73
 NAMES = ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
 

@@ -7,7 +7,7 @@ from bladewing.features import measure
 from bladewing.features.rotor.left_flashes import others_flash
 from bladewing.features.rotor.periodogram import prepare
 
-from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, folded, rotors, rotors_by_chance, white
+from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, folded, moving_at, rotors, rotors_by_chance, white
 
 
 def test_what_is_left_of_a_rotor_is_none_and_that_of_others_is():
@@ -34,7 +34,7 @@ def test_rotors_that_fill_the_span_are_not_all_where_most_of_the_power_is_left()
     prf_hz = 2 * rates_hz.mean() * 60 * rng.uniform(0.95, 1.05)
     times_s = np.arange(360) / prf_hz
     echo = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=WAVELENGTH_M, length_m=0.15)
-    iq = 6.3 * (echo + 5) * np.exp(-4j * np.pi * rng.uniform(-10, 10) * times_s / WAVELENGTH_M)
+    iq = 6.3 * (echo + 5) * moving_at(rng.uniform(-10, 10), times_s)
     found = measure((iq + white(rng, 360)).astype(np.complex64), carrier_hz=CARRIER_HZ, prf_hz=prf_hz)
     assert found.rotor_count < 4
     assert not found.rotors_resolved

@@ -8,10 +8,8 @@ from bladewing.features.rotor.octaves import coarsest, over_neighbours
 from bladewing.features.rotor.periodogram import prepare
 from scipy import special
 
-from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors_by_chance, white
+from ..signals import PRF_HZ, PULSES, RADAR, TIMES_S, WAVELENGTH_M, moving_at, rotors_by_chance, white
 
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
-TIMES_S = np.arange(PULSES) / PRF_HZ
 ROTOR = {"wavelength_m": WAVELENGTH_M, "length_m": 0.15}
 
 
@@ -20,7 +18,7 @@ def four_rotors(seed):
     rng = np.random.default_rng(seed)
     rates_hz = 57.5 * (1 + rng.uniform(-0.015, 0.015, 4))
     iq = rotors_by_chance(rng, rates_hz, TIMES_S, **ROTOR) * 10 + 100
-    iq *= np.exp(-4j * np.pi * rng.uniform(-30, 30) * TIMES_S / WAVELENGTH_M)
+    iq *= moving_at(rng.uniform(-30, 30))
     return (iq + white(rng, PULSES)).astype(np.complex64), rates_hz.mean()
 
 

@@ -6,9 +6,7 @@ from bladewing.features import measure
 from bladewing.features.rotor.points import bessel_functions
 from scipy.special import jv
 
-from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, white
-
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+from ..signals import PRF_HZ, PULSES, RADAR, WAVELENGTH_M, moving_at, white
 
 
 def rotor(rng, rate_hz, blades, length_m, points):
@@ -23,7 +21,7 @@ def rotor(rng, rate_hz, blades, length_m, points):
 def received(rng, echo, snr_db):
     """As a radar sees it from a body that moves, 20 dB over the blades."""
     echo = echo / np.sqrt(np.mean(np.abs(echo - echo.mean()) ** 2)) + 10
-    moved = np.exp(-4j * np.pi * rng.uniform(-20, 20) * np.arange(PULSES) / PRF_HZ / WAVELENGTH_M)
+    moved = moving_at(rng.uniform(-20, 20))
     return (10 ** (snr_db / 20) * echo * moved + white(rng, PULSES)).astype(np.complex64)
 
 

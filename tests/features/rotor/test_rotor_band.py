@@ -12,9 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import jv
 
-from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, white
+from ..signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, WAVELENGTH_M, rotors, white
 
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 SIDES = np.full(144, 2.0)
 ORDER = np.arange(1, 145)
 

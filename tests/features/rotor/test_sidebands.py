@@ -5,12 +5,9 @@ import pytest
 from bladewing.features import measure
 from bladewing.simulate import RotorMotion, rotor_echo
 
-from ..signals import CARRIER_HZ, PRF_HZ, PULSES, white
+from ..signals import PULSES, RADAR, TIMES_S, WAVELENGTH_M, moving_at, white
 
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
-TIMES_S = np.arange(PULSES) / PRF_HZ
-WAVELENGTH_M = 299_792_458.0 / CARRIER_HZ
-BODY = 100 * np.exp(-4j * np.pi * 7.3 * TIMES_S / WAVELENGTH_M)
+BODY = 100 * moving_at(7.3)
 
 #: Amplitude and phase [rad] of each of a supply's harmonics.
 HARMONICS = ((0.04, 0.3), (0.02, 2.0), (0.03, 4.1))

@@ -7,9 +7,7 @@ from bladewing.features.rotor.periodogram import prepare
 from bladewing.simulate import Scene
 from bladewing.simulate.catalogue import AIRFRAMES
 
-from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, tone, white
-
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+from ..signals import PRF_HZ, PULSES, RADAR, WAVELENGTH_M, rotors, tone, white
 
 
 def ground(rng, half_mps, power=2.0):

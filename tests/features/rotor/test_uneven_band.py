@@ -7,9 +7,8 @@ from bladewing.features.measure_record import ONE_CHANNEL
 from bladewing.features.one_channel import half_empty, made_analytic, one_channel
 from scipy.signal import hilbert
 
-from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, white
+from ..signals import PRF_HZ, PULSES, RADAR, WAVELENGTH_M, rotors, white
 
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 SEEDS = 8
 
 

@@ -8,9 +8,7 @@ from bladewing.features.rotor.changing_fit import fit_changing
 from bladewing.features.rotor.periodogram import prepare
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 
-from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, rotors, rotors_by_chance, tone, white
-
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+from ..signals import CARRIER_HZ, PRF_HZ, PULSES, RADAR, WAVELENGTH_M, moving_at, rotors, rotors_by_chance, tone, white
 
 
 def four_rotors(seed, snr_db, velocity_mps=-20.0):
@@ -18,7 +16,7 @@ def four_rotors(seed, snr_db, velocity_mps=-20.0):
     rng = np.random.default_rng(seed)
     rates_hz, times_s = np.linspace(3395, 3500, 4) / 60 * rng.uniform(0.99, 1.01), np.arange(PULSES) / PRF_HZ
     iq = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=WAVELENGTH_M, length_m=0.15) + 10
-    iq *= 10 ** (snr_db / 20) * np.exp(-4j * np.pi * velocity_mps * times_s / WAVELENGTH_M)
+    iq *= 10 ** (snr_db / 20) * moving_at(velocity_mps, times_s)
     return iq + white(rng, PULSES), rates_hz
 
 
@@ -144,7 +142,7 @@ def test_a_much_slower_rotor_is_not_one_of_twice_its_rate(snr_db):
         parts = [(93.0, 0.15), (75.0, 0.15), (60.0, 0.18)]
         one = {"wavelength_m": WAVELENGTH_M}
         echo = sum(rotors_by_chance(rng, [rate_hz], times_s, length_m=length_m, **one) for rate_hz, length_m in parts)
-        moved = np.exp(-4j * np.pi * rng.uniform(-15, 15) * times_s / WAVELENGTH_M)
+        moved = moving_at(rng.uniform(-15, 15), times_s)
         iq = (echo + 3) * moved * 10 ** (snr_db / 20) + white(rng, PULSES)
         found = measure(iq, carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
         given_hz = found.rotor_rates_hz[np.isfinite(found.rotor_rates_hz)]

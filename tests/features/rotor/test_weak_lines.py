@@ -8,9 +8,7 @@ from bladewing.features.rotor.periodogram import prepare
 from bladewing.features.rotor.weak_lines import without_weak_lines
 from bladewing.simulate import rotor_echo
 
-from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, white
-
-RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
+from ..signals import PRF_HZ, PULSES, RADAR, WAVELENGTH_M, moving_at, white
 
 
 def unlike(rng, rate_hz, phases_rad, *, snr_db=20.0, velocity_mps=0.0, change=0.0):
@@ -23,7 +21,7 @@ def unlike(rng, rate_hz, phases_rad, *, snr_db=20.0, velocity_mps=0.0, change=0.
         for blade, phase in zip(np.eye(len(phases_rad)), phases_rad, strict=True)
     )
     echo = echo / np.sqrt(np.mean(np.abs(echo) ** 2))
-    turn = np.exp(-4j * np.pi * velocity_mps * np.arange(PULSES) / PRF_HZ / WAVELENGTH_M)
+    turn = moving_at(velocity_mps)
     return ((echo + 10) * turn + 10 ** (-snr_db / 20) * white(rng, PULSES)).astype(np.complex64)
 
 
