@@ -273,7 +273,9 @@ def export(
 ) -> None:
     """Write one self-contained ONNX graph for a radar: raw IQ in, probabilities and label out, onnxruntime alone."""
     from .export import export_raw_iq
+    from .inference import Classifier
     from .model_file import chosen_name
+    from .predict import terms
     from .samples import positive
 
     if max_false_alarm is not None:
@@ -283,7 +285,11 @@ def export(
         out, carrier_hz=carrier_hz, prf_hz=prf_hz, pulses=pulses, model=name, max_false_alarm=max_false_alarm
     )
     graph = f"iq (batch, {pulses}, 2) to probabilities and label"
-    print(f"Wrote {out}: {graph}, within {worst:.0e} of predict --model {name}", flush=True)
+    print(f"Wrote {out}: {graph}, within {worst:.0e} of predict --model {name} on a few signals", flush=True)
+    if max_false_alarm is not None:
+        point = Classifier.load(name, max_false_alarm=max_false_alarm).operating_point
+        assert point
+        complain(terms(point), kind="note")
 
 
 @app.command(short_help="Measure models on fresh records: what each choice costs.")

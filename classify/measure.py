@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
+from bladewing.features.dropouts import unbroken
 from bladewing.features.inputs import MIN_PULSES
 from bladewing.features.measure import MOST_BLADES_GIVEN
 from bladewing.features.measurements import BODY, EACH_ROTOR, Measurements
@@ -293,7 +294,8 @@ class Measured:
         from .measure_plot import spectrum_svg
 
         n = self.clearest()
-        drawing = spectrum_svg(self.iq[n], self.recording, self.values, n, float(self.start_s[n]))
+        measured = self.iq[n][unbroken(self.iq[n])]
+        drawing = spectrum_svg(measured, self.recording, self.values, n, float(self.start_s[n]))
         try:
             write_whole(path, drawing)
         except OSError as error:

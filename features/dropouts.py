@@ -37,7 +37,7 @@ LEAST_DISTINCT = 8
 #: A converter's steps that were turned in phase, or whose channels were set right, show about 0 alone: the smallest
 #: samples have one size, to so much of it, no more than so many times as far from 0 as from another sample, or the next
 #: size is larger by so much. Zeros that are no more than so many times as frequent are as common as their neighbours.
-SAME_SIZE, AS_NEAR, NEXT_SIZE, LIKE_NEIGHBOURS = 1e-4, 1.5, 1.2, 4
+SAME_SIZE, AS_NEAR, NEXT_SIZE, LIKE_NEIGHBOURS = 1e-6, 1.5, 1.2, 4
 
 
 def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
@@ -63,7 +63,7 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     held = np.sort(size[~zero])
     steps = np.diff(held)
     steps = steps[steps > 0]
-    if len(steps) + 1 < LEAST_DISTINCT or _steps_about_zero(iq, zero):
+    if _hardly_steps(held) or _steps_about_zero(iq, zero):
         return none
     nearly = np.float32(NEAR_STEPS) * np.median(steps)
     near = int(np.searchsorted(held, nearly, side="right"))
@@ -88,6 +88,17 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     return lost if no_chance else none
 
 
+def _hardly_steps(sizes: NDArray[np.float32]) -> bool:
+    """Whether samples that are not 0 have hardly another size, and 0 is as near to them as they are to one another.
+
+    A converter's noise about another value than 0 has few sizes as well, but is never 0.
+    """
+    distinct = np.unique(sizes)
+    if len(distinct) >= LEAST_DISTINCT:
+        return False
+    return len(distinct) < 2 or bool(distinct[0] <= NEAR_STEPS * np.median(np.diff(distinct)))
+
+
 def _steps_about_zero(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> bool:
     """Whether zeros are as common as what lies a converter's step away, whichever way its steps are turned."""
     held = iq[~zero]
@@ -98,9 +109,10 @@ def _steps_about_zero(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> boo
     if ring < 2 or LIKE_NEIGHBOURS * ring < np.count_nonzero(zero):
         return False
     apart = np.abs(held - held[sizes.argmin()])
-    nearest = apart[apart > SAME_SIZE * smallest].min(initial=np.inf)
-    following = sizes[~one_size].min(initial=np.inf)
-    return bool(smallest <= AS_NEAR * nearest or following >= NEXT_SIZE * smallest)
+    others = apart[apart > SAME_SIZE * smallest]
+    larger = sizes[~one_size]
+    near = len(others) and smallest <= AS_NEAR * others.min()
+    return bool(near or (len(larger) and larger.min() >= NEXT_SIZE * smallest))
 
 
 def mended(iq: NDArray[np.complex64]) -> tuple[NDArray[np.complex64], dict[tuple[int, ...], slice]]:
@@ -162,7 +174,7 @@ def _silences(iq: NDArray[np.complex64]) -> tuple[NDArray[np.intp], NDArray[np.i
     """Where each run of zeros begins that is too long to be filled in, and its pulses; none of what is 0 throughout."""
     starts, lengths = _runs(_zeros(iq))
     long = lengths > MOST_IN_A_ROW
-    if lengths.max(initial=0) == len(iq) or (long.any() and len(np.unique(_sizes(iq))) <= LEAST_DISTINCT):
+    if lengths.max(initial=0) == len(iq) or (long.any() and _hardly_steps(_sizes(iq[~_zeros(iq)]))):
         long[:] = False  # what hardly steps is often 0
     return starts[long], lengths[long]
 
@@ -203,7 +215,7 @@ def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.com
     By the law by which each pulse of a block follows from those beside it (an autoregressive one, fitted forwards and
     backwards), those that are missing are what leaves the least of it unexplained: exact for a few lines, and of noise
     next to nothing, so that they draw no line of their own. Nor is I or Q beyond what it is elsewhere: a converter that
-    clipped does so there too.
+    clipped does so there too, and a channel that is the same in every pulse stays so.
 
     Parameters
     ----------
@@ -230,8 +242,11 @@ def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.com
                 start = max(block[0] - 2 * MOST_ORDERS, 0)
                 part = slice(start, block[-1] + 1 + 2 * MOST_ORDERS)
                 out[block[own]] = _filled_block(iq[part].astype(np.complex128), lost[part])[block[own] - start]
-    for found, given in ((out.real, iq.real), (out.imag, iq.imag)):
+    for found, given in ((out.real, iq.real[~lost]), (out.imag, iq.imag[~lost])):
         found[lost] = np.clip(found[lost], given.min(), given.max())
+    for sign in (1, -1):  # of one channel in both, to the bit
+        if (iq.real[~lost] == sign * iq.imag[~lost]).all():
+            out.imag[lost] = sign * out.real[lost]
     return out
 
 

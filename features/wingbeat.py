@@ -138,15 +138,15 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     if prf_hz * wavelength_m / 4 < 1.1 * WING_MPS:
         # a rotor folded into the wings' speeds cannot be told from them
         return (*nothing, f"no wingbeat: unambiguous only to {prf_hz * wavelength_m / 4:.1f} m/s")
+    whole = unbroken(iq)
+    if whole != slice(0, len(iq)):  # silences repeat, and what is there comes and goes with them
+        if whole.stop - whole.start < LEAST_S * prf_hz:
+            return (*nothing, f"no wingbeat: silences leave less than {LEAST_S:g} s in one piece")
+        return _one(iq[whole], carrier_hz, prf_hz)
     shown, body = followed(normed(iq), carrier_hz, prf_hz)
     velocity = body[0]
     if np.isnan(velocity):
         return (*nothing, "no wingbeat: no body line")
-    whole = unbroken(iq)
-    if whole != slice(0, len(iq)):  # silences repeat, and what is there comes and goes with them
-        if whole.stop - whole.start < LEAST_S * prf_hz:
-            return (np.nan, np.nan, np.nan, *body, f"no wingbeat: silences leave less than {LEAST_S:g} s in one piece")
-        return _one(iq[whole], carrier_hz, prf_hz)
     steady = standing(shown, body, carrier_hz, prf_hz)
     frame_s = float(np.clip(wavelength_m / 2 / CELL_MPS, *FRAME_S))
     frames = stft(steady, carrier_hz=carrier_hz, prf_hz=prf_hz, window_s=frame_s, overlap=1 - HOP_S / frame_s)

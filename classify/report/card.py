@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from bladewing.simulate.dataset import KIND_CLASS
+
 from .summary import front_budgets, headline_model, sentences
 from .words import count, micros, number, percent, size, spoken
 
@@ -163,9 +165,8 @@ def _envelope(limits: Mapping[str, float]) -> list[str]:
 
 def _training(report: Mapping[str, Any]) -> str:
     given = report["training"]
-    rows = report["scores"][headline_model(report)]["by_kind"]
     kinds = "; ".join(
-        f"{name}: {', '.join(spoken(row['kind']) for row in rows if row['class'] == name)}"
+        f"{name}: {', '.join(spoken(kind) for kind, label in sorted(KIND_CLASS.items()) if label == name)}"
         for name in report["classes"]
     )
     drawn = (

@@ -13,6 +13,7 @@ from bladewing.classify import BadInput, Classifier
 from bladewing.classify.cli import main
 from bladewing.classify.export import EXPORTED, TOLERANCE, export_raw_iq
 from bladewing.classify.model_file import read_model
+from bladewing.classify.predict import terms
 from bladewing.features.dropouts import longest_silence
 from bladewing.features.graph.inputs import IN_GRAPH, IQ, input_graph
 from bladewing.features.graph.operators import Graph
@@ -145,7 +146,7 @@ def small(tmp_path_factory):
     return out, radar, opened(out)
 
 
-def test_labels_keep_to_a_false_alarm_rate(small, tmp_path):
+def test_labels_keep_to_a_false_alarm_rate(small, tmp_path, capsys):
     _, radar, session = small
     out, rule = tmp_path / "strict.onnx", {"model": "spectrum-cnn-fast", "max_false_alarm": 0.001}
     export_raw_iq(out, **radar, **rule)
@@ -162,6 +163,8 @@ def test_labels_keep_to_a_false_alarm_rate(small, tmp_path):
         main(["export", str(out), *(f"--{name.replace('_', '-')}={value}" for name, value in (radar | rule).items())])
         == 0
     )
+    assert strict.operating_point is not None
+    assert terms(strict.operating_point) in capsys.readouterr().err  # what detection remains
 
 
 def test_a_batch_answers_like_its_records_alone(small):
@@ -220,6 +223,10 @@ def test_lost_pulses_are_unknown_and_what_a_converter_rounds_to_zero_is_none(sma
     probabilities, label = run(session, lost)
     np.testing.assert_array_equal(label, 3)
     np.testing.assert_allclose(probabilities, 1 / 3, rtol=1e-6)
+    for strength in (1e3, 1e4, 1e5):  # of a line at rest: all samples are nearly of one size
+        probabilities, label = run(session, np.where(lost == 0, 0, noise + np.float32(strength)))
+        np.testing.assert_array_equal(label, 3)
+        np.testing.assert_allclose(probabilities, 1 / 3, rtol=1e-6)
     for first, pulses, is_whole in ((0, 2, True), (100, 2, True), (0, 33, False), (-33, 33, False), (100, 33, False)):
         silent = noise.copy()
         silent[:, first : first + pulses or None] = 0

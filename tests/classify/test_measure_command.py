@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bladewing.classify import measure_plot
 from bladewing.classify.cli import main
 from bladewing.classify.measure import OF_COMBS, Measured, Settings, disagreement, measure_recording
 from bladewing.classify.measure_words import _blades, _unlike, with_error
@@ -317,6 +318,17 @@ def test_the_plot_is_svg_with_the_comb_on_it(folder, tmp_path, capsys):
     assert any(re.match(r"comb every [0-9.]+ Hz, band ", text) for text in words)
     assert {"band", "notch", "comb"} <= set(words)
     assert sum(e.get("stroke") == "#c0392b" for e in root.iter()) > 20
+
+
+def test_the_plot_shows_the_stretch_that_was_measured(tmp_path, monkeypatch):
+    """With the zeros of a silence it had a skirt of 20 dB about the body."""
+    line = (30 * moving(PULSES) + white(np.random.default_rng(4), PULSES)).astype(np.complex64)
+    line[500:700] = 0
+    np.save(tmp_path / "gap.npy", line)
+    drawn = []
+    monkeypatch.setattr(measure_plot, "spectrum_svg", lambda iq, *_: (drawn.append(iq), "<svg/>")[1])
+    assert main(["measure", str(tmp_path / "gap.npy"), *RADAR, "--plot", str(tmp_path / "gap.svg")]) == 0
+    np.testing.assert_array_equal(drawn[0], line[700 : round(0.08 * PRF_HZ)])
 
 
 def test_the_dwell_that_speaks_for_a_recording_is_clear_and_no_outlier():

@@ -11,6 +11,8 @@ from typing import Any
 import pytest
 from bladewing.classify.report.card import model_card
 from bladewing.classify.report.draw_scores import GROUPS, LEAST_SHOWN, accuracy_by_snr
+from bladewing.classify.report.words import spoken
+from bladewing.simulate.dataset import KIND_CLASS
 
 ROOT = Path(__file__).parents[2]
 CURE = "run: python docs/figures.py"
@@ -41,6 +43,15 @@ def test_readme_says_what_the_committed_report_says(figures: ModuleType, report:
 
 def test_model_card_is_that_of_the_committed_report(figures: ModuleType, report: dict[str, Any]) -> None:
     assert figures.CARD.read_text(encoding="utf-8") == model_card(report), CURE
+
+
+def test_the_card_names_every_kind_that_is_trained_on(report: dict[str, Any]) -> None:
+    """Not those that happen to be among the records of a small report."""
+    few = copy.deepcopy(report)
+    for scores in few["scores"].values():
+        scores["by_kind"] = scores["by_kind"][:3]
+    (line,) = (line for line in model_card(few).splitlines() if " Kinds: " in line)
+    assert all(spoken(kind) in line for kind in KIND_CLASS)
 
 
 def test_the_envelope_stands_on_the_card_in_words_and_units(report: dict[str, Any]) -> None:

@@ -14,6 +14,7 @@ from bladewing.features.dropouts import (
     mended,
     unbroken,
 )
+from bladewing.features.one_channel import one_channel
 from bladewing.features.one_thread import one_thread
 from hypothesis import given
 from hypothesis import strategies as st
@@ -230,3 +231,37 @@ def test_pulses_are_filled_in_on_one_thread(monkeypatch) -> None:
     monkeypatch.setattr(np.linalg, "solve", lambda *a: (held.append(one_thread._inside), solve(*a))[1])
     filled(np.where(lost, 0, whole), lost)
     assert held == [1]
+
+
+@pytest.mark.parametrize("other", ["offset", "the same", "turned round"])
+def test_what_is_filled_in_of_one_channel_stays_one(other: str) -> None:
+    """Q that is held at an offset was filled in beside it, and both sides of the spectrum were believed."""
+    channel = 3 * np.cos(0.3 * np.arange(2000)) + noise(np.random.default_rng(9), 2000).real
+    part = {"offset": 0.3 + 0 * channel, "the same": channel, "turned round": -channel}[other]
+    whole = (channel + 1j * part).astype(np.complex64)
+    lost = np.zeros(2000, bool)
+    lost[[77, 500, 501, 1400]] = True
+    found = filled(np.where(lost, 0, whole), lost)
+    assert one_channel(found)
+    assert np.abs(found[lost]).min() > 0
+
+
+@pytest.mark.parametrize(("lost", "every"), [(1, 128), (10, 128), (33, 256)])
+def test_of_a_quiet_converter_that_is_off_zero_pulses_are_lost_as_of_any(lost: int, every: int) -> None:
+    """Its codes are few, but none is 0: what was lost passed for a rotor's comb."""
+    rng = np.random.default_rng(1)
+    codes = 2048 + np.round(0.7 * rng.standard_normal((2, 20_000)))
+    whole = (codes[0] + 1j * codes[1]).astype(np.complex64)
+    gone = np.arange(20_000) % every < lost
+    given = np.where(gone, 0, whole).astype(np.complex64)
+    assert not lost_pulses(whole).any()
+    if lost <= MOST_IN_A_ROW:
+        np.testing.assert_array_equal(lost_pulses(given), gone)
+    else:
+        assert unbroken(given) == slice(19_745, 20_000)  # the last 32 may be filled in
+
+
+def test_a_pulse_lost_beside_a_line_of_100_db_is_one() -> None:
+    iq = (1e5 + noise(np.random.default_rng(2), 2048)).astype(np.complex64)
+    lost = np.arange(2048) % 128 == 3
+    np.testing.assert_array_equal(lost_pulses(np.where(lost, 0, iq).astype(np.complex64)), lost)
