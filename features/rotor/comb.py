@@ -34,6 +34,9 @@ from .wide_line import beside_line
 #: Checked by tests/benchmarks/measurement_tables.py.
 THRESHOLD, THRESHOLD_AT_REST = 18.0, 25.0
 
+#: Unlike blades show in the weak lines: so many deviations of noise over its mean.
+WEAK_DEVIATIONS = 3.0
+
 #: A rotor's lines reach at least so far from the body [m/s]; wings, limbs and wheels seldom do with so few lines.
 LEAST_REACH_MPS = 12.0
 
@@ -358,5 +361,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"
     # further lines fall on every so many-th; and of a comb that is sought less, a fraction may be what was found
     few = fit.spacing * per_turn * data.prf_hz > CHOPPING_RANGE_HZ[1]
-    is_sure = per_turn > 1 and not few and not may_come_back(start.last, fit.spacing)
+    weak = power[within][fit.orders[within] % per_turn != 0]
+    is_there = len(weak) and weak.mean() > 1 + WEAK_DEVIATIONS / np.sqrt(len(weak))
+    is_sure = per_turn > 1 and bool(is_there) and not few and not may_come_back(start.last, fit.spacing)
     return Comb(fit, fitted[1], start.last, per_turn, open_orders * fit.spacing, has_line, per_turn, is_sure), ""

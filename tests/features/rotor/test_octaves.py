@@ -119,3 +119,11 @@ def test_blades_that_are_given_leave_no_fraction_of_their_comb(five_tips):
     np.testing.assert_allclose(found.chopping_hz, 749.5, rtol=1e-3)
     np.testing.assert_allclose(found.rotation_hz, 149.9, rtol=1e-3)
     np.testing.assert_allclose(found.blade_length_m, 0.1271, rtol=0.03)
+
+
+def test_weak_lines_that_are_not_there_are_no_unlike_blades(five_tips):
+    """Of a comb found at half its spacing every second line is noise: two unlike blades were once told, for sure."""
+    iq, radar = five_tips(13, 24, 38)
+    found = measure(iq, **radar, beta_rad=np.radians(73))
+    np.testing.assert_allclose(found.chopping_hz, 749.5, rtol=1e-3)
+    assert np.isnan(found.rotation_hz).all()
