@@ -2,12 +2,15 @@
 
 import signal
 import sys
+import threading
 
 
 def main() -> int:
     """Run the command line; give its exit code."""
     # who ends it otherwise (`timeout`, a service) gets the same tidy end, workers and all
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    ours = threading.current_thread() is threading.main_thread()
+    if ours and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         from .cli import main as run
     except KeyboardInterrupt:

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .dropouts import NOTHING, mended
 from .inputs import in_blocks
 from .lines import middle_times, squared
 from .notch import parabola_offset
@@ -59,7 +60,8 @@ def body_acceleration(
     Returns
     -------
     acceleration_mps2, std_mps2 : ndarray of float64, shape (...)
-        Positive when the radial velocity grows; NaN where no line stands out, or it may be ground that sways. The
+        Positive when the radial velocity grows; NaN where no line stands out, it may be ground that sways, or more
+        pulses were lost than can be filled in. The
         deviation is the bound of a chirp's rate, 90 / (SNR pulses^5) rad^2 (Peleg and Porat 1991).
     smeared : ndarray of bool, shape (...)
         Whether the line is smeared for sure, so that `without_acceleration` is of use.
@@ -72,7 +74,7 @@ def body_acceleration(
     samples = finite_complex(iq)
     carrier_hz, prf_hz = require_radar(carrier_hz, prf_hz)
     pulses = samples.shape[-1]
-    flat = samples.reshape(-1, pulses)
+    flat, stretches = mended(samples.reshape(-1, pulses))
     value, std, smeared = np.full(len(flat), np.nan), np.full(len(flat), np.nan), np.zeros(len(flat), bool)
     wavelength_m = SPEED_OF_LIGHT_MPS / carrier_hz
     # one step smears a line over one bin of the dwell
@@ -89,7 +91,9 @@ def body_acceleration(
 
     first, *further = PARTS if reach > MANY_STEPS else (1,)
     tried = np.arange(-(reach // first**2), reach // first**2 + 1) * first**2
-    held = np.flatnonzero(largest_part(flat) >= LEAST_PART) if pulses >= LEAST_PULSES else np.zeros(0, np.intp)
+    told = largest_part(flat) >= LEAST_PART
+    told[[row for (row,), stretch in stretches.items() if stretch == NOTHING]] = False
+    held = np.flatnonzero(told) if pulses >= LEAST_PULSES else np.zeros(0, np.intp)
     loud = in_blocks(scaled(flat[held], unit_scale(flat[held])))
     each = (pair for block in loud for pair in zip(block, heights_at(tried, block, first), strict=True))
     for index, (one, heights) in zip(held, each, strict=True):

@@ -25,7 +25,8 @@ MOST_ORDERS, BLOCK, STRETCHES = 32, 8192, 6
 #: Share of the mean power that holds a law's coefficients back: next to nothing beside any noise.
 RIDGE = 1e-10
 
-#: Why nothing is told of a record of which no law can be had.
+#: What is whole of a record that lost so many pulses that no law tells of them, and why nothing is told of it.
+NOTHING = slice(0, 0)
 BEYOND_FILLING_IN = "lost pulses: so many are exactly 0 that they cannot be filled in"
 
 #: Two truths beside each other, as one number.
@@ -34,10 +35,10 @@ _TWO_TRUE = np.array([True, True]).view(np.uint16)
 #: Fewer sizes that differ are a converter's that hardly steps at all: it gives 0 most of the time.
 LEAST_DISTINCT = 8
 
-#: A converter's steps that were turned in phase, or whose channels were set right, show about 0 alone: the smallest
-#: samples have one size, to so much of it, no more than so many times as far from 0 as from another sample, or the next
-#: size is larger by so much. Zeros that are no more than so many times as frequent are as common as their neighbours.
-SAME_SIZE, AS_NEAR, NEXT_SIZE, LIKE_NEIGHBOURS = 1e-6, 1.5, 1.2, 4
+#: A converter's steps that were turned in phase, or whose channels were set right, show about 0 alone: several of the
+#: smallest samples have one size, to so much of it, and that is no more than so many times their distance from any
+#: other, or the next size is larger by so much. As many places as about steps not turned lie within so many of it.
+SAME_SIZE, AS_NEAR, NEXT_SIZE, NEAR_TURNED = 1e-6, 1.5, 1.2, 2.9
 
 
 def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
@@ -59,16 +60,24 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     """
     none = np.zeros(len(iq), bool)
     zero = _zeros(iq)
+    if not zero.any():
+        return none
     size = _sizes(iq)
     held = np.sort(size[~zero])
     steps = np.diff(held)
     steps = steps[steps > 0]
-    if _hardly_steps(held) or _steps_about_zero(iq, zero):
+    if _hardly_steps(held, steps):
         return none
     nearly = np.float32(NEAR_STEPS) * np.median(steps)
     near = int(np.searchsorted(held, nearly, side="right"))
     if np.count_nonzero(zero) <= NEAR_SHARE * near:  # what most converters of coarse steps give ends here
         return none
+    step = _turned_step(iq, zero)
+    if step:
+        size, nearly = np.abs(iq), np.float32(NEAR_TURNED * step)
+        near = int(np.count_nonzero((size <= nearly) & ~zero))
+        if np.count_nonzero(zero) <= NEAR_SHARE * near:
+            return none
     _, runs = _runs(zero)
     lost = none.copy()
     lost[zero] = np.repeat(runs, runs) <= MOST_IN_A_ROW
@@ -80,7 +89,7 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     if np.median(size[beside]) <= nearly:
         return none
     places = PLACES if iq.real.any() and iq.imag.any() else PLACES_OF_ONE
-    stepless = 1 - (len(steps) + 1) / len(held) < ALIKE
+    stepless = not step and 1 - (len(steps) + 1) / len(held) < ALIKE
     if zeros < LEAST_LOST:
         no_chance = stepless and len(held) >= ENOUGH and not lost[[0, -1]].any()
     else:
@@ -88,31 +97,34 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     return lost if no_chance else none
 
 
-def _hardly_steps(sizes: NDArray[np.float32]) -> bool:
+def _hardly_steps(held: NDArray[np.float32], steps: NDArray[np.float32]) -> bool:
     """Whether samples that are not 0 have hardly another size, and 0 is as near to them as they are to one another.
 
     A converter's noise about another value than 0 has few sizes as well, but is never 0.
+
+    Parameters
+    ----------
+    held, steps : ndarray
+        Sizes of those that are not 0, rising, and what lies between those that differ.
     """
-    distinct = np.unique(sizes)
-    if len(distinct) >= LEAST_DISTINCT:
+    if len(steps) + 1 >= LEAST_DISTINCT:
         return False
-    return len(distinct) < 2 or bool(distinct[0] <= NEAR_STEPS * np.median(np.diff(distinct)))
+    return not len(steps) or bool(held[0] <= NEAR_STEPS * np.median(steps))
 
 
-def _steps_about_zero(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> bool:
-    """Whether zeros are as common as what lies a converter's step away, whichever way its steps are turned."""
+def _turned_step(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> float:
+    """A converter's step where it shows about 0 alone, whichever way its steps were turned; 0 where it does not."""
     held = iq[~zero]
     sizes = np.abs(held)
     smallest = sizes.min()
     one_size = sizes <= (1 + SAME_SIZE) * smallest
-    ring = np.count_nonzero(one_size)
-    if ring < 2 or LIKE_NEIGHBOURS * ring < np.count_nonzero(zero):
-        return False
+    if np.count_nonzero(one_size) < 2:
+        return 0.0
     apart = np.abs(held - held[sizes.argmin()])
-    others = apart[apart > SAME_SIZE * smallest]
-    larger = sizes[~one_size]
-    near = len(others) and smallest <= AS_NEAR * others.min()
-    return bool(near or (len(larger) and larger.min() >= NEXT_SIZE * smallest))
+    others, larger = apart[apart > SAME_SIZE * smallest], sizes[~one_size]
+    as_near = len(others) and smallest <= AS_NEAR * others.min()
+    stands_out = len(larger) and larger.min() >= NEXT_SIZE * smallest
+    return float(smallest) if as_near or stands_out else 0.0
 
 
 def mended(iq: NDArray[np.complex64]) -> tuple[NDArray[np.complex64], dict[tuple[int, ...], slice]]:
@@ -128,8 +140,7 @@ def mended(iq: NDArray[np.complex64]) -> tuple[NDArray[np.complex64], dict[tuple
     records : ndarray of complex64, same shape
         Those that are there are returned as they are.
     stretches : dict of tuple of int to slice
-        Of each broken record, by its index, the longest stretch that is not (see `unbroken`): an empty one where so
-        many pulses were lost that no law tells of them.
+        Of each broken record, by its index, the longest stretch that is not (see `unbroken`), or `NOTHING`.
     """
     zeros, out = _zeros(iq), iq
     stretches: dict[tuple[int, ...], slice] = {}
@@ -140,7 +151,7 @@ def mended(iq: NDArray[np.complex64]) -> tuple[NDArray[np.complex64], dict[tuple
         if lost.any():
             out = iq.copy() if out is iq else out
             out[index] = filled(iq[index], lost)
-        stretch = unbroken(out[index]) if out[index][lost].all() else slice(0, 0)
+        stretch = unbroken(out[index]) if out[index][lost].all() else NOTHING
         if stretch != slice(0, iq.shape[-1]):
             stretches[index] = stretch
     return out, stretches
@@ -174,9 +185,15 @@ def _silences(iq: NDArray[np.complex64]) -> tuple[NDArray[np.intp], NDArray[np.i
     """Where each run of zeros begins that is too long to be filled in, and its pulses; none of what is 0 throughout."""
     starts, lengths = _runs(_zeros(iq))
     long = lengths > MOST_IN_A_ROW
-    if lengths.max(initial=0) == len(iq) or (long.any() and _hardly_steps(_sizes(iq[~_zeros(iq)]))):
+    if lengths.max(initial=0) == len(iq) or (long.any() and _seldom_steps(iq)):
         long[:] = False  # what hardly steps is often 0
     return starts[long], lengths[long]
+
+
+def _seldom_steps(iq: NDArray[np.complex64]) -> bool:
+    """`_hardly_steps` of all samples that are not 0."""
+    distinct = np.unique(_sizes(iq[~_zeros(iq)]))
+    return _hardly_steps(distinct, np.diff(distinct))
 
 
 def longest_silence(iq: NDArray[np.complex64]) -> tuple[int, int]:

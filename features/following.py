@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .bodies import LINE_DB
+from .dropouts import NOTHING, mended
 from .lines import from_whole
 from .notch import body_line
 from .samples import finite_complex, require_radar, scaled, unit_scale
@@ -39,15 +40,18 @@ def by_recording(
 ) -> list[NDArray]:
     """What is found in each recording of a batch (..., pulses), one after the other: an array (...) a field.
 
+    Pulses that were lost are filled in; one that lost too many for that is taken for silence.
+
     Raises
     ------
     ValueError
         If the samples are not complex or not finite, there are none, or a frequency is not positive.
     """
     carrier_hz, prf_hz = require_radar(carrier_hz, prf_hz)
-    samples = finite_complex(iq)
+    samples, stretches = mended(finite_complex(iq))
     lead, pulses = samples.shape[:-1], samples.shape[-1:]
-    each = [samples[index] for index in np.ndindex(lead)] or [np.zeros(pulses, np.complex64)]
+    silence = np.zeros(pulses, np.complex64)
+    each = [silence if stretches.get(index) == NOTHING else samples[index] for index in np.ndindex(lead)] or [silence]
     rows = [one(recording, carrier_hz, prf_hz) for recording in each]
     return [np.array(column)[: math.prod(lead)].reshape(lead) for column in zip(*rows, strict=True)]
 

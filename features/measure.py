@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .allocator import keep_freed
-from .dropouts import BEYOND_FILLING_IN, mended
+from .dropouts import BEYOND_FILLING_IN, NOTHING, mended
 from .measure_record import measure_record, unmeasured
 from .measurements import EACH_ROTOR, Measurements
 from .one_channel import made_analytic
@@ -88,13 +88,11 @@ def measure(
         for index in np.ndindex(some.shape[:-1]):
             record, own = some[index], spectrum.rows(index)
             stretch = stretches.get(index)
-            if stretch is not None and stretch.start == stretch.stop:
-                rows.append(unmeasured(BEYOND_FILLING_IN))
-                continue
-            if stretch is not None:
+            if stretch not in (None, NOTHING):
                 record = made_analytic(given[index][stretch])
                 own = doppler_spectrum(record, carrier_hz=carrier_hz, prf_hz=prf_hz)
-            rows.append(measure_record(record, own, blades, beta_rad))
+            told = stretch != NOTHING
+            rows.append(measure_record(record, own, blades, beta_rad) if told else unmeasured(BEYOND_FILLING_IN))
             if on_record and samples.size:
                 on_record(len(rows))
     columns = {}

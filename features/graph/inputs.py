@@ -6,7 +6,7 @@ import numpy as np
 
 from ..axis import pooling
 from ..change import PARTS, frame_starts, part_length
-from ..dropouts import LEAST_DISTINCT, LEAST_LOST, NEXT_SIZE
+from ..dropouts import AS_NEAR, LEAST_DISTINCT, LEAST_LOST
 from ..notch import LEAST_RESIDUAL
 from ..samples import LEAST_PART
 from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
@@ -150,12 +150,10 @@ def _none_lost(graph: Graph, size: Value, pulses: int) -> Value:
     there = is_there.count()
     others = graph.where(is_there, size, float(np.finfo(np.float32).max))
     least = others.min()
-    of_a_step = others <= least * (1 + _OF_A_STEP)
-    steps = of_a_step.count()
+    steps = (others <= least * (1 + _OF_A_STEP)).count()
     zeros = pulses - there
-    # beside a strong line at rest samples are nearly alike as well, but others lie between them and its next size
-    following = graph.where(of_a_step, float(np.finfo(np.float32).max), others).min()
-    is_step = following >= least * NEXT_SIZE
+    # beside a strong line at rest samples are nearly alike as well: none is as large as the next step
+    is_step = (size.max() >= least * AS_NEAR) | (size.max() <= least * (1 + _OF_A_STEP))
     hardly_steps = (size.max() <= least * LEAST_DISTINCT) & (there <= steps * LEAST_DISTINCT)
     return (zeros < float(LEAST_LOST)) | (is_step & ((zeros < steps) | hardly_steps))
 

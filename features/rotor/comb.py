@@ -353,15 +353,18 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     def strong(numbers: range) -> int:
         return strong_multiple(fit.orders[within], power[within], range(numbers.start, min(numbers.stop, most + 1)))
 
+    def between(number: int) -> bool:
+        weak = power[within][fit.orders[within] % number != 0]
+        return bool(len(weak) and weak.mean() > 1 + WEAK_DEVIATIONS / np.sqrt(len(weak)))
+
     per_turn = strong(blade_numbers(blades))
-    if per_turn == 1 and blades is not None and blades > 1:  # a fraction of the comb of so many may have been found
-        per_turn = strong(blade_numbers(None))
+    if per_turn == 1 and blades is not None and blades > 1:  # every second of four are alike, or a fraction was found
+        other = strong(blade_numbers(None))
+        per_turn = other if blades % other == 0 or not between(other) else 1
     for number in sorted({1, per_turn}):
         if of_mains(fit, data, start.score, number):
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"
     # further lines fall on every so many-th; and of a comb that is sought less, a fraction may be what was found
     few = fit.spacing * per_turn * data.prf_hz > CHOPPING_RANGE_HZ[1]
-    weak = power[within][fit.orders[within] % per_turn != 0]
-    is_there = len(weak) and weak.mean() > 1 + WEAK_DEVIATIONS / np.sqrt(len(weak))
-    is_sure = per_turn > 1 and bool(is_there) and not few and not may_come_back(start.last, fit.spacing)
+    is_sure = per_turn > 1 and between(per_turn) and not few and not may_come_back(start.last, fit.spacing)
     return Comb(fit, fitted[1], start.last, per_turn, open_orders * fit.spacing, has_line, per_turn, is_sure), ""

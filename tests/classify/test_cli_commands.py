@@ -104,6 +104,21 @@ def test_an_interrupt_while_the_program_loads_is_one_line():
     assert (told.returncode, told.stdout, told.stderr) == (130, "", "bladewing: stopped: interrupted\n")
 
 
+def test_the_program_runs_off_the_main_thread():
+    """Where no signal may be asked for."""
+    python = (
+        "import sys, threading\n"
+        "from bladewing.classify.__main__ import main\n"
+        "sys.argv = ['bladewing', '--version']\n"
+        "codes = []\n"
+        "thread = threading.Thread(target=lambda: codes.append(main()))\n"
+        "thread.start(), thread.join()\n"
+        "sys.exit(codes[0])\n"
+    )
+    told = subprocess.run([sys.executable, "-c", python], capture_output=True, text=True, check=False)
+    assert (told.returncode, told.stdout, told.stderr) == (0, metadata.version("bladewing") + "\n", "")
+
+
 def test_an_option_without_its_value_points_to_no_other_help(capsys):
     assert main(["train", "--records"]) == 2
     assert capsys.readouterr().err.endswith(" (see --help)\n")

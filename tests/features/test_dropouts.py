@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from bladewing.features import measure
+from bladewing.features.acceleration import body_acceleration
 from bladewing.features.dropouts import (
     BEYOND_FILLING_IN,
     LEAST_DISTINCT,
@@ -16,6 +17,7 @@ from bladewing.features.dropouts import (
 )
 from bladewing.features.one_channel import one_channel
 from bladewing.features.one_thread import one_thread
+from bladewing.features.wingbeat import wingbeat
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -265,3 +267,28 @@ def test_a_pulse_lost_beside_a_line_of_100_db_is_one() -> None:
     iq = (1e5 + noise(np.random.default_rng(2), 2048)).astype(np.complex64)
     lost = np.arange(2048) % 128 == 3
     np.testing.assert_array_equal(lost_pulses(np.where(lost, 0, iq).astype(np.complex64)), lost)
+
+
+@pytest.mark.parametrize(("sigma", "line", "channels", "every"), [(30, 90, 1, 50), (30, 3, 1, 50), (10, 0, 2, 43)])
+def test_lost_pulses_of_a_converter_that_is_not_turned_are_told_by_chance(
+    sigma: float, line: float, channels: int, every: int
+) -> None:
+    """Its own zeros are some tenths of these: a comb of the losses was told of 38 in 50 such records."""
+    for seed in range(5):
+        given = sigma * noise(np.random.default_rng(seed), 3000) * 2**0.5 + line * np.exp(0.4j * np.arange(3000))
+        given = np.round(given if channels == 2 else given.real + 0j)
+        assert not lost_pulses(given.astype(np.complex64)).any()
+        given[5::every] = 0
+        assert lost_pulses(given.astype(np.complex64))[5::every].all(), seed
+
+
+def test_of_what_lost_too_many_no_course_is_told_either() -> None:
+    given = (30 * np.exp(0.3j * np.arange(16_000)) + noise(np.random.default_rng(4), 16_000)).astype(np.complex64)
+    given[1::2] = 0
+    radar = {"carrier_hz": CARRIER_HZ, "prf_hz": 8e3}
+    beat = wingbeat(given, **radar)
+    assert np.isnan([beat.velocity_mps, beat.acceleration_mps2, beat.wingbeat_hz]).all()
+    assert np.isnan(body_acceleration(given[:2000], **radar)[0])
+    called: list[int] = []
+    measure(given.reshape(4, -1), **radar, on_record=called.append)
+    assert called == [1, 2, 3, 4]

@@ -127,3 +127,16 @@ def test_weak_lines_that_are_not_there_are_no_unlike_blades(five_tips):
     found = measure(iq, **radar, beta_rad=np.radians(73))
     np.testing.assert_allclose(found.chopping_hz, 749.5, rtol=1e-3)
     assert np.isnan(found.rotation_hz).all()
+
+
+def test_strong_lines_that_do_not_divide_the_blades_are_no_comb_where_the_others_are_there():
+    """Every third line of five blades that echo from one side mostly is strong: their comb was told at thrice that."""
+    rng, radar, pulses, turn_hz = np.random.default_rng(2), {"carrier_hz": 24e9, "prf_hz": 50e3}, 2048, 83.399
+    wave = 4j * np.pi * radar["carrier_hz"] / 299_792_458
+    angle_rad = 5.7173 + 2 * np.pi * (np.arange(5) / 5 + turn_hz * np.arange(pulses)[:, None] / radar["prf_hz"])
+    points_m = np.linspace(0.2, 1, 25)[:, None, None] * 0.25328
+    blades = (1 + 0.3126 * np.cos(angle_rad)) * np.exp(-wave * points_m * np.sin(angle_rad)).mean(axis=0)
+    echo = blades.sum(axis=1)
+    noise = rng.standard_normal(pulses) + 1j * rng.standard_normal(pulses)
+    iq = ((echo / np.std(echo) + 1) * 10 ** (29.7 / 20) + noise / 2**0.5).astype(np.complex64)
+    assert measure(iq, **radar, blades=5).chopping_hz == pytest.approx(5 * turn_hz, rel=1e-4)
