@@ -217,7 +217,8 @@ class UavBounds:
         """Energy of the error of so many Gauss points a blade in place of the continuous blade, over all pulses.
 
         The rule is exact for polynomials of order 2 n - 1; what it misses of a phasor are its Legendre terms from order
-        2 n on, (2 l + 1) j_l(z / 2), of which it sees the first by a known share and the others by one at most.
+        2 n on, (2 l + 1) j_l(z / 2), of which it sees the first by a known share and the others by one at most. The
+        sphere's sag adds what it misses of a phase that bends.
         """
         total = np.zeros(len(self.times_s))
         for rotor in self.part.rotors:
@@ -225,25 +226,43 @@ class UavBounds:
                 continue
             half = self.wavenumber * (rotor.blade_length_m - rotor.root_m) / 2
             cos_beta = np.cos(self.part.beta_rad(rotor))
-            nearness = rotor.blade_length_m / (self.centre_m.min() - rotor.offset_m)
+            nearest = float(self.centre_m.min()) - rotor.offset_m
+            nearness = rotor.blade_length_m / nearest
+            sag = half * (rotor.blade_length_m - rotor.root_m) / nearest
             for amplitude, theta in self._blades(rotor):
                 cosine = np.abs(cos_beta * np.cos(theta))
                 # the sphere's sag makes the phase run faster towards the tip
                 steepest = cosine + nearness * (1 - cosine**2)
-                classes, missed = _gauss_errors(points, half, float(np.ceil(64 * steepest.max())) / 64)
+                classes, missed = _gauss_errors(points, half, float(np.ceil(64 * steepest.max())) / 64, sag)
                 which = np.searchsorted(classes, steepest)
                 total += amplitude * (1 + np.abs(rotor.edge_asymmetry * np.sin(theta))) * missed[which]
         return float(np.sum(total**2))
 
 
 @lru_cache(maxsize=512)
-def _gauss_errors(points: int, half_phase_rad: float, steepest: float) -> tuple[Amplitude, Amplitude]:
-    """Upper ends of classes of steepness up to `steepest`, finest there, and `gauss_error` of each.
+def _gauss_errors(points: int, half_phase_rad: float, steepest: float, sag_rad: float) -> tuple[Amplitude, Amplitude]:
+    """Upper ends of classes of steepness up to `steepest`, finest there, and the error of each, straight and bent.
 
     Kept, because the rotors of an airframe are often alike.
     """
     classes = steepest * (1 - np.linspace(1, 0, _SPACING_CLASSES + 1)[1:] ** 2)
-    return classes, gauss_error(points, half_phase_rad * classes)
+    half_phase = half_phase_rad * classes
+    bent = np.maximum.accumulate(sag_error(points, 2 * half_phase, sag_rad))
+    return classes, np.minimum(gauss_error(points, half_phase) + bent, 2.0)
+
+
+def sag_error(points: int, phase_rad: Amplitude, sag_rad: float) -> Amplitude:
+    """Most that so many Gauss points miss more of exp(j phase) over a blade where the phase bends by a sag.
+
+    The rule's error is a known share of the phasor's derivative of order 2 n, and that a sum over powers of the slope,
+    at most `phase_rad` along the blade, and of half the second derivative, `sag_rad`: here without the slope's alone.
+    """
+    bends = np.arange(1, points + 1)
+    order = 2 * points
+    share = 4 * gammaln(points + 1) - 2 * gammaln(order + 1) - np.log(order + 1)
+    ways = share - gammaln(bends + 1) - gammaln(order - 2 * bends + 1) + bends * np.log(max(sag_rad, 1e-300))
+    slopes = (order - 2 * bends) * np.log(np.maximum(phase_rad, 1e-300))[:, None]
+    return np.asarray(np.exp(np.minimum(ways + slopes, 1.0)).sum(axis=1).clip(max=2.0))
 
 
 def gauss_error(points: int, half_phase_rad: Amplitude) -> Amplitude:

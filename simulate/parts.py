@@ -299,7 +299,8 @@ class ClutterPart(Part):
 class ReceiverPart(Part):
     """The receiver: thermal noise of unit power, and effects by name; `values` fixes their parameters.
 
-    `jitter_s` is the rms error of a pulse's instant, `dc_db` the level of an offset at velocity zero.
+    `jitter_s` is the rms error of a pulse's instant, of UAVs and birds alone; `dc_db` the level of an offset at
+    velocity zero.
     """
 
     noise: bool = True

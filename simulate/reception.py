@@ -81,6 +81,9 @@ def clutter_echo(part: ClutterPart, radar: Radar, seed: int) -> tuple[NDArray[np
     if target.body is not None and target.body_db is not None:
         iq = _unit(iq) + _unit(target.body) * (10 ** (target.body_db / 20)).astype(np.float32)[:, None]
     drawn = {name: float(values[0]) for name, values in target.truth.items() if not np.isnan(values[0])}
+    if part.kind == "ground":  # it moves by one of two laws, and both are drawn
+        other = {"wind_mph"} if "width_mps" in drawn else {"ground_width_mps", "ground_still_db"}
+        draws.unused |= other & set(part.values)
     return (_unit(iq) * np.float32(10 ** (part.level_db / 20)))[0], drawn, sorted(draws.unused)
 
 

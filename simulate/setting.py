@@ -154,6 +154,10 @@ class Setting(BaseModel):
                     f"{target.name}: it moves at {fastest:.1f} m/s, beyond the unambiguous {radar.unambiguous_mps:.1f} "
                     "m/s: its line aliases"
                 )
+        if self.receiver.jitter_s and self.clutter:
+            said.append("receiver.jitter_s moves UAVs and birds alone: clutter is rendered at even instants")
+        if self.receiver.mains_hz and not {"mains", "bursts"} & set(self.receiver.effects):
+            said.append('receiver.mains_hz changes nothing without "mains" or "bursts" among the effects')
         for name in self.receiver.values:
             effect = EFFECT_OF.get(name)
             if effect is not None and effect not in self.receiver.effects:

@@ -549,6 +549,31 @@ def test_a_value_that_a_kind_of_clutter_does_not_know_is_warned_of():
     assert [line.partition(": ")[2] for line in said] == ["wind_mph changes nothing of a clutter of kind rain"]
 
 
+@pytest.mark.parametrize(
+    ("values", "idle"),
+    [
+        ({"ground_width_mps": 0.5, "ground_still_db": 20.0}, ["ground_still_db", "ground_width_mps"]),
+        ({"ground_law": 0.0, "wind_mph": 30.0, "ground_width_mps": 0.5}, ["wind_mph"]),
+        ({"wind_mph": 30.0}, []),
+    ],
+)
+def test_a_value_of_the_law_by_which_ground_does_not_move_is_warned_of(values, idle):
+    said = clutter_of("ground", **values).warnings
+    assert [line.partition(": ")[2] for line in said] == [
+        f"{name} changes nothing of a clutter of kind ground" for name in idle
+    ]
+
+
+def test_what_of_a_receiver_does_not_reach_everything_is_warned_of():
+    ground = {"name": "field", "kind": "ground", "level_db": 10.0}
+    receiver = {"jitter_s": 1e-6, "mains_hz": 60.0}
+    said = Scene.build({"radar": RADAR, "clutter": [ground], "receiver": receiver}).warnings()
+    assert said == [
+        "receiver.jitter_s moves UAVs and birds alone: clutter is rendered at even instants",
+        'receiver.mains_hz changes nothing without "mains" or "bursts" among the effects',
+    ]
+
+
 def test_a_value_that_no_receiver_knows_is_warned_of():
     values = {"wind_mph": 30.0, "gain_db": 40.0, "image_db": -20.0}
     scene = Scene.build({"radar": RADAR, "receiver": {"effects": ["image"], "values": values}})
