@@ -171,6 +171,7 @@ def test_a_program_told_to_end_does_so_as_after_ctrl_c(tmp_path):
     assert told.stderr.readline().startswith("draw 4800 records: ")  # the workers are under way
     told.terminate()
     *progress, said = told.communicate(timeout=60)[1].splitlines()
-    assert (said, told.returncode) == ("bladewing: stopped: interrupted", 130)
+    assert said.startswith("bladewing: stopped: interrupted")  # and what is kept, if anything is by then
+    assert told.returncode == 130
     assert all(line.startswith("draw ") for line in progress)
     require_ended(told.pid)
