@@ -109,7 +109,8 @@ def _hardly_steps(held: NDArray[np.float32], steps: NDArray[np.float32]) -> bool
     """
     if len(steps) + 1 >= LEAST_DISTINCT:
         return False
-    return not len(steps) or bool(held[0] <= NEAR_STEPS * np.median(steps))
+    few = len(held) < LEAST_DISTINCT or not len(steps)  # too few to tell
+    return few or bool(held[0] <= NEAR_STEPS * np.median(steps))
 
 
 def _turned_step(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> float:
@@ -192,8 +193,9 @@ def _silences(iq: NDArray[np.complex64]) -> tuple[NDArray[np.intp], NDArray[np.i
 
 def _seldom_steps(iq: NDArray[np.complex64]) -> bool:
     """`_hardly_steps` of all samples that are not 0."""
-    distinct = np.unique(_sizes(iq[~_zeros(iq)]))
-    return _hardly_steps(distinct, np.diff(distinct))
+    held = np.sort(_sizes(iq[~_zeros(iq)]))
+    steps = np.diff(held)
+    return _hardly_steps(held, steps[steps > 0])
 
 
 def longest_silence(iq: NDArray[np.complex64]) -> tuple[int, int]:

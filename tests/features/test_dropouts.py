@@ -18,7 +18,7 @@ from bladewing.features.dropouts import (
 from bladewing.features.one_channel import one_channel
 from bladewing.features.one_thread import one_thread
 from bladewing.features.wingbeat import wingbeat
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from .signals import CARRIER_HZ, PRF_HZ, rotors
@@ -113,6 +113,7 @@ def test_a_silence_is_no_lost_pulses() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 300), st.integers(1, 200)), max_size=6), st.integers(0, 300))
+@example([(0, 33)], 5)
 def test_what_is_left_is_the_longest_stretch_without_a_silence(pieces: list[tuple[int, int]], rest: int) -> None:
     """Against looking at all stretches: pieces are so many samples and then so many zeros."""
     there = np.concatenate([np.repeat([True, False], pair) for pair in [*pieces, (rest, 0)]])
