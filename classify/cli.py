@@ -273,7 +273,6 @@ def export(
 ) -> None:
     """Write one self-contained ONNX graph for a radar: raw IQ in, probabilities and label out, onnxruntime alone."""
     from .export import export_raw_iq
-    from .inference import Classifier
     from .model_file import chosen_name
     from .predict import terms
     from .samples import positive
@@ -281,14 +280,12 @@ def export(
     if max_false_alarm is not None:
         positive(max_false_alarm, "--max-false-alarm")
     name = chosen_name(model)
-    worst = export_raw_iq(
+    worst, point = export_raw_iq(
         out, carrier_hz=carrier_hz, prf_hz=prf_hz, pulses=pulses, model=name, max_false_alarm=max_false_alarm
     )
     graph = f"iq (batch, {pulses}, 2) to probabilities and label"
     print(f"Wrote {out}: {graph}, within {worst:.0e} of predict --model {name} on a few signals", flush=True)
-    if max_false_alarm is not None:
-        point = Classifier.load(name, max_false_alarm=max_false_alarm).operating_point
-        assert point
+    if point is not None:
         complain(terms(point), kind="note")
 
 

@@ -16,6 +16,7 @@ import onnxruntime
 from bladewing.features.graph.inputs import IN_GRAPH, IQ, input_graph
 from bladewing.features.graph.operators import Graph, Value, needed
 from bladewing.models.export import attach_metadata
+from bladewing.models.operating import OperatingPoint
 from bladewing.models.seal import SEAL_KEY, seal
 from onnx import TensorProto, helper
 from scipy import fft
@@ -44,7 +45,7 @@ def export_raw_iq(
     pulses: int,
     model: str | os.PathLike[str] | None = None,
     max_false_alarm: float | None = None,
-) -> float:
+) -> tuple[float, OperatingPoint | None]:
     """Write a model as a graph that reads raw IQ.
 
     Parameters
@@ -66,8 +67,10 @@ def export_raw_iq(
 
     Returns
     -------
-    float
+    worst : float
         Largest difference of a probability from `Classifier.predict` over a few records, at most `TOLERANCE`.
+    point : OperatingPoint or None
+        What the false-alarm rate costs; None where none is asked for.
 
     Raises
     ------
@@ -105,7 +108,7 @@ def export_raw_iq(
         write_whole(Path(out), written)
     except OSError as error:
         raise unwritable(os.fspath(out), error, "give another file") from None
-    return worst
+    return worst, classifier.operating_point
 
 
 def _replaceable(out: Path) -> bool:

@@ -63,9 +63,7 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     if not zero.any():
         return none
     size = _sizes(iq)
-    held = np.sort(size[~zero])
-    steps = np.diff(held)
-    steps = steps[steps > 0]
+    held, steps = _sorted_steps(size[~zero])
     if _hardly_steps(held, steps):
         return none
     nearly = np.float32(NEAR_STEPS) * np.median(steps)
@@ -76,8 +74,6 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     if step:
         size, nearly = np.abs(iq), np.float32(NEAR_TURNED * step)
         near = int(np.count_nonzero((size <= nearly) & ~zero))
-        if np.count_nonzero(zero) <= NEAR_SHARE * near:
-            return none
     _, runs = _runs(zero)
     lost = none.copy()
     lost[zero] = np.repeat(runs, runs) <= MOST_IN_A_ROW
@@ -97,6 +93,13 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     return lost if no_chance else none
 
 
+def _sorted_steps(size: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Sizes of samples that are not 0, rising, and what lies between those that differ."""
+    held = np.sort(size)
+    steps = np.diff(held)
+    return held, steps[steps > 0]
+
+
 def _hardly_steps(held: NDArray[np.float32], steps: NDArray[np.float32]) -> bool:
     """Whether samples that are not 0 have hardly another size, and 0 is as near to them as they are to one another.
 
@@ -105,7 +108,7 @@ def _hardly_steps(held: NDArray[np.float32], steps: NDArray[np.float32]) -> bool
     Parameters
     ----------
     held, steps : ndarray
-        Sizes of those that are not 0, rising, and what lies between those that differ.
+        From `_sorted_steps`.
     """
     if len(steps) + 1 >= LEAST_DISTINCT:
         return False
@@ -184,18 +187,12 @@ def _runs(zero: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 def _silences(iq: NDArray[np.complex64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Where each run of zeros begins that is too long to be filled in, and its pulses; none of what is 0 throughout."""
-    starts, lengths = _runs(_zeros(iq))
+    zero = _zeros(iq)
+    starts, lengths = _runs(zero)
     long = lengths > MOST_IN_A_ROW
-    if lengths.max(initial=0) == len(iq) or (long.any() and _seldom_steps(iq)):
+    if lengths.max(initial=0) == len(iq) or (long.any() and _hardly_steps(*_sorted_steps(_sizes(iq)[~zero]))):
         long[:] = False  # what hardly steps is often 0
     return starts[long], lengths[long]
-
-
-def _seldom_steps(iq: NDArray[np.complex64]) -> bool:
-    """`_hardly_steps` of all samples that are not 0."""
-    held = np.sort(_sizes(iq[~_zeros(iq)]))
-    steps = np.diff(held)
-    return _hardly_steps(held, steps[steps > 0])
 
 
 def longest_silence(iq: NDArray[np.complex64]) -> tuple[int, int]:

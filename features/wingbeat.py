@@ -138,11 +138,9 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     if prf_hz * wavelength_m / 4 < 1.1 * WING_MPS:
         # a rotor folded into the wings' speeds cannot be told from them
         return (*nothing, f"no wingbeat: unambiguous only to {prf_hz * wavelength_m / 4:.1f} m/s")
-    whole = unbroken(iq)
-    if whole != slice(0, len(iq)):  # silences repeat, and what is there comes and goes with them
-        if whole.stop - whole.start < LEAST_S * prf_hz:
-            return (*nothing, f"no wingbeat: silences leave less than {LEAST_S:g} s in one piece")
-        return _one(iq[whole], carrier_hz, prf_hz)
+    iq = iq[unbroken(iq)]  # silences repeat, and what is there comes and goes with them
+    if len(iq) < LEAST_S * prf_hz:
+        return (*nothing, f"no wingbeat: silences leave less than {LEAST_S:g} s in one piece")
     shown, body = followed(normed(iq), carrier_hz, prf_hz)
     velocity = body[0]
     if np.isnan(velocity):

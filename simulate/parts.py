@@ -234,9 +234,13 @@ class UavPart(TargetPart):
         """Of a scatterer of that level, over the rms of the noise; `gain_db` is added."""
         return float(10 ** ((level_db + self.gain_db) / 20))
 
+    def rotor_beta_deg(self, rotor: RotorPart) -> float:
+        """Angle between the line of sight and a rotor's plane [deg]: its own, or the UAV's."""
+        return self.beta_deg if rotor.beta_deg is None else rotor.beta_deg
+
     def beta_rad(self, rotor: RotorPart) -> float:
         """Angle between the line of sight and a rotor's plane [rad]."""
-        return math.radians(self.beta_deg if rotor.beta_deg is None else rotor.beta_deg)
+        return math.radians(self.rotor_beta_deg(rotor))
 
     def fastest_tip_mps(self, rotor: RotorPart, dwell_s: float) -> float:
         """Largest radial speed that a rotor's tips may show within the dwell [m/s]."""

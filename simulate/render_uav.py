@@ -1,6 +1,5 @@
 """Rendering of a scene's UAVs: exact or far ranges, closed-form or dense blades, as a fidelity says."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -118,7 +117,7 @@ def uav_truth(part: UavPart) -> dict[str, Any]:
         "velocity_mps": part.velocity_mps,
         "acceleration_mps2": part.acceleration_mps2,
         "beta_deg": part.beta_deg,
-        "rotor_beta_deg": [round(math.degrees(part.beta_rad(rotor)), 9) for rotor in part.rotors],
+        "rotor_beta_deg": [part.rotor_beta_deg(rotor) for rotor in part.rotors],
         "rotation_hz": [rotor.rotation_hz for rotor in part.rotors],
         "blades": [rotor.blades for rotor in part.rotors],
         "blade_length_m": [rotor.blade_length_m for rotor in part.rotors],

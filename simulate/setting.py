@@ -154,7 +154,7 @@ class Setting(BaseModel):
                     f"{target.name}: it moves at {fastest:.1f} m/s, beyond the unambiguous {radar.unambiguous_mps:.1f} "
                     "m/s: its line aliases"
                 )
-        if self.receiver.jitter_s and self.clutter:
+        if self.receiver.jitter_s and self.clutters:
             said.append("receiver.jitter_s moves UAVs and birds alone: clutter is rendered at even instants")
         if self.receiver.mains_hz and not {"mains", "bursts"} & set(self.receiver.effects):
             said.append('receiver.mains_hz changes nothing without "mains" or "bursts" among the effects')

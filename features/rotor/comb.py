@@ -181,6 +181,29 @@ def strong_multiple(
     return best
 
 
+def _weak_lines_show(orders: NDArray[np.intp], power: NDArray[np.float64], number: int) -> bool:
+    """Whether the lines between every so many-th are more than noise."""
+    weak = power[orders % number != 0]
+    return bool(len(weak) and weak.mean() > 1 + WEAK_DEVIATIONS / np.sqrt(len(weak)))
+
+
+def _lines_a_turn(orders: NDArray[np.intp], power: NDArray[np.float64], blades: int | None, most: int) -> int:
+    """Every how many-th line is strong, `most` or fewer: 1, the blades given, or what else their comb may show.
+
+    Of blades that are given every second of four may be alike; and where a fraction of their comb was found, the lines
+    between are noise.
+    """
+
+    def strong(numbers: range) -> int:
+        return strong_multiple(orders, power, range(numbers.start, min(numbers.stop, most + 1)))
+
+    number = strong(blade_numbers(blades))
+    if number > 1 or blades is None or blades == 1:
+        return number
+    other = strong(blade_numbers(None))
+    return other if blades % other == 0 or not _weak_lines_show(orders, power, other) else 1
+
+
 def powers_over_noise(data: Periodogram, fit: CombFit, rest: NDArray[np.complex128]) -> NDArray[np.float64]:
     """Power of each line of a comb over the noise [1], as they are beside what combs leave of the record."""
     return squared(fit.seen_beside(rest)) * data.pulses / data.level_of(rest)(fit.frequencies)
@@ -348,23 +371,13 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
         )
     power = powers_over_noise(data, fit, fitted[1])
     within = (fit.orders >= start.low) & (fit.orders <= start.high)
-    most = int(fastest_chopping(data) / fit.spacing)
-
-    def strong(numbers: range) -> int:
-        return strong_multiple(fit.orders[within], power[within], range(numbers.start, min(numbers.stop, most + 1)))
-
-    def between(number: int) -> bool:
-        weak = power[within][fit.orders[within] % number != 0]
-        return bool(len(weak) and weak.mean() > 1 + WEAK_DEVIATIONS / np.sqrt(len(weak)))
-
-    per_turn = strong(blade_numbers(blades))
-    if per_turn == 1 and blades is not None and blades > 1:  # every second of four are alike, or a fraction was found
-        other = strong(blade_numbers(None))
-        per_turn = other if blades % other == 0 or not between(other) else 1
+    orders, power = fit.orders[within], power[within]
+    per_turn = _lines_a_turn(orders, power, blades, int(fastest_chopping(data) / fit.spacing))
     for number in sorted({1, per_turn}):
         if of_mains(fit, data, start.score, number):
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"
     # further lines fall on every so many-th; and of a comb that is sought less, a fraction may be what was found
     few = fit.spacing * per_turn * data.prf_hz > CHOPPING_RANGE_HZ[1]
-    is_sure = per_turn > 1 and between(per_turn) and not few and not may_come_back(start.last, fit.spacing)
+    unlike = per_turn > 1 and _weak_lines_show(orders, power, per_turn)
+    is_sure = unlike and not few and not may_come_back(start.last, fit.spacing)
     return Comb(fit, fitted[1], start.last, per_turn, open_orders * fit.spacing, has_line, per_turn, is_sure), ""
