@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from bladewing.features.acceleration import body_acceleration, without_acceleration
-from bladewing.features.dropouts import unbroken
+from bladewing.features.dropouts import BEYOND_FILLING_IN, unbroken
 from bladewing.features.inputs import MIN_PULSES
 from bladewing.features.measure import MOST_BLADES_GIVEN
 from bladewing.features.measurements import BODY, EACH_ROTOR, Measurements
@@ -82,6 +82,9 @@ KNOWN_MPS, ENDS = 1.0, 0.05
 #: Combs in no larger a share of the dwells may be chance: of noise alone one dwell in some 300 shows one.
 CHANCE = 0.1
 
+#: Reasons of a dwell in which a rotor could not have been seen.
+BLIND = ("PRF too low", "dwell too short", BEYOND_FILLING_IN)
+
 #: A recording whose spectrum has one side alone in more than this share of its dwells is of one channel.
 ONE_SIDED = 0.5
 
@@ -141,6 +144,8 @@ class Measured:
         Wingbeat and body over the whole recording; None where that is too short.
     remarks
         What is to be known of the recording beside this, a sentence each.
+    direction_known
+        False for one channel: whether a body comes or goes is not told then, and signs of velocities say nothing.
     """
 
     recording: Recording
@@ -152,11 +157,17 @@ class Measured:
     acceleration_mps2_std: np.ndarray
     beat: Wingbeat | None
     remarks: tuple[str, ...]
+    direction_known: bool
 
     @property
     def combs(self) -> int:
         """How many dwells hold a comb."""
         return int(np.isfinite(self.values.chopping_hz).sum())
+
+    @property
+    def looked_at(self) -> int:
+        """In how many dwells a rotor could have been seen."""
+        return sum(not reason.startswith(BLIND) for reason in self.values.reason.tolist())
 
     @property
     def has_rotor(self) -> bool:
@@ -194,7 +205,9 @@ class Measured:
         that of the other dwells, as it is where combs may be chance; see `body`.
         """
         held = np.isfinite(self.values.chopping_hz)
-        reason = disagreement(self.values) if held.any() else "no comb in any dwell"
+        reason = disagreement(self.values)
+        if not held.any():
+            reason = "no comb in any dwell" if self.looked_at else str(self.values.reason[0])
         medians: dict[str, Any] = dict.fromkeys(OF_COMBS)
         if not reason:
             medians = {name: _median(getattr(self.values, name)[held]) for name in OF_COMBS}
@@ -204,7 +217,11 @@ class Measured:
         pair = ("main_chopping_hz", "tail_chopping_hz", "gear_ratio")
         gear = {name: _median(getattr(self.values, name)[geared]) for name in pair}
         counts = {"dwells": len(self.iq), "with_comb": self.combs, "with_second_comb": int(geared.sum())}
-        beside = {"left_out_s": self.recording.left_out_s(self.iq), "remarks": list(self.remarks)}
+        beside = {
+            "left_out_s": self.recording.left_out_s(self.iq),
+            "remarks": list(self.remarks),
+            "direction_known": self.direction_known,
+        }
         return {**counts, "reason": reason or None, **beside, **medians, **gear, **self.over_all()}
 
     def body(self, dwells: np.ndarray) -> dict[str, float | None]:
@@ -228,7 +245,7 @@ class Measured:
         return dict(zip(BODY, (middle, float(np.sqrt(max(unlike, 1.0) / weight.sum()))), strict=True))
 
     def body_range(self, dwells: np.ndarray) -> list[float] | None:
-        """Lowest and highest velocity of the body in single dwells, of some of them; None where none knows it well.
+        """Between what nine tenths of the body's velocities in single dwells lie; None where none knows it well.
 
         Of a body that passes the end of the unambiguous velocities one of both lies beyond.
         """
@@ -242,8 +259,12 @@ class Measured:
         return SPEED_OF_LIGHT_MPS / self.recording.carrier_hz * self.recording.prf_hz / 2
 
     def _course(self, dwells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The body's velocity in some of the dwells and its deviation, all in the span about the best known."""
+        """The body's velocity in some of the dwells and its deviation, all in the span about the best known.
+
+        The speed alone where its direction is not known.
+        """
         value, std = self.values.body_velocity_mps[dwells], self.values.body_velocity_mps_std[dwells]
+        value = value if self.direction_known else np.abs(value)
         known = np.isfinite(value) & np.isfinite(std)
         if known.any():
             best = value[known][std[known].argmin()]
@@ -378,14 +399,17 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     remarks = recording.remarks(settings.dwell_s, iq, measured=True)
     if meant := in_kilohertz(recording.prf_hz):
         remarks += (f"PRF {recording.prf_hz:g} Hz: {meant}, if that is what it is",)
-    if whole is recording.iq:  # else it is told that there is one channel
+    direction_known = whole is recording.iq  # else it is told that there is one channel
+    if direction_known:
         empty = sum(bool(half_empty(centred_power(scaled(dwell, unit_scale(dwell)), window=KAISER))) for dwell in iq)
-        if empty > ONE_SIDED * count:
+        direction_known = empty <= ONE_SIDED * count
+        if not direction_known:
             remarks += (
                 f"one side: half of the spectrum is empty in {empty} of {counted(count)}, as of a single channel that "
                 "was made analytic: whether a body comes or goes is not told",
             )
-    return Measured(recording, iq, start_s, stop_s, values, acceleration, acceleration_std, beat, remarks)
+    pull = (acceleration, acceleration_std)
+    return Measured(recording, iq, start_s, stop_s, values, *pull, beat, remarks, direction_known)
 
 
 def helicopter(values: Measurements) -> bool:

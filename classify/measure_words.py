@@ -28,6 +28,7 @@ def print_measured(found: "Measured", console: "Console") -> None:
     from rich.text import Text
 
     v = found.values
+    body_mps = v.body_velocity_mps if found.direction_known else np.abs(v.body_velocity_mps)
     heads = ("start s", "body m/s", "chopping Hz", "rotors", "band Hz", "tip m/s")
     table = Table(*heads, box=None, pad_edge=False)
     for column in table.columns:
@@ -42,7 +43,7 @@ def print_measured(found: "Measured", console: "Console") -> None:
         count = f"{v.rotor_count[n]:.0f}" if v.rotors_resolved[n] else f">={v.rotor_count[n]:.0f}"
         table.add_row(
             f"{found.start_s[n]:.3f}",
-            with_error(v.body_velocity_mps[n], v.body_velocity_mps_std[n]),
+            with_error(body_mps[n], v.body_velocity_mps_std[n]),
             _rate_with_error(v.chopping_hz[n], v.chopping_hz_std[n]),
             count,
             with_error(v.bandwidth_hz[n], v.bandwidth_hz_std[n]),
@@ -62,9 +63,9 @@ def print_measured(found: "Measured", console: "Console") -> None:
 def _sentence(found: "Measured") -> str:
     """The recording in one line: the answer an engineer wants."""
     all_together = found.together()
-    body = _body(all_together)
+    body = _body(found, all_together)
     if not all_together["with_comb"]:
-        return f"no rotor in {counted(all_together['dwells'])}{body}"
+        return f"{_none(found)}{body}"
     where = f"comb in {all_together['with_comb']} of {counted(all_together['dwells'])}"
     if not found.has_rotor:
         where += ", perhaps by chance"
@@ -95,13 +96,24 @@ def _sentence(found: "Measured") -> str:
     return f"{where}; {rotor}{body}{gear}{_wheel(found)}{_unlike(found)}{folded and '; ' + folded}"
 
 
-def _body(all_together: Mapping[str, Any]) -> str:
+def _none(found: "Measured") -> str:
+    """Where no rotor is, and where none could have been seen."""
+    dwells = len(found.iq)
+    if not found.looked_at:
+        return "whether there is a rotor cannot be told"
+    if found.looked_at < dwells:
+        return f"no rotor in {found.looked_at} of {counted(dwells)}, whether in the others cannot be told"
+    return f"no rotor in {counted(dwells)}"
+
+
+def _body(found: "Measured", all_together: Mapping[str, Any]) -> str:
     """How fast the body is: its median, or from where to where where that is not the same in all dwells; or ""."""
     velocity_mps, std_mps = (all_together[name] for name in BODY)
     slowest, fastest = all_together["body_velocity_range_mps"] or (0.0, 0.0)
+    sign = "+" if found.direction_known else ""
     if fastest - slowest > UNSTEADY_MPS:
-        return f"; body {slowest:+.2f} to {fastest:+.2f} m/s"
-    return "" if velocity_mps is None else f"; body {signed(velocity_mps, std_mps)} m/s"
+        return f"; body {slowest:{sign}.2f} to {fastest:{sign}.2f} m/s"
+    return "" if velocity_mps is None else f"; body {signed(velocity_mps, std_mps, sign)} m/s"
 
 
 def _blades(found: "Measured") -> str:
@@ -197,8 +209,10 @@ def _rate_with_error(value: float, std: float) -> str:
     return f">={value:.4g}" if std > value else with_error(value, std)
 
 
-def signed(velocity_mps: float, std_mps: float) -> str:
+def signed(velocity_mps: float, std_mps: float, sign: str = "+") -> str:
     """A velocity with its sign and its standard deviation, to the hundredth where it is known to 1 m/s.
+
+    `sign` is "" where one that is not below 0 has none.
 
     Examples
     --------
@@ -209,4 +223,4 @@ def signed(velocity_mps: float, std_mps: float) -> str:
     """
     if std_mps >= 1:
         return with_error(velocity_mps, std_mps)
-    return f"{round(velocity_mps, 2) + 0.0:+.2f} +- {max(std_mps, 0.01):.2f}"  # not -0.00
+    return f"{round(velocity_mps, 2) + 0.0:{sign}.2f} +- {max(std_mps, 0.01):.2f}"  # not -0.00

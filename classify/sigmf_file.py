@@ -85,7 +85,10 @@ def find_sigmf(path: Path) -> Path | None:
     if meta.is_file():
         return meta
     if data.is_file():
-        raise BadInput(f"{data}: its metadata {meta.name} are missing: a SigMF recording is both files")
+        raise BadInput(
+            f"{data}: its metadata {meta.name} are missing: a SigMF recording is both files; samples alone, beside "
+            "--carrier-hz and --prf-hz, are saved as .npy"
+        )
     if missing:
         raise BadInput(missing)
     return None

@@ -61,11 +61,11 @@ def line_among(spectrum: Spectrum, where: NDArray[np.bool_], known: list[float])
         top = (top + 1) % len(power)
     while power[top - 1] > power[top]:
         top = (top - 1) % len(power)
-    if top == first:
-        return line
-    own = np.abs(place - top) <= LOBE_BINS + 1
+    away = np.abs((place - top + spectrum.bins // 2) % spectrum.bins - spectrum.bins // 2)
+    own = away <= LOBE_BINS + 1
     known_bins = (np.rint(np.array(known) * spectrum.bins).astype(np.intp) + spectrum.bins // 2) % spectrum.bins
-    return _strongest(spectrum, where & ~own if own[known_bins].any() else np.abs(place - top) <= 1)
+    # with both bins beside it, wherever it is looked for
+    return _strongest(spectrum, where & ~own if top != first and own[known_bins].any() else away <= 1)
 
 
 def _beside(spectrum: Spectrum, lines: list[float], half_bins: float) -> NDArray[np.bool_]:

@@ -34,6 +34,10 @@ NOISE_TOP_DB = 13.5
 #: line of a hovering drone's blades in none of 351.
 OTHER_SIDE_DB = 8.0
 
+#: Nor where a line stands on that side as far from the one at rest as this on its own, to so many bins: blades whose
+#: edges reflect unlike leave there a line of any level.
+MIRROR_BINS = 1.5
+
 #: One that does not is the body's all the same so often, at most: 5 of 450 were.
 MOVES_SHARE = 0.05
 
@@ -83,8 +87,12 @@ def body_velocity(
         Positive when the range grows. Without a comb, that of the strongest line, if one moves of that; NaN where none
         stands out, or where it may lie anywhere.
     """
-    own, level_db = data.strong.centres[0], data.strong.centres_db[0]
-    if fit is None:
+    own, level_db = data.strong.lines[0]
+    if fit is not None:
+        # before a background that is stronger: the line at the comb's centre, where one is seen
+        at_centre = (line for line in data.strong.lines if abs(folded(line[0] - fit.centre)) * data.pulses < 1.0)
+        own, level_db = next(at_centre, (own, level_db))
+    else:
         if level_db < LINE_DB:
             return np.nan, np.nan
         own, level_db, open_std = _likeliest(data, spectrum, blades)
@@ -110,30 +118,37 @@ def body_velocity(
 def _likeliest(data: Periodogram, spectrum: Spectrum, blades: bool) -> tuple[float, float, float]:
     """The line that is the body's most likely where no comb tells, its level [dB], and its deviation by the others.
 
-    It is the strongest that leaves do not make in a wind, if there is any and blades do not: what stands at rest is a
-    background then, or a rival where it is hardly stronger. Where it is much stronger, and a hovering body's by its
-    shape, or lines that move are as strong on both sides of it, these are a hovering drone's blades. Places in
-    [cycles a sample].
+    It is the strongest that leaves do not make in a wind, or one that stands out of what they make, if there is any and
+    blades do not: what stands at rest is a background then, or a rival where it is hardly stronger. Where it is much
+    stronger, and a hovering body's by its shape, or lines that move are as strong on both sides of it, these are a
+    hovering drone's blades. Places in [cycles a sample].
     """
     lines = data.strong.lines
-    moving = [] if blades else [line for line in lines if abs(line[0]) >= data.rest_half and line[1] >= LINE_DB]
+    loud = [] if blades else [line for line in lines if line[1] >= LINE_DB]
+    moving = [line for line in loud if abs(line[0]) >= data.rest_half]
+    moving = moving or [line for line in loud if abs(line[0]) * data.pulses > LOBE_BINS]
     own, level_db = (moving or lines)[0]
     slow, slow_db = lines[0]
     if moving and slow_db > level_db + WEAKEST_DB:
         if _is_hovering(spectrum, slow, slow_db, data.rest_half):
             return slow, slow_db, 0.0
-        if _on_both_sides(spectrum, own, level_db, data.rest_half):
+        if _on_both_sides(spectrum, own, level_db, slow, data.rest_half):
             return slow, slow_db, MOVES_SHARE**0.5 * _rivals_std(spectrum, slow, data.rest_half, [], level_db)
     rest = data.rest_half if moving else 0.0
-    at_rest = [place for place, other_db in lines if abs(place) < rest and other_db < level_db + WEAKEST_DB]
+    at_rest = [place for place, db in lines if place != own and abs(place) < rest and db < level_db + WEAKEST_DB]
     return own, level_db, _rivals_std(spectrum, own, rest, at_rest)
 
 
-def _on_both_sides(spectrum: Spectrum, line: float, level_db: float, rest: float) -> bool:
-    """Whether something on the other side of rest, and further from it than so much, is about as strong as a line."""
+def _on_both_sides(spectrum: Spectrum, line: float, level_db: float, slow: float, rest: float) -> bool:
+    """Whether what is on the other side of rest, further from it than so much, says that a line is one of blades.
+
+    It is about as strong, or a line as far from that at rest.
+    """
     turns = spectrum.frequency_hz / spectrum.prf_hz
-    across = spectrum.level_db[(np.abs(turns) > rest) & (turns * line < 0)]
-    return float(across.max(initial=-np.inf)) > max(level_db - OTHER_SIDE_DB, NOISE_TOP_DB)
+    across = (np.abs(turns) > rest) & (turns * line < 0)
+    mirror = across & tops(spectrum.relative_power) & (np.abs(_bins_from(spectrum, 2 * slow - line)) <= MIRROR_BINS)
+    as_strong = float(spectrum.level_db[across].max(initial=-np.inf)) > max(level_db - OTHER_SIDE_DB, NOISE_TOP_DB)
+    return as_strong or float(spectrum.level_db[mirror].max(initial=-np.inf)) > NOISE_TOP_DB
 
 
 def _is_hovering(spectrum: Spectrum, line: float, level_db: float, rest: float) -> bool:

@@ -14,6 +14,7 @@ from .lines import from_whole
 from .notch import body_line
 from .samples import finite_complex, require_radar, scaled, unit_scale
 from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum
+from .window import KAISER
 
 #: Dwells by which the body is followed [s], each over the next two: of dwells side by side a heave of their rate would
 #: make one slow slope.
@@ -24,6 +25,10 @@ LEAST_PULSES = 16
 
 #: The course is a line through so many dwells at most, spread over all: slopes between all pairs are that many squared.
 MOST_DWELLS = 400
+
+#: What is left of dwells counts up to so many spreads. And the medians of slopes are off by so many times what a line
+#: of least squares is in white noise, whose errors in dwells that overlap take one another away.
+CLIPPED, ROBUST_LOSS = 3.0, 2.0
 
 #: What stands at rest in this sense is taken for the background [m/s, m/s^2], and taken out so far about velocity zero.
 REST_MPS, REST_MPS2, REST_NOTCH_MPS = 0.4, 0.15, 0.5
@@ -118,5 +123,44 @@ def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> Cours
     slope = float(np.median((velocity[second] - velocity[first]) / (when[second] - when[first])))
     rest = velocity - slope * when
     middle = float(np.median(rest))
-    spread = 1.4826 * float(np.median(np.abs(rest - middle)))
-    return middle, slope, spread * float(np.sqrt(OVERLAP / ((when - when.mean()) ** 2).sum()))
+    return middle, slope, _slope_std(rest - middle, when, length)
+
+
+def _slope_std(rest: NDArray[np.floating], when: NDArray[np.floating], length: int) -> float:
+    """Deviation of the slope of a line through the velocities of dwells that overlap.
+
+    Parameters
+    ----------
+    rest : ndarray, shape (dwells,)
+        What the line leaves of each.
+    when : ndarray, shape (dwells,)
+        Their middles [s].
+    length : int
+        Of a dwell [pulses].
+
+    Returns
+    -------
+    float
+        From how what is left goes together over a quarter of the recording (Newey and West 1987), and no less than
+        white noise of that spread would leave.
+    """
+    count = len(rest)
+    spread = 1.4826 * float(np.median(np.abs(rest)))
+    away = when - when.mean()
+    weight = _together(away / (away @ away))
+    seen = _together(np.clip(rest, -CLIPPED * spread, CLIPPED * spread)) / count
+    most = min(max(count // 4, OVERLAP), count - 1)
+    lag = np.arange(most + 1)
+    twice = np.where(lag > 0, 2.0, 1.0)
+    found = float((twice * (1 - lag / (most + 1)) * weight[lag] * seen[lag]).sum())
+    # a line's frequency is a mean of the noise by the window times the time from the middle: neighbours' are opposite
+    score = KAISER.shape(length) * (np.arange(length) - (length - 1) / 2)
+    alike = _together(score)[:: max(length // OVERLAP, 1)][: min(OVERLAP, count)]
+    white = spread**2 * float((twice[: len(alike)] * weight[: len(alike)] * alike).sum() / alike[0])
+    return float(np.sqrt(max(found, ROBUST_LOSS**2 * white, 0.0)))
+
+
+def _together(values: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Sums of the products of values so many places apart, 0 to all but one."""
+    size = fft.next_fast_len(2 * len(values), real=True)
+    return np.asarray(fft.irfft(np.abs(fft.rfft(values, size)) ** 2, size)[: len(values)], np.float64)

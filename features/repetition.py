@@ -35,6 +35,14 @@ _CONTINUUM_HZ, _SLOWEST_HZ = 6.0, 2.0
 #: Fluctuation of a level that is rounding [natural logarithm of a float32 power].
 _ROUNDING = 1e-5
 
+#: What pauses, its phase held meanwhile, spreads the power about its rate over lines: those within so much of it [Hz]
+#: hold this share and more outside the main one, so many bins of the recording to each side. Steady wings' held none,
+#: those of birds that glide or bound in between a fifth to a third.
+_ABOUT_HZ, _PAUSES_SHARE, _MAIN_BINS = 1.8, 0.05, 2.0
+
+#: Cells' power over so much of chance counts there; their centre is off by up to so much of how far it is spread.
+_OVER_CHANCE, _CENTRE_SHARE = 2.0, 1 / 4
+
 #: Stated deviations count neighbouring cells and frames as so much less than independent [1 of the variance].
 _OVERLAP = 2.3
 
@@ -194,6 +202,34 @@ def repetition(levels: LevelSpectrum, low_hz: float, high_hz: float) -> Repetiti
     )
     rate, std = _refined(levels, float(rates[chosen]), multiples, cells)
     return Repetition(rate, std, float(best[chosen]), _moving_share(levels, place), _share(levels, power), cells)
+
+
+def while_moving(levels: LevelSpectrum, found: Repetition) -> tuple[float, float]:
+    """The rate of what repeats while it does, and its deviation: another than the pattern's where it pauses.
+
+    Parameters
+    ----------
+    levels : LevelSpectrum
+        From `level_spectrum`.
+    found : Repetition
+        From `repetition`: of what pauses one of several lines, as far apart as its pauses come.
+
+    Returns
+    -------
+    rate_hz, rate_hz_std : float
+        [Hz]
+    """
+    used = found.cells if found.cells.any() else levels.weight > 0
+    rates = np.arange(len(levels.moving)) * levels.step_hz
+    about = np.abs(rates - found.rate_hz) < _ABOUT_HZ
+    power = np.maximum(squared(levels.moving[np.ix_(about, used)]).mean(axis=1) - _OVER_CHANCE, 0.0)
+    total = float(power.sum())
+    main = np.abs(rates[about] - found.rate_hz) <= _MAIN_BINS * _PADDING * levels.step_hz
+    if total == 0 or float(power[~main].sum()) < _PAUSES_SHARE * total:
+        return found.rate_hz, found.rate_hz_std
+    centre = float(power @ rates[about]) / total
+    spread = float(np.sqrt(power @ (rates[about] - centre) ** 2 / total))
+    return centre, max(found.rate_hz_std, _CENTRE_SHARE * spread)
 
 
 def _moving_share(levels: LevelSpectrum, place: NDArray[np.intp]) -> float:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from .dropouts import unbroken
 from .following import by_recording, followed, normed, standing
-from .repetition import HARMONICS, LevelSpectrum, Repetition, level_spectrum, repetition
+from .repetition import HARMONICS, LevelSpectrum, Repetition, level_spectrum, repetition, while_moving
 from .spectrum import LEAST_FLOOR, SPEED_OF_LIGHT_MPS
 from .stft import stft
 
@@ -59,7 +59,7 @@ class Wingbeat:
     Parameters
     ----------
     wingbeat_hz, wingbeat_hz_std : ndarray of float64, shape (...)
-        Wingbeat rate [Hz].
+        Wingbeat rate [Hz], while the wings beat: of a bird that glides or bounds in between less well known.
     repeat : ndarray of float64, shape (...)
         Share of the pattern's fluctuation that repeats, 0..1.
     velocity_mps : ndarray of float64, shape (...)
@@ -165,7 +165,7 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     reason = _not_wings(found, velocity, motion, far)
     if reason:
         return (np.nan, np.nan, found.share, *body, f"no wingbeat: {reason}")
-    return (found.rate_hz, found.rate_hz_std, found.share, *body, "")
+    return (*while_moving(levels, found), found.share, *body, "")
 
 
 def _motion(

@@ -118,7 +118,9 @@ class Plan:
     def explain(self) -> str:
         """The plan in words and numbers, one line a decision."""
         together = "nothing is left out" if self.error_db == -np.inf else f"at most {self.error_db:+.1f} dB re noise"
-        head = f"error of all that is left out, over the dwell: {together} (tolerance {self.tolerance_db:+.1f} dB)"
+        points = any(one.points for one in self.fidelity.values())
+        what = f"error of all that is left out{' and of blades as so few points' if points else ''}, over the dwell"
+        head = f"{what}: {together} (tolerance {self.tolerance_db:+.1f} dB)"
         return "\n".join([head, *(decision.line() for decision in self.decisions), *self.notes])
 
 

@@ -344,12 +344,13 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     if start.score < threshold(data) or start.spacing * data.prf_hz >= LEAST_FRACTION_HZ:
         start = with_faster(data, start)
     if start.score < threshold(data):
-        return None, f"no comb: evidence {start.score:.1f} nats, {threshold(data):.0f} are needed"
+        reason = f"no comb: evidence {start.score:.1f} nats, {threshold(data):.0f} are needed"
+        return None, span_too_slow(data) or reason
     start = of_flashes(data, of_one_rotor(data, beside_line(data, start)))
     start, open_orders, has_line = centred(data, start)
     fitted = fit_combs(data, start.centre, [start.spacing], [(start.low, start.high)])
     if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
-        return None, f"no comb: fewer than {LEAST_LINES} lines"
+        return None, span_too_slow(data) or f"no comb: fewer than {LEAST_LINES} lines"
     fit = fitted[0][0]
     reach = start.last * fit.spacing
     reach_mps = reach * data.span_mps

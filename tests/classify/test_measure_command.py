@@ -76,6 +76,35 @@ def test_noise_has_nulls_and_a_reason(folder, capsys):
     assert closing["recording"]["reason"] == "no comb in any dwell"
 
 
+def test_where_no_dwell_could_show_a_rotor_none_is_denied(tmp_path, capsys):
+    path, rng = tmp_path / "slow.npy", np.random.default_rng(5)
+    np.save(path, white(rng, 320).astype(np.complex64))
+    slow = [str(path), "--carrier-hz", "24e9", "--prf-hz", "1e3"]
+    assert main(["measure", *slow]) == 0
+    said = capsys.readouterr().out
+    assert "whether there is a rotor cannot be told" in said
+    assert "no rotor in" not in said
+    assert main(["measure", *slow, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["recording"]["reason"].startswith("PRF too low: ")
+
+
+def test_of_one_channel_a_body_has_a_speed_and_no_direction(tmp_path, capsys):
+    """Its sign was told beside the remark that it is anyone's guess."""
+    for velocity_mps in (8.0, -8.0):
+        moved = 30 * moving_at(velocity_mps, np.arange(2 * PULSES) / PRF_HZ) + white(
+            np.random.default_rng(4), 2 * PULSES
+        )
+        for name, iq, is_known in (("both", moved, True), ("one", moved.real + 0j, False)):
+            np.save(tmp_path / f"{name}.npy", iq.astype(np.complex64))
+            assert main(["measure", str(tmp_path / f"{name}.npy"), *RADAR]) == 0
+            sign = "[+-]" if is_known else ""
+            assert re.search(rf"; body {sign}8\.00 \+- 0\.01 m/s", capsys.readouterr().out)
+            assert main(["measure", str(tmp_path / f"{name}.npy"), *RADAR, "--json"]) == 0
+            told = json.loads(capsys.readouterr().out.splitlines()[-1])["recording"]
+            assert told["direction_known"] == is_known
+            assert told["body_velocity_mps"] == pytest.approx(velocity_mps if is_known else 8.0, abs=0.01)
+
+
 def test_combs_that_are_not_one_rotors_have_no_median_but_a_reason(tmp_path, capsys):
     rng, path = np.random.default_rng(6), tmp_path / "unlike.npy"
     unlike = [spinning(rate_hz, PULSES) + 10 for rate_hz in (40.3, 47.1, 61.7, 83.3)]  # none of the mains

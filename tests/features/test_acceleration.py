@@ -176,3 +176,12 @@ def test_no_acceleration_found_is_none_to_take_out():
     iq = white(np.random.default_rng(2), 2, PULSES)
     with pytest.raises(ValueError, match=r"acceleration_mps2 holds a value that is not finite.* put 0 there"):
         without_acceleration(iq, np.array([np.nan, 1.0]), **RADAR)
+
+
+def test_ground_that_sways_is_in_the_deviation_of_what_hovers_before_it():
+    scene = Scene.load("quadcopter")
+    iq = np.stack([scene.render(seed=seed).iq for seed in range(30)])
+    found, std, smeared = body_acceleration(iq, carrier_hz=scene.radar.carrier_hz, prf_hz=scene.radar.prf_hz)
+    assert not smeared.any()
+    # a mean square of 30 normal errors lies below 2.0 in all but one of 1000 cases; it was 7
+    assert np.nanmean((found / std) ** 2) < 2.0

@@ -186,3 +186,14 @@ def test_a_body_without_a_line_is_told_by_lines_that_come_back_beside_the_others
         found = measure(iq, **radar)
         told += abs(found.body_velocity_mps - 5.0) < 4 * found.body_velocity_mps_std < 12
     assert told == 7
+
+
+@pytest.mark.parametrize(("carrier_hz", "prf_hz"), [(77e9, 5e3), (24e9, 1e3), (9.85e9, 1e3)])
+def test_where_no_rotor_could_be_seen_the_prf_is_the_reason(carrier_hz, prf_hz):
+    """Be it noise or a drone whose lines fold: that no comb is found says nothing of it."""
+    rng, wavelength_m, times_s = np.random.default_rng(4), 299_792_458.0 / carrier_hz, np.arange(400) / prf_hz
+    noise = white(rng, 4, 400)
+    drone = rotors_by_chance(rng, [69.0, 70.0, 71.0], times_s, wavelength_m=wavelength_m, length_m=0.12)
+    for iq in (noise, noise + 3 * (drone + 3)):
+        found = measure(iq, carrier_hz=carrier_hz, prf_hz=prf_hz)
+        assert all("PRF too low" in reason for reason in found.reason.tolist())
