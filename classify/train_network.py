@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 CLASS_OF_KIND = tuple(CLASSES.index(label) for label in KIND_CLASS.values())
 """Class of each kind that networks learn to tell, in the order of `KIND_CLASS`."""
 
+PUPIL_EPOCHS = 2
+"""Times the settings' epochs that a pupil makes: it goes on gaining by what its teacher says (docs/ablation.md)."""
+
 OnFraction = Callable[[float], None]
 
 ScoresOf = Callable[[Gathered], NDArray[np.floating]]
@@ -106,13 +109,16 @@ def _trained(
         if image
         else SpectrumNet(shapes, seed=seed, widen=rung.widen, kinds=CLASS_OF_KIND)
     )
+    course = settings.model_dump(include={field.name for field in fields(Course)})
+    if taught:
+        course["epochs"] *= PUPIL_EPOCHS
     epochs_part = epochs_of(name)
     try:
         result = train_network(
             net,
             Lessons(_inputs(name, sets.train), sets.train.labels, kinds_of(sets.train), taught() if taught else None),
             (_inputs(name, sets.validate), sets.validate.labels),
-            Course(**settings.model_dump(include={field.name for field in fields(Course)})),
+            Course(**course),
             seed=seed,
             # no measurement is signed, so only the picture is mirrored
             augment=VelocityMirror(signal, -2 if image else -1),

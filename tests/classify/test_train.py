@@ -226,6 +226,7 @@ def test_a_pupil_learns_from_its_teacher_after_it_and_an_interruption_changes_no
     straight = _run(outs[0], models=names)["models"]
     assert list(straight) == list(names)
     assert [straight[name]["teacher"] for name in names] == ["spectrum-cnn-teacher", ""]
+    assert [len(straight[name]["epochs"]) for name in names] == [2 * SETTINGS.epochs, SETTINGS.epochs]
     taught = (outs[0] / "spectrum-cnn.onnx").read_bytes()
     assert taught != (whole / "spectrum-cnn.onnx").read_bytes()
     assert "spectrum-cnn-teacher" in _stopped_once(outs[1], "spectrum-cnn-epochs", after=2, models=names)
