@@ -54,6 +54,17 @@ def test_the_second_is_asked_about_no_record_that_the_first_is_sure_of(cascade, 
     assert sum(count for second, count, _ in asked if second) == len(records) - sum(sure for *_, sure in by_first)
 
 
+def test_the_first_is_sure_of_nothing_that_either_would_not_name(cascade, monkeypatch):
+    """With a rate of false alarms each has a threshold of its own, which may lie above `SURE`."""
+    p = np.float32([[0.97, 0.02, 0.01]])
+    assert SURE[0] < 0.97
+    assert cascade.sure(p).all()
+    for model in (cascade, cascade.first):
+        with monkeypatch.context() as patch:
+            patch.setattr(model, "accept", (0.98, *model.accept[1:]))
+            assert not cascade.sure(p).any()
+
+
 def test_inputs_that_are_made_are_answered_as_samples_are(cascade, records):
     inputs = model_inputs(records, **RADAR, names=cascade.inputs)
     np.testing.assert_array_equal(cascade.from_inputs(inputs), cascade.predict(records, **RADAR).probabilities)

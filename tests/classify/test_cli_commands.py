@@ -1,6 +1,8 @@
 """`bladewing train` and `bladewing report` hand their options on; help and usage errors of the whole command line."""
 
+import errno
 import json
+import os
 import subprocess
 import sys
 import types
@@ -10,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from bladewing.classify.cli import app, main
+from bladewing.classify.exits import exit_code
 from bladewing.classify.files import result_folder
 from bladewing.classify.training_account import ACCOUNT, print_account
 from bladewing.models import pretrained
@@ -216,6 +219,39 @@ def test_a_run_that_ends_early_leaves_no_empty_folder(monkeypatch, tmp_path, com
     assert main([command, "--out", str(out)]) == (2 if isinstance(error, ModuleNotFoundError) else 130)
     left = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*")}
     assert left == {None: set(), "old": {"old"}, "a/b/part": {"a", "a/b", "a/b/part"}}[kept]
+
+
+def failing(error):
+    def command():
+        raise error
+
+    return command
+
+
+@pytest.mark.parametrize("name", ["ENOSPC", "EDQUOT", "EROFS", "EACCES", "EPERM", "EFBIG", "ENAMETOOLONG"])
+def test_a_disk_that_cannot_be_written_is_the_users_to_mend(name, capsys):
+    number = getattr(errno, name)
+    assert exit_code(failing(OSError(number, os.strerror(number), "out/train.json"))) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"bladewing: error: out/train.json: {os.strerror(number)}: make room or give another place")
+    assert said.count("\n") == 1
+
+
+def test_a_disk_that_is_broken_is_none_of_what_was_expected(capsys):
+    assert exit_code(failing(OSError(errno.EIO, os.strerror(errno.EIO), "out/train.json"))) == 1
+    assert "unexpected OSError" in capsys.readouterr().err
+
+
+def test_too_little_memory_is_bad_input_with_the_cure(capsys):
+    assert exit_code(failing(MemoryError())) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("bladewing: error: more memory is needed than there is: give less at once")
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(("given", "code"), [(0, 0), (1, 1), (2, 2), (None, 0), ("done", 0), (130, 130)])
+def test_a_command_ends_with_the_code_it_answers(given, code):
+    assert exit_code(lambda: given) == code
 
 
 @pytest.mark.parametrize("closed", ["1", "2"])

@@ -156,10 +156,13 @@ def test_a_clipped_recording_is_answered_with_a_remark(run_json, sigmf_pair):
     assert remark.endswith("lower the gain")
 
 
-def test_both_files_of_a_recording_are_answered_once(run_json, sigmf_pair):
+def test_both_files_of_a_recording_are_answered_once(run_json, sigmf_pair, tmp_path):
     meta = sigmf_pair("my rec 3.30GHz")
     data, stem = meta.with_suffix(".sigmf-data"), meta.with_suffix("")
-    lines = run_json(data, meta, stem, meta.parent / "." / meta.name)
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path)
+    ways = [os.path.relpath(meta), *(tmp_path / way / meta.name for way in ("sub/..", "link"))]
+    lines = run_json(data, meta, stem, meta.parent / "." / meta.name, *ways)
     assert [line["file"] for line in lines] == [str(data)] * 3
 
 

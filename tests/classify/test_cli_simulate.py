@@ -123,6 +123,16 @@ def test_explain_says_what_is_left_out_and_writes_nothing(scene_file, tmp_path, 
     assert list(tmp_path.iterdir()) == [scene_file]
 
 
+def test_what_is_explained_is_the_plan_of_the_seed_that_is_rendered(scene_file, capsys):
+    """What a receiver does is drawn by the seed."""
+    scene_file.write_text(f'{SCENE}[receiver]\neffects = ["fading", "image", "mains"]\n')
+    plans = {seed: Scene.load(scene_file).plan(seed).explain() for seed in (0, 3)}
+    assert plans[0] != plans[3]
+    for seed, plan in plans.items():
+        assert main(["simulate", str(scene_file), "--explain", "--seed", str(seed)]) == 0
+        assert capsys.readouterr().out.strip() == plan
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -106,6 +106,15 @@ def test_a_second_run_writes_nothing(whole):
     assert {path: path.stat().st_mtime_ns for path in whole.glob("*.npy")} == before
 
 
+def test_what_a_killed_writer_left_half_written_goes_and_nothing_else(copy):
+    litter = {".bladewing-0.tmp", ".bladewing-1.new"}
+    for name in (*litter, ".bladewing-note.txt", "mine.tmp"):
+        (copy / name).write_bytes(b"x")
+    before = set(content(copy))
+    assert write(copy) == 0
+    assert before - set(content(copy)) == litter
+
+
 @pytest.mark.parametrize("damage", ["missing", "cut", "flipped", "longer"])
 def test_what_is_damaged_is_drawn_again_and_nothing_else(whole, copy, damage):
     path = copy / "train-00001.iq.npy"
@@ -174,6 +183,19 @@ def test_a_disk_that_is_too_small_is_refused_before_anything_is_drawn(tmp_path, 
     with pytest.raises(BadInput, match=r"GB are needed, 0\.001 GB are free"):
         write(tmp_path / "deep" / "data")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_disk_with_room_for_just_what_is_missing_is_large_enough(copy, monkeypatch):
+    missing = [copy / f"test-00000.{part}.npy" for part in ("iq", "table")]
+    needed = sum(path.stat().st_size for path in missing)
+    for path in missing:
+        path.unlink()
+    monkeypatch.setattr(module.shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(10, 10, free))
+    free = needed - 1
+    with pytest.raises(BadInput, match="make room or draw fewer"):
+        write(copy)
+    free = needed
+    assert write(copy) == 1
 
 
 def test_one_writer_at_a_time(whole):

@@ -10,7 +10,8 @@ from bladewing.classify import gather as gather_module
 from bladewing.classify.errors import BadInput
 from bladewing.classify.gather import gather, inputs_digest
 from bladewing.classify.parts import Parts
-from bladewing.features import INPUT_SHAPES
+from bladewing.features import INPUT_SHAPES, model_inputs
+from bladewing.simulate import stream
 
 
 def test_inputs_do_not_depend_on_the_workers(monkeypatch):
@@ -23,6 +24,17 @@ def test_inputs_do_not_depend_on_the_workers(monkeypatch):
         np.testing.assert_array_equal(one.inputs[name], two.inputs[name])
     np.testing.assert_array_equal(one.labels, np.arange(60) % 3)
     np.testing.assert_array_equal(one.truth["kind"], two.truth["kind"])
+
+
+def test_measurements_are_kept_to_the_bit_and_levels_to_hundredths_of_a_decibel():
+    """Half precision would round a speed of 300 m/s to a quarter."""
+    names = ("features", "levels")
+    found = gather(3, "bench", 48, names=names, workers=1).inputs
+    radars = [(r.iq, {"carrier_hz": r.radar.carrier_hz, "prf_hz": r.radar.prf_hz}) for r in stream(3, "bench", 48)]
+    made = [model_inputs(iq, **radar, names=names) for iq, radar in radars]
+    features, levels = (np.concatenate([inputs[name] for inputs in made]) for name in names)
+    np.testing.assert_array_equal(found["features"], features)
+    np.testing.assert_allclose(found["levels"], levels, rtol=0, atol=0.035)
 
 
 def test_other_measurements_have_another_digest(monkeypatch):

@@ -63,6 +63,16 @@ def test_a_recording_tells_of_them_and_how_many() -> None:
     np.testing.assert_array_equal(np.delete(recording.iq, range(100, 110)), np.delete(iq, range(100, 110)))
 
 
+def test_pulses_that_are_too_many_to_be_filled_in_are_not_said_to_be() -> None:
+    iq = noise(np.random.default_rng(4), 2000)
+    iq[::2] = 0
+    recording = Recording("walk", iq, 24e9, 1e4)
+    np.testing.assert_array_equal(recording.iq, iq)
+    assert recording.filled_in == 0
+    (said,) = recording.remarks(0.2, recording.dwells(0.2))
+    assert said.startswith("lost: 1000 of 2000 pulses are exactly 0")
+
+
 def test_lost_pulses_of_a_recording_draw_no_rotor(tmp_path) -> None:
     """Of each 97th pulse that was lost, ground was once a UAV, surely, with a comb of 258 Hz."""
     whole = (100 + noise(np.random.default_rng(10), len(PULSES))).astype(np.complex64)

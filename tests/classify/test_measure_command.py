@@ -11,8 +11,9 @@ import pytest
 from bladewing.classify import measure_plot
 from bladewing.classify.cli import main
 from bladewing.classify.measure import OF_COMBS, Measured, Settings, disagreement, measure_recording
-from bladewing.classify.measure_words import _blades, _unlike, with_error
-from bladewing.classify.recording import load_recording
+from bladewing.classify.measure_words import _blades, _unlike, _wheel, with_error
+from bladewing.classify.recording import Recording, load_recording
+from bladewing.features.rotor.comb import OVER_BODY
 from bladewing.simulate import RotorMotion, Scene, rotor_echo
 from scipy.signal import hilbert
 
@@ -62,6 +63,13 @@ def test_json_gives_a_line_a_dwell_and_one_a_recording(folder, capsys):
             assert isinstance(whole, int)
     assert abs(closing["recording"]["body_velocity_mps"] - VELOCITY_MPS) < 0.1
     assert 0 < closing["recording"]["body_velocity_mps_std"] < 0.1
+
+
+def test_times_go_on_where_the_recording_begins(folder):
+    read = load_recording(folder / "drone.npy", carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
+    found = measure_recording(Recording("x", read.iq, CARRIER_HZ, PRF_HZ, start_s=100.0), Settings(0.08, 2, None))
+    *dwells, _ = found.json_objects()
+    assert [(dwell["start_s"], dwell["stop_s"]) for dwell in dwells] == [(100.0, 100.08), (100.08, 100.16)]
 
 
 def test_noise_has_nulls_and_a_reason(folder, capsys):
@@ -372,6 +380,17 @@ def test_the_dwell_that_speaks_for_a_recording_is_clear_and_no_outlier():
     assert Measured.clearest(SimpleNamespace(values=values)) == 0
 
 
+def test_of_several_recordings_the_one_with_the_clearest_comb_is_drawn():
+    silent, another, weak, strong = (
+        SimpleNamespace(values=SimpleNamespace(comb_snr_db=np.array([snr_db])), clearest=lambda: 0)
+        for snr_db in (np.nan, np.nan, 10.0, 20.0)
+    )
+    assert Measured.clearer(silent, None) is silent
+    assert Measured.clearer(silent, another) is another
+    for one, clearer in ((silent, weak), (silent, strong), (weak, strong)):
+        assert Measured.clearer(one, clearer) is Measured.clearer(clearer, one) is clearer
+
+
 def test_the_plot_of_silence_is_a_line_at_the_foot(tmp_path):
     np.save(tmp_path / "silence.npy", np.zeros(2000, np.complex64))
     target = tmp_path / "silence.svg"
@@ -439,6 +458,7 @@ def test_a_dwell_smeared_by_acceleration_is_measured(folder, tmp_path, capsys):
     [
         (["--beta-deg", "90"], "--beta-deg is 90"),
         (["--blades", "0"], "--blades is 0: it must be a whole number of 1 to 64"),
+        (["--blades", "65"], "--blades is 65: it must be a whole number of 1 to 64"),
         (["--blades", "2.5"], "--blades is '2.5': it must be a whole number"),
         (["--beta-deg", "x"], "--beta-deg is 'x': it must be a number"),
         (["--blades", "1000000000000"], "--blades is 1000000000000: it must be a whole number of 1 to 64"),
@@ -455,6 +475,10 @@ def test_bad_options_are_one_line_and_code_2(folder, capsys, options, said):
     out, error = capsys.readouterr()
     assert (out, error.count("\n")) == ("", 1)
     assert said in error
+
+
+def test_as_many_blades_may_be_given_as_are_said_to_be():
+    assert Settings.checked(dwell_s=0.08, blades=64, beta_deg=0.0).blades == 64
 
 
 @pytest.mark.parametrize("columns", ["40", None])
@@ -500,6 +524,18 @@ def test_a_comb_that_ends_where_the_body_s_speed_does_is_called_a_wheel_s(tmp_pa
     for speed_mps, within in ((2 * edge_mps, True), (5.0, False)):
         assert "comb in 1 of 1 dwell; " in said[speed_mps]
         assert ("the lines reach no further than the body moves" in said[speed_mps]) == within
+
+
+@pytest.mark.parametrize(("reach", "wheel"), [(0.95, True), (1.05, False)])
+def test_a_wheel_is_thought_of_up_to_where_its_lines_may_reach(reach, wheel):
+    edge_hz = 2 * reach * OVER_BODY * 10.0 / WAVELENGTH_M  # to either side of a body at 10 m/s
+    values = SimpleNamespace(
+        chopping_hz=np.array([30.0, 30.0, np.nan]),
+        bandwidth_hz=np.array([2 * edge_hz, 2 * edge_hz, np.nan]),
+        body_velocity_mps=np.array([10.0, -10.0, 500.0]),
+    )
+    found = SimpleNamespace(values=values, recording=SimpleNamespace(carrier_hz=CARRIER_HZ))
+    assert ("perhaps a wheel" in _wheel(found)) == wheel
 
 
 def test_a_value_is_written_to_the_second_digit_of_its_error():

@@ -260,7 +260,7 @@ def test_a_train_json_that_never_ends_is_told_too(tiny_models: Path, tmp_path: P
         run.run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
 
 
-def test_what_was_measured_is_kept_for_the_same_cascade_on_the_same_machine_alone(
+def test_what_was_measured_is_kept_for_the_same_run_on_the_same_machine_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     settings = run.report_config(None, seed=1, quick=True)
@@ -269,6 +269,13 @@ def test_what_was_measured_is_kept_for_the_same_cascade_on_the_same_machine_alon
     assert one == run._of(settings, {"a": b"x"}, account)
     assert one != run._of(settings, {"a": b"x"}, {"cascade": {"stages": ["b", "a"]}})
     assert one != run._of(settings, {"a": b"x"}, None)
+    assert one != run._of(run.report_config(None, seed=2, quick=True), {"a": b"x"}, account)
+    for models in ({"a": b"y"}, {"b": b"x"}):
+        assert one != run._of(settings, models, account)
+    for digest in ("simulator_digest", "inputs_digest", "schema_hash"):
+        with monkeypatch.context() as patch:
+            patch.setattr(run, digest, lambda: "0" * 64)
+            assert one != run._of(settings, {"a": b"x"}, account), digest
     machine = run.describe_machine()
     for change, same in (({"load": 99.0}, True), ({"cpu": "another"}, False), ({"packages": {}}, False)):
         monkeypatch.setattr(run, "describe_machine", lambda change=change: machine | change)

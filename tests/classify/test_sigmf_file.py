@@ -325,6 +325,10 @@ def test_a_hole_between_captures_is_refused_and_the_first_index_is_the_start(sig
         (("2026-01-01T00:00:00", "2026-01-01T00:00:10Z"), True),
         (("2026-01-01T00:00:10.000Z", "2026-01-01T00:00:00.000Z"), True),
         (("2026-01-01T00:00:01Z", "2026-01-01T00:00:00Z"), False),
+        (("2026-01-01T00:00:00Z", "2026-01-01T00:00:00.900Z"), False),  # one of them is rounded
+        (("2026-01-01T00:00:00.900Z", "2026-01-01T00:00:00Z"), False),
+        (("2026-01-01T00:00:00.000", "2026-01-01T00:00:00.003Z"), False),  # without a zone it is UTC
+        (("2026-01-01T02:00:00.000+02:00", "2026-01-01T00:00:00.003Z"), False),
         (("yesterday", "2026-01-01T00:00:10Z"), False),
         ((None, "2026-01-01T00:00:10Z"), False),
     ],
@@ -338,6 +342,17 @@ def test_captures_between_which_time_went_by_are_refused(sigmf_pair, times, hole
         load_recording(path)
         return
     with pytest.raises(BadInput, match=r"captures\[1\] is dated .* s after captures\[0\] .*: store each run in a rec"):
+        load_recording(path)
+
+
+@pytest.mark.parametrize(("time", "hole"), [("50:00", False), ("50:02", False), ("49:58", False), ("50:04", True)])
+def test_a_clock_may_be_off_by_a_thousandth_of_the_time_between_captures(sigmf_pair, time, hole):
+    dated = [(0, "2026-01-01T00:00:00.000Z"), (3000, f"2026-01-01T00:{time}.000Z")]  # 50 minutes of samples at 1 Hz
+    path = sigmf_pair(captures=[capture(start, **{"core:datetime": at}) for start, at in dated], sample_rate=1.0)
+    if not hole:
+        assert load_recording(path).iq.size == 4000
+        return
+    with pytest.raises(BadInput, match=r"captures\[1\] is dated 3004 s after captures\[0\]"):
         load_recording(path)
 
 

@@ -3,13 +3,14 @@ from functools import partial
 import bladewing.classify
 import numpy as np
 import pytest
+from bladewing.classify import predict
 from bladewing.classify.errors import BadInput
 from bladewing.classify.fusion import CORRELATION, LOOKS, ODDS
 from bladewing.classify.inference import Classifier, Envelope, Prediction
 from bladewing.classify.labels import CLASSES, UNKNOWN, decide
 from bladewing.classify.predict import Answer, answer
 from bladewing.classify.recording import Recording
-from bladewing.classify.track import DOUBT, FITTED_DWELL_S, fuse, weights
+from bladewing.classify.track import DOUBT, FITTED_DWELL_S, Track, fuse, weights
 from bladewing.simulate import Radar, Scene, draw_records
 from bladewing.simulate.catalogue import AIRFRAMES
 from hypothesis import assume, given
@@ -306,21 +307,43 @@ class Asked:
     decide = staticmethod(lambda p: decide(p, ACCEPT))
 
     def __init__(self, envelope):
-        self.envelope, self.shapes = envelope, []
+        self.envelope, self.looks = envelope, []
 
     def predict(self, iq, *, carrier_hz, prf_hz):
-        self.shapes.append(iq.shape)
+        self.looks.append(iq)
         p = np.tile(np.float32([0.4, 0.3, 0.3]), (len(iq), 1))
         return Prediction(decide(p, ACCEPT)[0], p, np.full(len(iq), ""), np.zeros(len(iq)))
+
+
+def recorded(pulses):
+    """Noise at a PRF of 4 kHz."""
+    return Recording("x", np.random.default_rng(3).normal(size=(pulses, 2)).view(complex)[:, 0], 10e9, 4e3)
 
 
 @pytest.mark.parametrize(("count", "lengths"), [(1, [1]), (2, [1, 2]), (13, [1, 2, 5, 12]), (31, [1, 2, 5, 12, 31])])
 def test_as_many_looks_of_each_length_as_the_recording_holds(count, lengths):
     asked = Asked(Envelope())
-    noise = np.random.default_rng(3).normal(size=(count * 80 + 30, 2)).view(complex)[:, 0]
-    given = answer(Recording("x", noise, 10e9, 4e3), asked, dwell_s=0.02)
-    assert asked.shapes == [(count // length, length * 80) for length in lengths]
+    recording = recorded(count * 80 + 30)
+    given = answer(recording, asked, dwell_s=0.02)
+    assert [looks.shape for looks in asked.looks] == [(count // length, length * 80) for length in lengths]
+    for looks in asked.looks:  # they begin with the recording and follow one another
+        np.testing.assert_array_equal(looks.ravel(), recording.iq[: looks.size])
     assert given.track.used == count
+
+
+def test_looks_of_a_recording_count_by_their_duration(monkeypatch):
+    given = []
+    monkeypatch.setattr(predict, "fuse", lambda *p, dwell_s, **more: given.append(dwell_s) or fuse(*p, **more))
+    for dwell_s in (0.02, 0.25, 5.0):
+        answer(recorded(4000), Asked(Envelope()), dwell_s=dwell_s)
+    assert given == pytest.approx([0.02, 0.25, 1.0])  # a recording shorter than a dwell is one
+
+
+def test_what_only_a_long_look_shows_is_sought_in_the_first_five_seconds(monkeypatch):
+    sought = []
+    monkeypatch.setattr(predict, "long_look", lambda iq, *_: sought.append(iq) or {})
+    answer(recorded(28_000), Asked(Envelope()))
+    np.testing.assert_array_equal(sought, [recorded(28_000).iq[:20_000]])
 
 
 @pytest.mark.parametrize(("velocity_mps", "rate_hz", "steps"), [(-1.6, 3.2, True), (7.0, 5.0, False)])
@@ -404,6 +427,27 @@ def test_dwells_that_are_refused_alike_share_a_line_and_those_between_them_have_
         ["0.400", "0.500", "unknown", "not", "sure"],
         ["0.500", "0.700", "unknown", "2", "dwells:", "not", "sure"],
     ]
+
+
+def answered(track, start_s=0.0):
+    """Two dwells of half a second that say UAV, and a track of them."""
+    start_s = start_s + np.array([0.0, 0.5])
+    dwells = Prediction(np.array(["uav"] * 2), np.tile([0.8, 0.1, 0.1], (2, 1)), np.full(2, ""), np.zeros(2))
+    return Answer("x", start_s, start_s + 0.5, dwells, track)
+
+
+@pytest.mark.parametrize("label", ["uav", "clutter", "unknown"])
+def test_a_label_that_is_not_what_was_declared_is_not_left_without_a_word(label, capsys):
+    answered(Track(label, np.array([0.8, 0.1, 0.1]), "", 2, "uav", 1)).print(Console())
+    said = capsys.readouterr().out
+    assert "declared uav after 0.5 s" in said
+    assert ("do not bear out" in said) == (label != "uav")
+
+
+@pytest.mark.parametrize("after", [1, 2])
+def test_a_declaration_is_timed_from_the_beginning_of_a_recording_that_goes_on_from_another(after):
+    track = Track("uav", np.array([0.8, 0.1, 0.1]), "", 2, "uav", after)
+    assert answered(track, start_s=100.0).declared_s == 0.5 * after
 
 
 def test_a_recording_outside_the_envelope_is_refused_before_its_dwells_are_read(monkeypatch):

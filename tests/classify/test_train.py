@@ -286,6 +286,18 @@ def test_other_settings_and_runs_of_other_lengths_do_not_take_what_was_kept(tmp_
     assert len(list(tmp_path.glob("train-parts/*/spectrum-cnn-epochs.npz"))) == 2
 
 
+def test_what_is_kept_is_of_the_same_simulator_inputs_and_libraries(tmp_path, monkeypatch):
+    kept = []
+    monkeypatch.setattr(train, "Parts", lambda _, of: kept.append(of) or interrupt())
+    for changed in ("simulator_digest", "inputs_digest", "schema_hash", "_versions", None, None):
+        with monkeypatch.context() as patch:
+            if changed:
+                patch.setattr(train, changed, lambda: "another")
+            with pytest.raises(KeyboardInterrupt):
+                run_training(tmp_path, records=600, progress=False)
+    assert [kept.count(of) for of in kept] == [1, 1, 1, 1, 2, 2]
+
+
 @pytest.mark.parametrize("name", ["features-linear", "spectrum-cnn-epochs"])
 def test_what_is_damaged_or_foreign_is_refused_in_one_line(tmp_path, name):
     with pytest.raises(KeyboardInterrupt):

@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from bladewing.classify import files
@@ -48,6 +49,32 @@ def test_a_fault_at_any_rename_leaves_all_old_or_all_new(tmp_path, monkeypatch, 
     settle(tmp_path)
     assert content(tmp_path) in (OLD, NEW)
     assert len(list(tmp_path.iterdir())) == len(content(tmp_path))
+
+
+@pytest.mark.parametrize("call", range(1, 5))
+def test_killed_as_a_decision_is_taken_back_it_leaves_all_old_or_all_new(tmp_path, monkeypatch, call):
+    write_together(tmp_path, OLD)
+    count = 0
+    unlink = Path.unlink
+
+    def interrupted(folder):
+        if (folder / files._JOURNAL).exists():
+            raise KeyboardInterrupt  # decided, not done
+
+    def killed(self, **options):
+        nonlocal count
+        count += self.exists()
+        if count == call:
+            raise SystemExit
+        unlink(self, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(files, "_sync_folder", interrupted)
+        patch.setattr(Path, "unlink", killed)
+        with pytest.raises(SystemExit):
+            write_together(tmp_path, NEW)
+    settle(tmp_path)
+    assert content(tmp_path) in (OLD, NEW)
 
 
 def decided(folder):

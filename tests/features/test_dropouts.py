@@ -81,7 +81,7 @@ def test_nothing_at_all_and_nothing_lost_are_no_dropouts() -> None:
     assert not lost_pulses(np.zeros(0, np.complex64)).any()
 
 
-@pytest.mark.parametrize("lost", [[700], [100, 1500], [40, 41]])
+@pytest.mark.parametrize("lost", [[700], [1], [1998], [100, 1500], [40, 41]])
 def test_one_lost_pulse_is_enough_where_samples_have_no_steps(lost: list[int]) -> None:
     """It stands 60 dB beside a strong line as noise that hides all blades."""
     pulse = np.arange(2000)
@@ -94,7 +94,8 @@ def test_one_lost_pulse_is_enough_where_samples_have_no_steps(lost: list[int]) -
 @pytest.mark.parametrize("window", [np.bartlett, np.hanning, np.blackman])
 def test_the_ends_of_a_window_are_no_lost_pulses(window) -> None:
     iq = noise(np.random.default_rng(2), 2000) * window(2000)
-    assert not lost_pulses(iq.astype(np.complex64)).any()
+    for ends in (slice(None), slice(1, None), slice(-1)):  # both, and one alone
+        assert not lost_pulses(iq[ends].astype(np.complex64)).any()
     assert not lost_pulses((np.exp(0.3j * np.arange(2000)) - 1).astype(np.complex64)).any()
 
 
@@ -110,6 +111,17 @@ def test_a_silence_is_no_lost_pulses() -> None:
     assert not lost_pulses(iq).any()
     iq[10:20] = 0
     assert np.flatnonzero(lost_pulses(iq)).tolist() == list(range(10, 20))
+
+
+@pytest.mark.parametrize("start", [0, 1000])
+@pytest.mark.parametrize(("pulses", "few"), [(MOST_IN_A_ROW, True), (MOST_IN_A_ROW + 1, False)])
+def test_the_longest_run_that_is_filled_in_is_one_short_of_a_silence(start: int, pulses: int, few: bool) -> None:
+    iq = noise(np.random.default_rng(5))
+    iq[start : start + pulses] = 0
+    assert lost_pulses(iq).sum() == few * pulses
+    record, stretches = mended(iq)
+    assert record.all() == few
+    assert (stretches == {}) == few
 
 
 @given(st.lists(st.tuples(st.integers(0, 300), st.integers(1, 200)), max_size=6), st.integers(0, 300))

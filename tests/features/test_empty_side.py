@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from bladewing.features import INPUT_SHAPES, doppler_spectrum, model_inputs
 from bladewing.features.empty_side import empty_sides, filled_sides, side_noise
+from bladewing.features.one_channel import made_analytic
 from bladewing.features.window import HANN
 from scipy.signal import hilbert
 
@@ -71,6 +72,22 @@ def test_an_empty_side_gets_the_noise_of_the_other_and_that_one_stays(seed, conj
     )
 
 
+def test_an_empty_side_is_filled_in_every_input_that_shows_levels():
+    iq = hilbert(white(np.random.default_rng(3), 3, PULSES).real)
+    made = model_inputs(iq, **RADAR, names=("spectrum", "image"))
+    inputs = {
+        "levels": made["spectrum"][:, 0],
+        "parts of the dwell": made["spectrum"][:, 3:],  # not below the floor, where half of the noise is
+        "frames": made["image"][:, 0].swapaxes(-1, -2),
+    }
+    for name, levels_db in inputs.items():
+        middle, width = levels_db.shape[-1] // 2, levels_db.shape[-1] // 8
+        # past the notch about rest and within the unambiguous velocities
+        one, other = levels_db[..., middle - 2 * width : middle - width], levels_db[..., middle + width :][..., :width]
+        assert one.mean() == pytest.approx(other.mean(), abs=1), name
+        assert min(one.std(), other.std()) > 0.3, name
+
+
 def test_how_the_other_side_was_taken_away_hardly_matters():
     """Of each dwell alone, or of a recording that was then cut, whose strong lines leak to the other side."""
     inner = slice(PULSES, 2 * PULSES)
@@ -115,6 +132,20 @@ def test_one_channel_is_read_as_if_made_analytic(of):
     one = of(noisy).astype(np.complex64)
     apart = [model_inputs(iq, **RADAR, names=("levels",))["levels"][0] for iq in (one, hilbert(of(noisy)))]
     assert np.abs(apart[0] - apart[1]).mean() < 0.1  # the transform of the one goes round, not of the other
+
+
+@pytest.mark.parametrize("both", [1 + 1j, 1 - 1j, -1 + 1j])
+def test_one_channel_in_both_parts_is_read_as_that_channel_whichever_sign_they_have(both):
+    iq = (white(np.random.default_rng(7), PULSES) + 3 * tone(3000.0)).real.astype(np.complex64)
+    wanted = made_analytic(iq)
+    assert wanted.imag.any()
+    np.testing.assert_array_equal(made_analytic(iq * np.complex64(both)), both.real * wanted)
+
+
+def test_one_channel_at_the_ends_of_float32_is_made_analytic_without_infinities():
+    """What is a quarter of a turn behind a jump stands higher than the jump."""
+    jumps = 3.4e38 * np.sign(white(np.random.default_rng(8), 4000).real).repeat(5)
+    assert np.isfinite(made_analytic(jumps.astype(np.complex64))).all()
 
 
 def test_a_line_without_noise_is_no_channel_of_two():

@@ -98,6 +98,25 @@ def test_two_lines_are_a_band_of_one_line():
     assert values["strong_40_70_db"] > values["weak_40_70_db"] + 1.5
 
 
+@pytest.mark.parametrize(
+    ("speed_mps", "name"), [(1.5, "slow"), (4.5, "middle"), (-17.0, "middle"), (25.0, "fast"), (-70.0, "fast")]
+)
+def test_what_begins_within_the_dwell_changes_the_level_at_its_own_speed_alone(speed_mps, name):
+    begins = np.clip((np.arange(PULSES) / PULSES - 0.4) / 0.2, 0, 1)
+    line = 3 * begins * tone(-2 * speed_mps / WAVELENGTH_M)
+    without, with_it = by_name(noise()), by_name(noise() + line)
+    more = {one: with_it[f"change_{one}_db"] - without[f"change_{one}_db"] for one in ("slow", "middle", "fast")}
+    assert max(more, key=more.get) == name, more
+
+
+@pytest.mark.parametrize(("first_mps", "last_mps"), [(30.0, 30.0), (-25.0, -25.0), (20.0, 40.0), (40.0, 20.0)])
+def test_the_centroid_drifts_as_far_as_the_line_does(first_mps, last_mps):
+    range_m = np.cumsum(np.linspace(first_mps, last_mps, PULSES)) / PRF_HZ
+    values = by_name(300 * np.exp(-4j * np.pi / WAVELENGTH_M * range_m) + noise())
+    # parts are a quarter of the dwell: the middles of the first and the last are three quarters of it apart
+    assert values["centroid_drift_mps"] == pytest.approx(abs(last_mps - first_mps) * 3 / 4, abs=1.5)
+
+
 @pytest.mark.parametrize("centre_hz", [0.0, 611.0, -1234.0])
 def test_a_perfect_comb_has_its_step_its_orders_and_no_smear(centre_hz):
     values = by_name(10 * comb(centre_hz=centre_hz) + noise())

@@ -89,6 +89,15 @@ def test_the_floor_ignores_a_band_of_lines_and_an_empty_side():
     assert 10 * np.log10(doppler_spectrum(one_sided, **RADAR).floor) == pytest.approx(3.0, abs=0.8)
 
 
+@pytest.mark.parametrize("window", [HANN, KAISER])
+@pytest.mark.parametrize(("by_db", "floor"), [(0, 1.0), (3, 0.75), (10, 1.0), (20, 1.0), (25, 1.0), (60, 1.0)])
+def test_the_floor_is_the_mean_of_like_sides_and_that_of_the_fuller_one_of_unlike_sides(window, by_db, floor):
+    sides = np.fft.fft(white(np.random.default_rng(4), 40, 2048))
+    sides[:, 1024:] *= 10 ** (-by_db / 20)
+    power = centred_power(np.fft.ifft(sides).astype(np.complex64), window=window)
+    assert noise_floor(power, window).mean() == pytest.approx(floor, rel=0.03)
+
+
 def test_noise_floor_is_monotone_in_the_power():
     power = np.random.default_rng(1).exponential(size=(4, 512)).astype(np.float32)
     np.testing.assert_allclose(noise_floor(power * 8, HANN), noise_floor(power, HANN) * 8)

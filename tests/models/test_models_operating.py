@@ -82,6 +82,17 @@ def test_ties_do_not_exceed_the_rate():
     assert operating_curve(probabilities, labels).at(0.1).threshold > 0.8
 
 
+def test_what_is_not_the_most_probable_class_is_neither_a_false_alarm_nor_found():
+    """However probable: a record is named UAV only where nothing else is likelier."""
+    uavs = np.repeat([[0.9, 0.1, 0.0], [0.45, 0.0, 0.55]], 100, axis=0)
+    others = np.repeat([[0.4, 0.3, 0.3], [0.48, 0.52, 0.0], [0.01, 0.0, 0.99]], [20, 500, 480], axis=0)
+    curve = operating_curve(np.concatenate([uavs, others]), np.repeat([0, 1], [200, 1000]))
+    every_win = curve.at(0.1)  # 2 % of the others win
+    assert every_win.threshold == pytest.approx(1 / 3, abs=1e-6)
+    assert every_win.detection == 0.5
+    assert 0.4 < curve.at(0.0125).threshold < 0.401
+
+
 def test_the_curve_survives_its_text():
     curve = operating_curve(*drawn(5_000, 5))
     again = OperatingCurve.from_json(curve.to_json())

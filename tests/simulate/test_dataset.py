@@ -28,10 +28,12 @@ def test_each_kind_alone_renders_the_same_bits_in_any_batch(kind):
         np.testing.assert_array_equal(whole.iq[i], draw_records(RADAR, 1, seed=5, start=i, kind=kind).iq[0])
 
 
-def test_other_seeds_and_purposes_are_other_records():
+def test_other_seeds_and_purposes_are_other_records_of_other_radars():
     base = draw_records(RADAR, 6, seed=1)
     for other in (draw_records(RADAR, 6, seed=2), draw_records(RADAR, 6, seed=1, purpose="test")):
         assert not (base.iq == other.iq).any()
+    drawn = [draw_radar(*of, group) for of in ((1, "train"), (2, "train"), (1, "test")) for group in range(40)]
+    assert len(set(drawn)) == 3 * 40
 
 
 def test_classes_are_balanced_and_kinds_follow_their_shares():
@@ -100,6 +102,33 @@ def test_powers_are_those_drawn():
     target = Target(0 * micro.astype(np.complex64), body.astype(np.complex64), np.full(5, 12.0))
     power = np.mean(abs(dataset_module.powered(target, snr_db)) ** 2, axis=1)
     np.testing.assert_allclose(10 * np.log10(power), snr_db + 12, atol=1e-3)
+
+
+def parts_of(monkeypatch, kind):
+    """Power of what reaches the receiver and of the thermal noise, a record, and the truth about it."""
+    powers = []
+    for part in (0, 1):
+        monkeypatch.setattr(dataset_module.Receiver, "receive", lambda _, *given, part=part: given[part])
+        records = draw_records(Radar(9.85e9, 5e3, 4000), 150, seed=3, kind=kind)
+        powers.append(np.mean(np.abs(records.iq.astype(complex)) ** 2, axis=1))
+    return *powers, records.truth
+
+
+def test_the_background_stands_as_far_over_the_noise_as_truth_says(monkeypatch):
+    signal, noise, truth = parts_of(monkeypatch, "noise")
+    there = np.isfinite(truth["background_db"])
+    assert (signal[~there] == 0).all()
+    off_db = 10 * np.log10((signal / noise)[there]) - truth["background_db"][there]
+    # half of them are a return at rest, the others fluctuate; the noise's own power scatters by 0.07 dB
+    assert np.quantile(np.abs(off_db), 0.4) < 0.1
+    assert np.abs(np.median(off_db)) < 0.1
+
+
+def test_an_echo_stands_as_far_over_the_noise_as_truth_says_also_where_that_is_quiet(monkeypatch):
+    signal, noise, truth = parts_of(monkeypatch, "rain")
+    alone = ~np.isfinite(truth["background_db"])
+    assert (truth["quiet_db"][alone] > 0).any()
+    np.testing.assert_allclose(10 * np.log10((signal / noise)[alone]), truth["snr_db"][alone], atol=0.4)
 
 
 def test_a_stream_is_its_groups():

@@ -10,7 +10,7 @@ from bladewing.simulate.bird import wing_size, wingbeat_hz
 from bladewing.simulate.clutter import draw_clutter
 from bladewing.simulate.dataset import QUIET, WEATHER
 from bladewing.simulate.laws import LAWS, WIDTH, Draws
-from bladewing.simulate.receiver import FAULT_CHANCE, FAULTLESS_CHANCE, Receiver
+from bladewing.simulate.receiver import FAULT_CHANCE, FAULTLESS_CHANCE, NormalsOf, Receiver
 from bladewing.simulate.uav import LEAST_ROTATION_HZ, _motion, _tail_rotor
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -214,6 +214,96 @@ def test_a_limiter_keeps_the_phase_and_what_is_below_its_level(limit_db):
     np.testing.assert_allclose(np.abs(iq), np.minimum(np.abs(signal), limit), rtol=1e-5)
     np.testing.assert_allclose(np.angle(iq), np.angle(signal), atol=1e-5)
     assert (np.abs(signal) > limit).any() == (limit_db < 20)
+
+
+RADAR = Radar(9.85e9, 1e4, 4000)
+
+
+def received(drawn: Receiver, signal: np.ndarray) -> np.ndarray:
+    """What receivers make of signals without noise."""
+    generators = [np.random.default_rng([1, row]) for row in range(len(signal))]
+    iq = signal.astype(np.complex64)
+    return drawn.receive(iq, np.zeros_like(iq), RADAR, lambda _: NormalsOf(generators)).astype(complex)
+
+
+def tones(*frequencies_hz: float) -> np.ndarray:
+    return np.exp(2j * np.pi * np.array(frequencies_hz)[:, None] * RADAR.times_s)
+
+
+@pytest.mark.parametrize("image_db", [-50.0, -20.0])
+def test_an_image_is_the_line_at_the_other_side_and_as_far_under_it_as_asked_for(image_db):
+    drawn = alone("image", 2)
+    drawn.image_db[:] = image_db
+    lines = np.abs(np.fft.fft(received(drawn, tones(1000.0, -700.0)))) / RADAR.pulses
+    np.testing.assert_allclose(lines[[0, 1], [400, -280]], 1, rtol=1e-5)
+    np.testing.assert_allclose(20 * np.log10(lines[[0, 1], [-400, 280]]), image_db, atol=0.01)
+
+
+def test_a_high_pass_halves_a_line_at_its_corner_and_leaves_those_far_above():
+    drawn = alone("high_pass", 4)
+    drawn.high_pass_hz[:] = 50.0
+    passed = np.abs(received(drawn, tones(0.0, 50.0, -50.0, 2000.0)))
+    np.testing.assert_allclose(passed.mean(axis=1), [0, 0.5, 0.5, 1], atol=1e-3)
+
+
+def test_a_band_falls_to_its_edges_with_the_square_of_the_frequency():
+    drawn = alone("colour", 3)
+    drawn.hump_db[:], drawn.tilt_db[:] = 0.0, -20.0
+    passed = np.abs(received(drawn, tones(-5000.0, 2500.0, 0.0)))
+    np.testing.assert_allclose(20 * np.log10(passed.mean(axis=1)), [-20, -5, 0], atol=0.01)
+
+
+def test_a_band_is_humped_by_what_is_asked_for_at_most():
+    drawn = alone("colour", 300)
+    drawn.tilt_db[:] = 0.0
+    impulse = np.zeros((300, RADAR.pulses))
+    impulse[:, 0] = 1
+    reached_db = np.abs(20 * np.log10(np.abs(np.fft.fft(received(drawn, impulse))))).max(axis=1)
+    most_db = drawn.hump_db.sum(axis=1)
+    assert (reached_db <= most_db + 0.01).all()
+    assert (reached_db > 0.9 * most_db).mean() > 0.3
+
+
+def test_what_is_made_analytic_keeps_a_lines_level_and_one_side_by_chance():
+    drawn = alone("analytic", 60)
+    lines = np.abs(np.fft.fft(received(drawn, tones(*[1000.0] * 60)))) / RADAR.pulses
+    upper, lower = lines[:, 400], lines[:, -400]
+    np.testing.assert_allclose(np.maximum(upper, lower), 1, rtol=1e-4)
+    assert (np.minimum(upper, lower) < 1e-4).all()
+    assert 10 < (upper > lower).sum() < 50
+
+
+def test_a_real_receiver_gives_the_real_part():
+    (heard,) = received(alone("real_only", 1), tones(1000.0))
+    np.testing.assert_allclose(heard, np.cos(2 * np.pi * 1000.0 * RADAR.times_s), atol=1e-5)
+
+
+@pytest.mark.parametrize(("full_scale_db", "bits"), [(-3.0, 8.0), (0.0, 6.0), (12.0, 10.0)])
+def test_a_converter_has_its_full_scale_over_the_largest_sample_and_so_many_steps(full_scale_db, bits):
+    drawn = alone("converter", 1)
+    drawn.full_scale_db[:], drawn.bits[:] = full_scale_db, bits
+    signal = np.random.default_rng(2).normal(size=(1, RADAR.pulses, 2)).view(complex)[..., 0]
+    full_scale = max(abs(signal.real).max(), abs(signal.imag).max()) * 10 ** (full_scale_db / 20)
+    step = full_scale / 2 ** (bits - 1)
+    given, wanted = received(drawn, signal).real, signal.real.clip(-full_scale, full_scale)
+    assert 0.49 * step < np.abs(given - wanted).max() < 0.51 * step
+    np.testing.assert_allclose(given, np.rint(given / step) * step, atol=1e-3 * step)
+
+
+def test_phase_noise_has_the_rms_asked_for():
+    drawn = alone("phase_noise", 200)
+    drawn.phase_noise_rad[:] = 0.01
+    turned = np.angle(received(drawn, np.ones((200, RADAR.pulses))))
+    assert np.sqrt(np.mean(turned**2)) == pytest.approx(0.01, rel=0.25)
+
+
+def test_fading_swings_about_the_level_by_as_much_as_asked_for():
+    drawn = alone("fading", 300)
+    drawn.fading_db[:] = 8.0
+    drawn.fading_hz[:] = 25.0, 17.0
+    level_db = 20 * np.log10(np.abs(received(drawn, np.ones((300, RADAR.pulses)))))
+    assert np.abs(level_db).max() == pytest.approx(8.0, abs=0.3)  # where both sines are highest
+    assert np.sqrt(np.mean(level_db**2)) == pytest.approx(4.0, rel=0.05)
 
 
 def test_rain_and_the_sea_stand_behind_targets_as_often_as_they_are_to(monkeypatch):

@@ -7,17 +7,19 @@ from pathlib import Path
 import bladewing.simulate
 import numpy as np
 import pytest
+from bladewing.simulate import reception
 from bladewing.simulate.bird import wingbeat_hz
 from bladewing.simulate.catalogue import AIRFRAMES, BIRDS
 from bladewing.simulate.clutter import _texture
 from bladewing.simulate.laws import LAWS, WIDTH
 from bladewing.simulate.parts import BOUNDS, MOST, bounds_of
 from bladewing.simulate.radar import Radar
-from bladewing.simulate.receiver import EFFECT_OF, FAULT_CHANCE
+from bladewing.simulate.receiver import EFFECT_OF, FAULT_CHANCE, Receiver
 from bladewing.simulate.reception import Chosen, Reception
 from bladewing.simulate.render import Rendering, render
 from bladewing.simulate.render_bird import _cycle_rad, heave_range_m, members
 from bladewing.simulate.scene import Scene, SceneError, shipped
+from bladewing.simulate.target import Target
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import special
@@ -56,6 +58,8 @@ def power_spectrum(iq: np.ndarray) -> np.ndarray:
         (scene(uav=[uav(velocity=3.0)]), r"unknown field uav\[0\]\.velocity: the fields are .*velocity_mps"),
         (scene(uav=[uav(rotors=[{**ROTOR, "rpm": 3.0}])]), r"unknown field .*rpm: the fields are blade_length_m"),
         (scene(uav=[uav(range_m=0.1)]), r"range_m is 0\.1: .* must exceed its own reach of 0\.15 m"),
+        (scene(uav=[uav(range_m=7.9, body=[{"level_db": 10.0, "offset_m": 8.0}])]), r"its own reach of 8 m"),
+        (scene(uav=[uav(range_m=7.9, rotors=[{**ROTOR, "offset_m": 7.85}])]), r"its own reach of 8 m"),
         (scene(uav=[uav(range_m=1.0, velocity_mps=-30.0)]), r"dwell of 0\.04 s \(pulses / PRF\) it comes to -0\.2 m"),
         (scene(uav=[uav(range_m=1.0, velocity_mps=-90.0, acceleration_mps2=4500.0)]), r"it comes to 0\.1 m"),
         (scene(uav=[uav(name="mains")]), r"a part is named 'mains': that is the receiver's"),
@@ -266,7 +270,7 @@ def test_rpm_and_grams_are_warned_of():
 
 
 def test_a_jitter_that_pulses_change_places_by_is_warned_of():
-    for jitter_s, warned in ((0.1e-4, False), (1.0, True)):
+    for jitter_s, warned in ((0.1e-4, False), (0.24e-4, False), (0.26e-4, True), (1.0, True)):
         said = Scene.build({"radar": {**RADAR, "prf_hz": 1e4}, "receiver": {"jitter_s": jitter_s}}).warnings()
         assert any("change places" in line for line in said) == warned
 
@@ -402,6 +406,20 @@ def test_the_receivers_parts_do_what_their_values_say():
     assert len(np.unique(empty(**{**noise, "effects": []}).render(1).iq.real)) > 2**10
 
 
+def test_every_effect_of_a_receiver_has_random_numbers_of_its_own(monkeypatch):
+    """Else noise, phase noise and bursts of one seed would rise and fall together."""
+    drawn = []
+
+    def receive(self, signal, noise, radar, normals_of):
+        drawn.extend(normals_of(name)(np.array([0]))(3).tobytes() for name in FAULT_CHANCE)
+        return signal
+
+    monkeypatch.setattr(Receiver, "receive", receive)
+    for seed in (4, 5):
+        empty().render(seed)
+    assert len(set(drawn)) == 2 * len(FAULT_CHANCE)
+
+
 def test_phase_noise_turns_a_line_and_leaves_its_power():
     part = uav(rotors=[])
     values = {"radar": RADAR, "uav": [part], "receiver": {"noise": False}}
@@ -529,6 +547,17 @@ def test_every_parameter_of_a_receiver_is_rendered_at_its_extremes():
             receiver = {"effects": list(FAULT_CHANCE), "values": {name: value}}
             scene = Scene.build({"radar": {**RADAR, "pulses": 100}, "clutter": [part], "receiver": receiver})
             assert np.isfinite(scene.render().iq).all(), (name, value)
+
+
+def test_the_body_of_a_confuser_stands_over_its_limbs_by_what_was_drawn(monkeypatch):
+    turns = np.arange(1000)[None] / 1000
+    limbs, body = (np.exp(2j * np.pi * number * turns).astype(np.complex64) for number in (20, 3))
+    monkeypatch.setattr(reception, "draw_discrete", lambda *_: Target(limbs, 5 * body, np.array([12.0])))
+    walker = {"name": "walker", "kind": "person", "level_db": 17.0}
+    iq = Scene.build({"radar": RADAR, "clutter": [walker], "receiver": {"noise": False}}).render().iq
+    lines_db = 20 * np.log10(np.abs(np.fft.fft(iq)[[20, 3]]) / 1000)
+    assert np.diff(lines_db) == pytest.approx(12, abs=1e-3)
+    assert 10 * np.log10(np.sum(10 ** (lines_db / 10))) == pytest.approx(17, abs=1e-3)
 
 
 def test_a_vehicle_that_a_narrow_beam_misses_is_silent():
