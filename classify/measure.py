@@ -145,7 +145,8 @@ class Measured:
     remarks
         What is to be known of the recording beside this, a sentence each.
     direction_known
-        False for one channel: whether a body comes or goes is not told then, and signs of velocities say nothing.
+        False for one channel: whether a body comes or goes is not told then, and what is told in place of its velocity
+        and acceleration is its speed and how that changes; `values` are as measured.
     """
 
     recording: Recording
@@ -165,6 +166,11 @@ class Measured:
         return int(np.isfinite(self.values.chopping_hz).sum())
 
     @property
+    def speed_sign(self) -> np.ndarray:
+        """-1 for each dwell whose velocity is turned to be a speed, as its direction is not known, else 1."""
+        return np.where(~np.bool_(self.direction_known) & (self.values.body_velocity_mps < 0), -1.0, 1.0)
+
+    @property
     def looked_at(self) -> int:
         """In how many dwells a rotor could have been seen."""
         return sum(not reason.startswith(BLIND) for reason in self.values.reason.tolist())
@@ -176,6 +182,7 @@ class Measured:
 
     def json_objects(self) -> Iterator[dict[str, Any]]:
         """One object a dwell and a closing one; what has no value is null."""
+        sign = self.speed_sign
         for n in range(len(self.iq)):
             seen = np.isfinite(self.values.rotor_rates_hz[n])
             yield {
@@ -183,7 +190,8 @@ class Measured:
                 "start_s": round(float(self.start_s[n]), 9),
                 "stop_s": round(float(self.stop_s[n]), 9),
                 **{name: _number(getattr(self.values, name)[n], whole=name in WHOLE) for name in VALUES},
-                "acceleration_mps2": _number(self.acceleration_mps2[n]),
+                "body_velocity_mps": _number(sign[n] * self.values.body_velocity_mps[n]),
+                "acceleration_mps2": _number(sign[n] * self.acceleration_mps2[n]),
                 "acceleration_mps2_std": _number(self.acceleration_mps2_std[n]),
                 **{name: [_number(value) for value in getattr(self.values, name)[n][seen]] for name in EACH_ROTOR},
                 "rotors_resolved": bool(self.values.rotors_resolved[n]),
@@ -263,8 +271,8 @@ class Measured:
 
         The speed alone where its direction is not known.
         """
-        value, std = self.values.body_velocity_mps[dwells], self.values.body_velocity_mps_std[dwells]
-        value = value if self.direction_known else np.abs(value)
+        value = (self.speed_sign * self.values.body_velocity_mps)[dwells]
+        std = self.values.body_velocity_mps_std[dwells]
         known = np.isfinite(value) & np.isfinite(std)
         if known.any():
             best = value[known][std[known].argmin()]
@@ -282,6 +290,8 @@ class Measured:
             reason = f"no wingbeat: a rotor in {self.combs} of {len(self.iq)} dwells"
             return dict.fromkeys(WINGBEAT) | {"wingbeat_reason": reason}
         beat = {name: _number(getattr(self.beat, name)) for name in WINGBEAT}
+        if not self.direction_known and self.beat.velocity_mps < 0:
+            beat["acceleration_mps2"] = _number(-self.beat.acceleration_mps2)
         return beat | {"wingbeat_reason": str(self.beat.reason) or None}
 
     def clearest(self) -> int:
@@ -408,8 +418,18 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
                 f"one side: half of the spectrum is empty in {empty} of {counted(count)}, as of a single channel that "
                 "was made analytic: whether a body comes or goes is not told",
             )
-    pull = (acceleration, acceleration_std)
-    return Measured(recording, iq, start_s, stop_s, values, *pull, beat, remarks, direction_known)
+    return Measured(
+        recording=recording,
+        iq=iq,
+        start_s=start_s,
+        stop_s=stop_s,
+        values=values,
+        acceleration_mps2=acceleration,
+        acceleration_mps2_std=acceleration_std,
+        beat=beat,
+        remarks=remarks,
+        direction_known=direction_known,
+    )
 
 
 def helicopter(values: Measurements) -> bool:

@@ -27,7 +27,7 @@ from .ladder import ACCOUNT, CASCADE
 from .model_file import COVERAGES, CURVE_KEY, FORMAT, KINDS_KEY, SETS_KEY
 from .parts import TRAIN_PARTS, Parts
 from .progress import Progress
-from .train_network import OnFraction, ScoresOf, Taught, epochs_of, train_net
+from .train_network import PUPIL_EPOCHS, OnFraction, ScoresOf, Taught, epochs_of, train_net
 from .training_account import covered, figures, print_account
 from .training_config import TrainingConfig, training_config
 from .training_costs import add_costs
@@ -83,6 +83,7 @@ def run_training(
         out / TRAIN_PARTS,
         {
             "settings": settings.model_dump(mode="json"),
+            "pupil_epochs": PUPIL_EPOCHS,
             "run_records": TASK_RECORDS if stored is None else SHARD_RECORDS,  # kept parts hold so many of these
             "simulator_sha256": simulator,
             "inputs_sha256": inputs_digest(),

@@ -66,7 +66,7 @@ def body_acceleration(
     acceleration_mps2, std_mps2 : ndarray of float64, shape (...)
         Positive when the radial velocity grows; NaN where no line stands out, it may be ground that sways, or more
         pulses were lost than can be filled in. The deviation is the bound of a chirp's rate, 90 / (SNR pulses^5) rad^2
-        (Peleg and Porat 1991).
+        (Peleg and Porat 1991), and `SWAY_FACTOR` times that for a line about velocity zero beside a background.
     smeared : ndarray of bool, shape (...)
         Whether the line is smeared for sure, so that `without_acceleration` is of use.
 

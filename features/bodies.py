@@ -61,7 +61,7 @@ def line_among(spectrum: Spectrum, where: NDArray[np.bool_], known: list[float])
         top = (top + 1) % len(power)
     while power[top - 1] > power[top]:
         top = (top - 1) % len(power)
-    away = np.abs((place - top + spectrum.bins // 2) % spectrum.bins - spectrum.bins // 2)
+    away = np.rint(np.abs(from_whole((place - top) / spectrum.bins)) * spectrum.bins)
     own = away <= LOBE_BINS + 1
     known_bins = (np.rint(np.array(known) * spectrum.bins).astype(np.intp) + spectrum.bins // 2) % spectrum.bins
     # with both bins beside it, wherever it is looked for

@@ -45,6 +45,9 @@ MOVES_SHARE = 0.05
 #: lies about it stands so far below it [dB]: of 351 hovering drones 222 were, of 3200 backgrounds one.
 OFF_REST_BINS, PURE_DB = 1.0, 25.0
 
+#: A line is the one at a comb's centre up to so far from it [bins].
+AT_CENTRE_BINS = 1.0
+
 #: What is known to this share of the unambiguous span is not known: anywhere in it is 0.29.
 UNTOLD_SHARE = 0.2
 
@@ -90,7 +93,9 @@ def body_velocity(
     own, level_db = data.strong.lines[0]
     if fit is not None:
         # before a background that is stronger: the line at the comb's centre, where one is seen
-        at_centre = (line for line in data.strong.lines if abs(folded(line[0] - fit.centre)) * data.pulses < 1.0)
+        at_centre = (
+            line for line in data.strong.lines if abs(folded(line[0] - fit.centre)) * data.pulses < AT_CENTRE_BINS
+        )
         own, level_db = next(at_centre, (own, level_db))
     else:
         if level_db < LINE_DB:
@@ -104,7 +109,7 @@ def body_velocity(
         offset = abs(folded(own - fit.centre))
         # rotors that were taken for one move its comb, and a body that turns has a line whose top is not its mean
         apart = offset if offset > APART_DEVIATIONS * np.hypot(std, fit.centre_std) else 0.0
-        if offset * data.pulses > 1.0:
+        if offset * data.pulses > AT_CENTRE_BINS:
             # no background lies beside rest: a line there is as likely a slow body's
             slow = AT_REST_BINS < abs(own) * data.pulses <= data.rest_half * data.pulses
             turns, std = fit.centre, float(np.hypot(fit.centre_std, offset * slow))
@@ -126,7 +131,8 @@ def _likeliest(data: Periodogram, spectrum: Spectrum, blades: bool) -> tuple[flo
     lines = data.strong.lines
     loud = [] if blades else [line for line in lines if line[1] >= LINE_DB]
     moving = [line for line in loud if abs(line[0]) >= data.rest_half]
-    moving = moving or [line for line in loud if abs(line[0]) * data.pulses > LOBE_BINS]
+    if not moving and abs(lines[0][0]) * data.pulses <= LOBE_BINS:  # else the strongest is leaves' own
+        moving = [line for line in loud if abs(line[0]) * data.pulses > LOBE_BINS]
     own, level_db = (moving or lines)[0]
     slow, slow_db = lines[0]
     if moving and slow_db > level_db + WEAKEST_DB:

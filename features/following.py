@@ -106,7 +106,8 @@ def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> Cours
     length = round(BODY_DWELL_S * prf_hz)
     if length < LEAST_PULSES:
         return np.nan, np.nan, np.nan
-    starts = np.arange(0, len(iq) - length + 1, max(length // OVERLAP, 1))
+    hop = max(length // OVERLAP, 1)
+    starts = np.arange(0, len(iq) - length + 1, hop)
     dwells = np.lib.stride_tricks.sliding_window_view(iq, length)[starts]
     spectrum = doppler_spectrum(dwells, carrier_hz=carrier_hz, prf_hz=prf_hz)
     body = body_line(spectrum)
@@ -123,26 +124,26 @@ def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> Cours
     slope = float(np.median((velocity[second] - velocity[first]) / (when[second] - when[first])))
     rest = velocity - slope * when
     middle = float(np.median(rest))
-    return middle, slope, _slope_std(rest - middle, when, length)
+    return middle, slope, _slope_std(rest - middle, when, length, hop)
 
 
-def _slope_std(rest: NDArray[np.floating], when: NDArray[np.floating], length: int) -> float:
+def _slope_std(rest: NDArray[np.floating], when: NDArray[np.floating], length: int, hop: int) -> float:
     """Deviation of the slope of a line through the velocities of dwells that overlap.
 
     Parameters
     ----------
     rest : ndarray, shape (dwells,)
-        What the line leaves of each.
+        What the line leaves of each velocity [m/s].
     when : ndarray, shape (dwells,)
         Their middles [s].
-    length : int
-        Of a dwell [pulses].
+    length, hop : int
+        Of a dwell, and from one to the next [pulses].
 
     Returns
     -------
     float
         From how what is left goes together over a quarter of the recording (Newey and West 1987), and no less than
-        white noise of that spread would leave.
+        white noise of that spread would leave of the medians of slopes [m/s^2].
     """
     count = len(rest)
     spread = 1.4826 * float(np.median(np.abs(rest)))
@@ -155,7 +156,7 @@ def _slope_std(rest: NDArray[np.floating], when: NDArray[np.floating], length: i
     found = float((twice * (1 - lag / (most + 1)) * weight[lag] * seen[lag]).sum())
     # a line's frequency is a mean of the noise by the window times the time from the middle: neighbours' are opposite
     score = KAISER.shape(length) * (np.arange(length) - (length - 1) / 2)
-    alike = _together(score)[:: max(length // OVERLAP, 1)][: min(OVERLAP, count)]
+    alike = _together(score)[::hop][: min(OVERLAP, count)]
     white = spread**2 * float((twice[: len(alike)] * weight[: len(alike)] * alike).sum() / alike[0])
     return float(np.sqrt(max(found, ROBUST_LOSS**2 * white, 0.0)))
 

@@ -221,7 +221,7 @@ def while_moving(levels: LevelSpectrum, found: Repetition) -> tuple[float, float
     """
     used = found.cells if found.cells.any() else levels.weight > 0
     rates = np.arange(len(levels.moving)) * levels.step_hz
-    about = np.abs(rates - found.rate_hz) < _ABOUT_HZ
+    about = (np.abs(rates - found.rate_hz) < _ABOUT_HZ) & (rates >= _SLOWEST_HZ)
     power = np.maximum(squared(levels.moving[np.ix_(about, used)]).mean(axis=1) - _OVER_CHANCE, 0.0)
     total = float(power.sum())
     main = np.abs(rates[about] - found.rate_hz) <= _MAIN_BINS * _PADDING * levels.step_hz

@@ -53,9 +53,9 @@ ROW_LEFT = 0.012
 LEFT_OVER, LEFT_SHARE = 0.3, 0.05
 LEAST_BINS = 100
 
-#: A family of fewer orders than this lies near the body: what is left of it is looked for from half a line out to the
-#: edge, in so many bins at least, and what a lone rotor leaves is held to the share of several where it comes to so
-#: many deviations. (Of 56 sets told as all there were, 30 to 160 ms at 2.4 to 24 GHz, 34 were not; now 18 of 38.)
+#: A family of fewer lines than this to a side lies near the body: what is left of it is looked for from half a line out
+#: to the edge, in so many bins at least, and what a lone rotor leaves is held to the share of several where it comes to
+#: so many deviations. (Of 56 sets told as all there were, 30 to 160 ms at 2.4 to 24 GHz, 34 were not; now 18 of 38.)
 FEW_LINES, LEAST_BINS_FEW, FEW_DEVIATIONS = 8, 16, 5.0
 
 #: What a lone rotor leaves may be a change of its rate; from this share of its lines' power on they say little of it.
@@ -158,11 +158,14 @@ class Left(NamedTuple):
         Whether it may be a rotor.
     deviations : float
         How far it is from noise, in its own deviations; infinite where too little of the band is seen to tell.
+    few : bool
+        Whether the family has so few lines that it was looked at right beside them.
     """
 
     share: float
     may_hide: bool
     deviations: float
+    few: bool
 
 
 def left_over(about: _About, fits: Sequence[CombFit], edge: float) -> Left:
@@ -177,7 +180,7 @@ def left_over(about: _About, fits: Sequence[CombFit], edge: float) -> Left:
     within = usable & (away < high) & (away > low)
     beyond = usable & (away > 1.1 * edge)
     if within.sum() < (LEAST_BINS_FEW if few else LEAST_BINS):
-        return Left(0.0, False, np.inf)
+        return Left(0.0, False, np.inf, few)
     # where lines come back from the other end of the span, or leave too little of it, the floor tells the noise
     nothing_beyond = edge > 0.5 or beyond.sum() < LEAST_BINS
     noise = 1.0 if nothing_beyond else float(power[beyond].mean())
@@ -195,7 +198,7 @@ def left_over(about: _About, fits: Sequence[CombFit], edge: float) -> Left:
     deviation = noise * float(np.sqrt(1 / within.sum() + 1 / max(beyond.sum(), LEAST_BINS)))
     all_over = over + noise * taken / float(within.sum())
     may_hide = (all_over + HIDDEN_DEVIATIONS * deviation) * float(within.sum()) > held
-    return Left(share, may_hide, all_over / deviation)
+    return Left(share, may_hide, all_over / deviation, few)
 
 
 def _stands_past(about: _About, fits: Sequence[CombFit], edge: float) -> bool:
@@ -275,7 +278,7 @@ def judged(
         How far out lines were fitted [cycles a sample from the body], where that may not be as far as they reach.
     """
     about = power_about(data, rotors.rest, rotors.fits[0].centre)
-    share, hidden, deviations = left_over(about, rotors.fits, edge)
+    share, hidden, deviations, few = left_over(about, rotors.fits, edge)
     any_rate = 2 * RATE_SPREAD * float(rotors.rates.mean())  # of one airframe
     if share > LEFT_WANDERING:
         rotors = replace(rotors, unseen=any_rate)
@@ -304,7 +307,7 @@ def judged(
     past = (not several or fitted_to is not None) and _stands_past(about, rotors.fits, fitted_to or edge)
     if fitted_to is None and others_flash(data, rotors.rest, (fit.spacing for fit in rotors.fits), edge):
         return not_all(rotors, data, any_rate)  # they may be any
-    held_to = LEFT_SHARE if several or (tip < FEW_LINES and deviations > FEW_DEVIATIONS) else LEFT_ALONE
+    held_to = LEFT_SHARE if several or (few and deviations > FEW_DEVIATIONS) else LEFT_ALONE
     if not (twice or paired or hidden or past or contradicted or share > held_to):
         return rotors
     apart = abs(rotors.next_rate - float(rotors.rates[0])) if hidden and not several else 0.0

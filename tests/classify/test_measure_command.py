@@ -113,6 +113,22 @@ def test_of_one_channel_a_body_has_a_speed_and_no_direction(tmp_path, capsys):
             assert told["body_velocity_mps"] == pytest.approx(velocity_mps if is_known else 8.0, abs=0.01)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_of_one_channel_a_body_that_grows_faster_does_so_whichever_way_it_goes(tmp_path, capsys, sign):
+    prf_hz = 4e3
+    times_s = np.arange(int(2 * prf_hz)) / prf_hz
+    range_m = sign * (6 * times_s + times_s**2 / 2)  # 6 to 8 m/s
+    iq = 30 * np.cos(4 * np.pi * range_m / WAVELENGTH_M) + white(np.random.default_rng(4), len(times_s)).real + 0j
+    np.save(tmp_path / "one.npy", iq.astype(np.complex64))
+    radar = ["--carrier-hz", str(CARRIER_HZ), "--prf-hz", str(prf_hz)]
+    assert main(["measure", str(tmp_path / "one.npy"), *radar, "--json"]) == 0
+    *dwells, closing = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    for told in (*dwells, closing["recording"]):
+        assert 5.9 < told["body_velocity_mps"] < 8.1
+    assert closing["recording"]["acceleration_mps2"] == pytest.approx(1.0, abs=0.01)
+    assert np.median([told["acceleration_mps2"] for told in dwells]) == pytest.approx(1.0, abs=0.1)
+
+
 def test_combs_that_are_not_one_rotors_have_no_median_but_a_reason(tmp_path, capsys):
     rng, path = np.random.default_rng(6), tmp_path / "unlike.npy"
     unlike = [spinning(rate_hz, PULSES) + 10 for rate_hz in (40.3, 47.1, 61.7, 83.3)]  # none of the mains

@@ -186,6 +186,17 @@ def test_a_slow_body_before_ground_moves_and_ground_alone_does_not(ground_db, sp
     np.testing.assert_allclose(measure(before, **radar).body_velocity_mps, 0.0, atol=0.1)
 
 
+def test_ground_that_sways_over_many_bins_is_no_surer_of_a_body_in_it():
+    """Its strongest line may be anywhere in what leaves make: that is no line which stands out of it."""
+    pulses, prf_hz = 3200, 20e3
+    radar = {"carrier_hz": 77e9, "prf_hz": prf_hz}
+    shape = np.exp(-0.25 * (np.fft.fftfreq(pulses, 1 / prf_hz) / 40) ** 2)  # the power by a Gaussian law of 40 Hz rms
+    ground = np.fft.ifft(np.fft.fft(white(np.random.default_rng(2), 24, pulses)) * shape)
+    iq = 30 * ground / np.sqrt(np.mean(np.abs(ground) ** 2)) + white(np.random.default_rng(3), 24, pulses)
+    found = measure(iq, **radar)
+    assert np.mean(np.abs(found.body_velocity_mps) > 5 * found.body_velocity_mps_std) < 0.2
+
+
 @pytest.mark.parametrize(("asymmetry", "body_db"), [(0.6, 30.0), (0.9, 15.0)])
 def test_a_hovering_drones_blade_is_not_its_body_where_edges_reflect_unlike(asymmetry, body_db):
     """The other side of rest holds a line as far from it, however weak; 11 m/s were told for sure."""
