@@ -26,9 +26,8 @@ from .progress import Progress
 from .recording import Recording
 from .terminal import counted
 
-#: What a dwell's JSON object holds beside its times and the reason, in this order.
+#: What a dwell's JSON object holds after its times and the body's velocity, in this order.
 VALUES = (
-    "body_velocity_mps",
     "body_velocity_mps_std",
     "chopping_hz",
     "chopping_hz_std",
@@ -166,9 +165,13 @@ class Measured:
         return int(np.isfinite(self.values.chopping_hz).sum())
 
     @property
-    def speed_sign(self) -> np.ndarray:
-        """-1 for each dwell whose velocity is turned to be a speed, as its direction is not known, else 1."""
-        return np.where(~np.bool_(self.direction_known) & (self.values.body_velocity_mps < 0), -1.0, 1.0)
+    def body_mps(self) -> np.ndarray:
+        """The body's velocity in each dwell, its speed where its direction is not known, shape (dwells,) [m/s]."""
+        return self._turn(self.values.body_velocity_mps) * self.values.body_velocity_mps
+
+    def _turn(self, velocity_mps: np.ndarray) -> np.ndarray:
+        """-1 where a velocity is turned to be a speed, and what goes with it as well; else 1."""
+        return np.where((velocity_mps < 0) & (not self.direction_known), -1.0, 1.0)
 
     @property
     def looked_at(self) -> int:
@@ -182,16 +185,17 @@ class Measured:
 
     def json_objects(self) -> Iterator[dict[str, Any]]:
         """One object a dwell and a closing one; what has no value is null."""
-        sign = self.speed_sign
+        body_mps = self.body_mps
+        acceleration_mps2 = self._turn(self.values.body_velocity_mps) * self.acceleration_mps2
         for n in range(len(self.iq)):
             seen = np.isfinite(self.values.rotor_rates_hz[n])
             yield {
                 "file": self.recording.name,
                 "start_s": round(float(self.start_s[n]), 9),
                 "stop_s": round(float(self.stop_s[n]), 9),
+                "body_velocity_mps": _number(body_mps[n]),
                 **{name: _number(getattr(self.values, name)[n], whole=name in WHOLE) for name in VALUES},
-                "body_velocity_mps": _number(sign[n] * self.values.body_velocity_mps[n]),
-                "acceleration_mps2": _number(sign[n] * self.acceleration_mps2[n]),
+                "acceleration_mps2": _number(acceleration_mps2[n]),
                 "acceleration_mps2_std": _number(self.acceleration_mps2_std[n]),
                 **{name: [_number(value) for value in getattr(self.values, name)[n][seen]] for name in EACH_ROTOR},
                 "rotors_resolved": bool(self.values.rotors_resolved[n]),
@@ -267,12 +271,8 @@ class Measured:
         return SPEED_OF_LIGHT_MPS / self.recording.carrier_hz * self.recording.prf_hz / 2
 
     def _course(self, dwells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The body's velocity in some of the dwells and its deviation, all in the span about the best known.
-
-        The speed alone where its direction is not known.
-        """
-        value = (self.speed_sign * self.values.body_velocity_mps)[dwells]
-        std = self.values.body_velocity_mps_std[dwells]
+        """The body's velocity in some of the dwells and its deviation, all in the span about the best known."""
+        value, std = self.body_mps[dwells], self.values.body_velocity_mps_std[dwells]
         known = np.isfinite(value) & np.isfinite(std)
         if known.any():
             best = value[known][std[known].argmin()]
@@ -290,8 +290,7 @@ class Measured:
             reason = f"no wingbeat: a rotor in {self.combs} of {len(self.iq)} dwells"
             return dict.fromkeys(WINGBEAT) | {"wingbeat_reason": reason}
         beat = {name: _number(getattr(self.beat, name)) for name in WINGBEAT}
-        if not self.direction_known and self.beat.velocity_mps < 0:
-            beat["acceleration_mps2"] = _number(-self.beat.acceleration_mps2)
+        beat["acceleration_mps2"] = _number(self._turn(self.beat.velocity_mps) * self.beat.acceleration_mps2)
         return beat | {"wingbeat_reason": str(self.beat.reason) or None}
 
     def clearest(self) -> int:

@@ -28,7 +28,7 @@ def print_measured(found: "Measured", console: "Console") -> None:
     from rich.text import Text
 
     v = found.values
-    body_mps = found.speed_sign * v.body_velocity_mps
+    body_mps = found.body_mps
     heads = ("start s", "body m/s", "chopping Hz", "rotors", "band Hz", "tip m/s")
     table = Table(*heads, box=None, pad_edge=False)
     for column in table.columns:

@@ -55,8 +55,7 @@ def line_among(spectrum: Spectrum, where: NDArray[np.bool_], known: list[float])
         Lines whose flanks are no other's [cycles a sample].
     """
     power, place = spectrum.relative_power, np.arange(spectrum.bins)
-    line = _strongest(spectrum, where)
-    first = top = int(line.index)
+    first = top = int(_strongest(spectrum, where).index)
     while power[(top + 1) % len(power)] > power[top]:
         top = (top + 1) % len(power)
     while power[top - 1] > power[top]:

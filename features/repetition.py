@@ -99,6 +99,10 @@ class LevelSpectrum:
         over = (squared(amplitudes) - 1) @ self.weight
         return np.asarray(over / np.sqrt(2 * (self.weight**2).sum() + 1e-9), np.float64)
 
+    def used(self, cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """These cells, or all that have something to say where these are none, shape (cells,)."""
+        return cells if cells.any() else self.weight > 0
+
     def at(self, rate_hz: float) -> float:
         """Excess of what is no common course at the first multiples of a rate, together."""
         place = self.places(rate_hz, 1) * np.arange(1, HARMONICS + 1)
@@ -219,7 +223,7 @@ def while_moving(levels: LevelSpectrum, found: Repetition) -> tuple[float, float
     rate_hz, rate_hz_std : float
         [Hz]
     """
-    used = found.cells if found.cells.any() else levels.weight > 0
+    used = levels.used(found.cells)
     rates = np.arange(len(levels.moving)) * levels.step_hz
     about = (np.abs(rates - found.rate_hz) < _ABOUT_HZ) & (rates >= _SLOWEST_HZ)
     power = np.maximum(squared(levels.moving[np.ix_(about, used)]).mean(axis=1) - _OVER_CHANCE, 0.0)
@@ -256,7 +260,7 @@ def _refined(
 
     The power at a multiple is the log likelihood of its place, so the curvature at its top is one over the variance.
     """
-    used = cells if cells.any() else levels.weight > 0
+    used = levels.used(cells)
     power = (np.abs(levels.moving[:, used]) ** 2).sum(axis=1)
     places, weights = [], []
     for k in order:
