@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 from bladewing.features.dropouts import filled, longest_silence, lost_pulses
 from bladewing.features.one_channel import one_channel, varies
+from bladewing.features.stand_ins import stand_ins
 from numpy.typing import NDArray
 
 from .arrays import ARRAY_SUFFIXES, read_array
@@ -60,10 +61,10 @@ class Recording:
         iq = complex_samples(self.iq, self.name)
         if iq.ndim != 1 or not len(iq):
             raise BadInput(f"{self.name}: samples of shape {iq.shape}: give those of one range cell, (pulses,)")
-        lost = lost_pulses(iq)
+        lost = lost_pulses(iq) | stand_ins(iq)
         if lost.any():
-            iq = filled(iq, lost)
-            object.__setattr__(self, "filled_in", int(np.count_nonzero(iq[lost])))
+            given, iq = iq, filled(iq, lost)
+            object.__setattr__(self, "filled_in", int(np.count_nonzero(iq != given)))
         object.__setattr__(self, "iq", iq)
         for name in ("carrier_hz", "prf_hz"):
             object.__setattr__(self, name, positive(getattr(self, name), f"{self.name}: {name}"))
@@ -142,8 +143,8 @@ class Recording:
             )
         if self.filled_in:
             said.append(
-                f"lost: {self.filled_in} of {len(self.iq)} pulses were exactly 0, which would draw lines that are no "
-                "target's: they are filled in from those beside them"
+                f"lost: {self.filled_in} of {len(self.iq)} pulses were exactly 0, one value again and again or the "
+                "pulse before, which would draw lines that are no target's: they are filled in from those beside them"
             )
         if lost := int(lost_pulses(self.iq).sum()):
             said.append(

@@ -47,7 +47,7 @@ def running_sums(
         place = order * steps[:, :some]
         place += nearest[:, :some]
         seen = evidence.table.take(place.astype(np.intp), mode="wrap")
-        seen[..., every:] *= order <= outermost[every:some]
+        np.copyto(seen[..., every:], 0, where=order > outermost[every:some])  # to multiply takes twice the time
         sums = seen.view(np.float32).reshape(*seen.shape, MOST_SNRS)
         for inner, outer in zip((before[:, :some], *sums[:-1]), sums, strict=True):
             outer += inner

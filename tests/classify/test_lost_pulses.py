@@ -88,6 +88,28 @@ def test_lost_pulses_of_a_recording_draw_no_rotor(tmp_path) -> None:
     assert said.endswith("filled in from those beside them")
 
 
+@pytest.mark.parametrize("how", ["mean removed", "held"])
+def test_nor_do_those_that_are_not_0(how: str) -> None:
+    """A sliding spot whose every 97th pulse was lost was a UAV, its mean taken out or its pulses held."""
+    turning = 30 * np.exp(2j * np.pi * 0.0631 * PULSES)
+    whole = (turning + noise(np.random.default_rng(10), len(PULSES))).astype(np.complex64)
+    lost = np.arange(97, len(PULSES), 97)
+    spoilt = whole.copy()
+    if how == "held":
+        spoilt[lost] = spoilt[lost - 1]
+    else:
+        spoilt[lost] = 0
+        spoilt -= spoilt.mean()
+    recording = Recording("spot", spoilt, 9.85e9, 25e3)
+    assert recording.filled_in == len(lost)
+    np.testing.assert_allclose(recording.iq[lost] - (spoilt - whole)[0], whole[lost], atol=6)  # the line, not the noise
+    given = answer(recording, Classifier.load())
+    assert not set(given.dwells.labels) & {"uav"}
+    assert given.shown == {}
+    (said,) = given.remarks
+    assert said.startswith("lost: 206 of 20000 pulses were exactly 0, one value again and again or the pulse before")
+
+
 def gull() -> np.ndarray:
     """Four seconds of a gull that flaps and heaves, 6 kHz at 9.85 GHz."""
     bird = {"name": "gull", "species": "herring_gull", "velocity_mps": -8.0, "heave_m": 0.02}
