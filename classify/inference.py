@@ -11,6 +11,7 @@ from typing import NoReturn
 
 import numpy as np
 from bladewing.features.allocator import keep_freed
+from bladewing.features.clicks import clicks_filled
 from bladewing.features.dropouts import BEYOND_FILLING_IN, mended
 from bladewing.features.inputs import dwells_of
 from bladewing.features.samples import LEAST_PART, largest_part
@@ -248,8 +249,9 @@ class Classifier:
         iq
             Shape (..., pulses), complex: one range cell, one sample a pulse. Leading axes are a batch, and every
             record is answered as if it were alone. The gain does not matter. Pulses that were lost, which are exactly
-            0, are filled in by what those beside them tell of them; of a record that more of these in a row break than
-            that is done for, the longest stretch is judged. One channel, I without Q, is made analytic.
+            0, are filled in by what those beside them tell of them, and so are single ones that interference hit, far
+            over all others; of a record that more lost ones in a row break than that is done for, the longest stretch
+            is judged. One channel, I without Q, is made analytic.
         carrier_hz
             Carrier [Hz].
         prf_hz
@@ -303,14 +305,14 @@ class Classifier:
         largest = largest_part(records)
         live = largest >= LEAST_PART
         if np.count_nonzero(live) == live.size:
-            told = self._told(records, None, carrier_hz, prf_hz)
+            told = self._told(clicks_filled(records, largest), None, carrier_hz, prf_hz)
             labels, why = self.decide(told[:, :-1])
             return told, labels, np.array(why, dtype=np.str_)
         told, labels = _untold(len(records))
         reasons = np.full(len(records), "no signal: every sample is 0", dtype=object)
         reasons[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
         rows = np.flatnonzero(live)
-        told[rows] = self._told(records, rows, carrier_hz, prf_hz)
+        told[rows] = self._told(clicks_filled(records, largest), rows, carrier_hz, prf_hz)
         labels[rows], reasons[rows] = self.decide(told[rows, :-1])
         return told, labels, reasons.astype(np.str_)
 

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from .dropouts import LEAST_LOST, lost_pulses
 
-#: Samples are seldom alike but for those that stand for lost pulses, this share of the others at most; those that do are
-#: so many times as many as come of any other value, or as others that are alike at all, and no larger a share than this.
+#: Samples are seldom alike but for those that stand for lost pulses: this share of the others at most. Those that do
+#: are so many times as many as come of any other value, or as others alike at all, and no more of all than this.
 ALIKE, OFTEN, MOST_SHARE = 0.01, 3, 0.25
 
 

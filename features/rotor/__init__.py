@@ -2,7 +2,7 @@
 
 Modules, in the order in which a record passes through them
 -----------------------------------------------------------
-periodogram, clicks, strong_lines, slow_lines
+periodogram, strong_lines, slow_lines
     What is strong and slow is taken out, the noise made even; what then speaks for a line in each bin.
 comb_search, comb_sums, flashes, octaves, folding, common_fraction, flash_rate, wide_line, one_sided, comb_centre, comb
     Where a comb may be, which of its multiples and fractions it is, which line is the body's, how wide that is, whether

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..bodies import within
+from ..clicks import without_clicks
 from ..evidence import Evidence, line_evidence
 from ..lines import LineSpace, from_whole, squared
 from ..one_channel import half_empty
 from ..spectrum import Spectrum, doppler_spectrum
-from .clicks import without_clicks
 from .octaves import over_neighbours
 from .slow_lines import remove_bands
 from .strong_lines import StrongLines, strong_lines

@@ -331,6 +331,24 @@ def test_every_shipped_model_loads_and_answers():
         np.testing.assert_allclose(answer.probabilities.sum(axis=-1), 1, atol=1e-5)
 
 
+@pytest.mark.parametrize("times", [10, 100])
+def test_one_pulse_that_interference_hit_costs_no_name(times):
+    """Of 100 times the rms, in one pulse of 2048, three of four UAVs had lost theirs."""
+    radar = Radar(9.85e9, 25e3, 2048)
+    records = draw_records(radar, 96, 3, purpose="bench")
+    uavs = records.iq[(records.labels == "uav") & (records.truth["snr_db"] > 5)]
+    classifier, axes = Classifier.load(), {"carrier_hz": radar.carrier_hz, "prf_hz": radar.prf_hz}
+    hit = uavs.copy()
+    hit[:, 700] += times * np.sqrt(np.mean(np.abs(uavs) ** 2, axis=-1)).astype(np.float32)
+    before, after = (classifier.predict(iq, **axes) for iq in (uavs, hit))
+    named = before.labels == "uav"
+    assert named.sum() >= 10
+    assert np.mean(after.labels[named] == "uav") >= 0.9
+    assert np.median(np.abs(after.probabilities - before.probabilities)) < 0.02
+    every = [classifier.predict(one, **axes).probabilities for one in hit]
+    np.testing.assert_allclose(after.probabilities, every, atol=1e-5)
+
+
 def test_eight_threads_share_a_classifier_and_get_the_same_answers():
     classifier = Classifier.load()
     # radars and lengths differ, so that what is kept of each is made while others use it

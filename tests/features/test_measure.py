@@ -4,9 +4,9 @@ from threading import Event, Thread
 import numpy as np
 import pytest
 from bladewing.features import measure
+from bladewing.features.clicks import CLICK_OVER_BESIDE, CLICK_POWER, without_clicks
 from bladewing.features.lines import LineSpace, line_products, sum_of_lines
 from bladewing.features.one_thread import one_thread
-from bladewing.features.rotor.clicks import CLICK_OVER_BESIDE, CLICK_POWER, without_clicks
 from bladewing.features.rotor.comb import find_comb, strong_multiple
 from bladewing.features.rotor.comb_fit import fit_combs
 from bladewing.features.rotor.flashes import flash_nats

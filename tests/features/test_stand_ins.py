@@ -57,7 +57,17 @@ def test_what_is_whole_holds_none() -> None:
     ends = noise(4)
     clipped = np.clip(ends.real, -0.3, 0.3) + 1j * np.clip(ends.imag, -0.3, 0.3)
     tone = np.exp(2j * np.pi * np.arange(2000) / 8)
-    for whole in (noise(5), zeros, clipped, tone, np.ones(2000), np.zeros(2000), noise(6).real, noise(7, 3), noise(8, 0)):
+    for whole in (
+        noise(5),
+        zeros,
+        clipped,
+        tone,
+        np.ones(2000),
+        np.zeros(2000),
+        noise(6).real,
+        noise(7, 3),
+        noise(8, 0),
+    ):
         assert not stand_ins(np.asarray(whole, np.complex64)).any()
 
 

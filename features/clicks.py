@@ -1,0 +1,114 @@
+"""Single samples that stand far out of a record: clicks, unless they are the flashes of a rotor."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from .dropouts import filled
+from .fast import power_of
+from .lines import squared
+from .samples import scaled, unit_scale
+
+#: A click: one sample so many times over the noise, and over both beside it; fewer in a record than a rotor's flashes.
+#: A flash is as long as the rotor's band is narrow: its samples beside are as strong.
+CLICK_POWER, CLICK_OVER_BESIDE, MOST_CLICKS = 25.0, 4.0, 5
+
+#: Or as many as this share of the pulses, where no distance from click to click, a pulse more or less, is that of more
+#: than so large a share of them: interference at random times.
+CLICKED_SHARE, PERIOD_SHARE = 1 / 64, 0.4
+
+#: A click fills the whole span and leaves it empty; a sample cut out of a rotor's band fills what was empty beside it.
+#: Where that rises by this factor they were no clicks.
+EMPTY_RISE = 1.1
+
+#: Records as they are given are looked through from so many pulses on, a shorter one holds a rotor's one flash; and
+#: where a sample alone has so many times the mean power: of noise one in 9 million has.
+LEAST_PULSES, OVER_MEAN = 256, 16.0
+
+#: Largest parts of samples between these have squares that float32 holds; others are looked through in any case.
+_SQUARED = 1e-15, 1e15
+
+
+def clicks(samples: NDArray[np.complexfloating]) -> NDArray[np.bool_]:
+    """Find the clicks of a record.
+
+    Parameters
+    ----------
+    samples : ndarray of complex, shape (pulses,)
+        One record.
+
+    Returns
+    -------
+    ndarray of bool, same shape
+        False throughout where there are none, or nothing but them.
+    """
+    power = squared(samples)
+    noise = float(np.median(power)) / np.log(2)
+    beside = np.maximum(np.roll(power, 1), np.roll(power, -1))
+    beside[[0, -1]] = np.inf  # the record may have cut a flash there
+    found = (power > CLICK_POWER * noise) & (power > CLICK_OVER_BESIDE * beside) & (noise > 0)
+    places = np.flatnonzero(found)
+    none = np.zeros(len(samples), bool)
+    if not len(places) or (len(places) > MOST_CLICKS and not _at_random(places, len(samples))):
+        return none
+    both = np.stack([samples, np.where(found, 0.0, samples)])
+    before, after = np.quantile(squared(fft.fft(both)), 0.25, axis=-1)
+    return found if after < EMPTY_RISE * before else none
+
+
+def without_clicks(samples: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Samples with clicks set to 0: two of them are as far apart as the flashes of some rotor.
+
+    Parameters
+    ----------
+    samples : ndarray of complex128, shape (pulses,)
+        One record, strong lines taken out.
+    """
+    return np.where(clicks(samples), 0.0, samples)
+
+
+def clicks_filled(iq: NDArray[np.complex64], largest: NDArray[np.float32]) -> NDArray[np.complex64]:
+    """Records with their clicks filled in by what the pulses beside them tell of them, as lost ones are.
+
+    One click lifts the floor under all of the spectrum: what lies below it is no longer seen.
+
+    Parameters
+    ----------
+    iq : ndarray of complex64, shape (records, pulses)
+        Records as they were received, finite.
+    largest : ndarray of float32, shape (records,)
+        Largest of all parts of a record's samples, in size.
+
+    Returns
+    -------
+    ndarray of complex64, same shape
+        Those given where there is no click.
+    """
+    pulses = iq.shape[-1]
+    if pulses < LEAST_PULSES:
+        return iq
+    parts = np.ascontiguousarray(iq).view(np.float32)
+    with np.errstate(over="ignore", under="ignore"):
+        maybe = 2 * pulses * np.square(largest) > OVER_MEAN * np.vecdot(parts, parts)
+    maybe |= ~((largest > _SQUARED[0]) & (largest < _SQUARED[1]))
+    out = iq
+    if not np.count_nonzero(maybe):
+        return out
+    rows = np.flatnonzero(maybe)
+    records = scaled(iq[rows], unit_scale(iq[rows]))
+    power = power_of(records)
+    row, pulse = np.nonzero(power > OVER_MEAN * power.mean(axis=1, keepdims=True))
+    beside = np.maximum(power[row, pulse - 1], power[row, (pulse + 1) % pulses])
+    for index in np.unique(row[power[row, pulse] > CLICK_OVER_BESIDE * beside]):
+        if (found := clicks(records[index])).any():
+            out = iq.copy() if out is iq else out
+            out[rows[index]] = filled(iq[rows[index]], found)
+    return out
+
+
+def _at_random(places: NDArray[np.intp], pulses: int) -> bool:
+    """True where clicks are few and no distance comes so often among them as a rotor's period would."""
+    if len(places) > CLICKED_SHARE * pulses:
+        return False
+    apart = np.bincount((places[:, None] - places)[np.triu_indices(len(places), 1)[::-1]], minlength=3)
+    return bool((apart[:-2] + apart[1:-1] + apart[2:]).max() < PERIOD_SHARE * len(places))

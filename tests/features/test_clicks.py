@@ -1,0 +1,57 @@
+"""Clicks that are filled in before a record is judged: found at any gain, and no flashes among them."""
+
+import numpy as np
+import pytest
+from bladewing.features.clicks import LEAST_PULSES, clicks_filled
+from bladewing.features.samples import largest_part
+
+from .signals import white
+
+PLACES = [40, 333, 1200]
+
+
+def noise(seed: int, count: int = 2000) -> np.ndarray:
+    """White noise of unit power as a recording holds it."""
+    return white(np.random.default_rng(seed), count).astype(np.complex64)
+
+
+def filled_in(iq: np.ndarray) -> np.ndarray:
+    """Records with their clicks filled in."""
+    return clicks_filled(iq, largest_part(iq))
+
+
+@pytest.mark.parametrize("gain", [1.0, 1e-30, 1e35j])
+@pytest.mark.parametrize("times", [10.0, 30.0, 100.0])
+def test_a_pulse_that_interference_hit_is_filled_in(times: float, gain: complex) -> None:
+    whole = noise(1) + 8 * np.exp(2j * np.pi * 0.03 * np.arange(2000)).astype(np.complex64)
+    hit = np.stack([whole, whole, noise(2)])
+    hit[1, PLACES] += np.float32(8 * times)
+    given = (hit * np.complex64(gain)).astype(np.complex64)
+    out = filled_in(given)
+    np.testing.assert_array_equal(out[[0, 2]], given[[0, 2]])
+    rest = np.delete(np.arange(2000), PLACES)
+    np.testing.assert_array_equal(out[1, rest], given[1, rest])
+    assert np.abs(out[1, PLACES] / gain - whole[PLACES]).max() < 4.0  # the line is there again
+    np.testing.assert_array_equal(filled_in(given[1:2])[0], out[1])  # each as if it were alone
+
+
+def test_clicks_at_random_times_are_filled_in_and_flashes_are_not() -> None:
+    rng = np.random.default_rng(3)
+    random = noise(3)
+    random[np.sort(rng.choice(2000, 20, replace=False))] += 60
+    assert np.abs(filled_in(random[None])).max() < 6
+    flashes = noise(4)
+    flashes[7::100] += 60  # a pulse each, as of a rotor at a low PRF
+    np.testing.assert_array_equal(filled_in(flashes[None])[0], flashes)
+    wide = noise(5)
+    wide[[100, 101, 900, 901]] += 60
+    np.testing.assert_array_equal(filled_in(wide[None])[0], wide)
+
+
+def test_of_few_pulses_and_of_nothing_but_a_click_none_is() -> None:
+    short = noise(6, LEAST_PULSES - 1)
+    short[50] += 60
+    alone = np.zeros(2000, np.complex64)
+    alone[50] = 1
+    for whole in (short, alone, np.zeros(2000, np.complex64), np.ones(2000, np.complex64)):
+        np.testing.assert_array_equal(filled_in(whole[None])[0], whole)
