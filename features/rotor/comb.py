@@ -62,7 +62,7 @@ MAINS_BINS = 4.0
 MAINS_SCORE = 70.0
 
 #: A rotor has up to so many blades, if its number is not known.
-MOST_BLADES = 4
+MOST_BLADES = 6
 
 #: Every k-th line stronger than the others by this factor in power: unequal blades, k to a turn.
 UNEQUAL_FACTOR = 4.0

@@ -23,7 +23,7 @@ from .periodogram import Level, Periodogram, prepared_again
 from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
 from .turning import DEGREES, bend, is_sure
 from .unresolved import judged, left_over, not_all, power_about
-from .weak_lines import by_rotation, without_weak_lines
+from .weak_lines import by_rotation, with_all_lines, without_weak_lines
 
 #: What the lines tell of the rate grows by so much once its change is taken out, where several rotors were found that
 #: are one; and where these were told apart.
@@ -364,6 +364,7 @@ def _as_it_is(
     comb, why = found
     if comb is None:
         return None, why
+    comb = with_all_lines(data, comb, blades)
     edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades)
     if slow := slower_than_rotors(data, comb.fit, edge, std):
         return None, slow

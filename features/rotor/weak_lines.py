@@ -54,19 +54,10 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None) -> tup
     last = int(np.abs(fit.orders).max())
     image = _image_of_lines(data, fit, left, level)
     for parts in blade_numbers(blades):
-        if fit.spacing * data.pulses < LEAST_BINS * parts:
-            continue
-        order = np.arange(-last * parts, last * parts)
-        own = order[np.gcd(order, parts) == 1]  # those of fewer blades may be there without them
-        places = (fit.centre + fit.spacing * tried / parts for tried in (own, order + 0.5))
-        seen = [place[data.usable(place)] for place in places]
-        there, beside = (squared(left.means(place)[0]) * data.pulses / level(place) for place in seen)
-        if min(len(there), len(beside)) < LEAST_LINES or there.max() > MOST_SHARE * there.sum():
-            continue
-        nats = two_means_nats(there, beside)
-        if there.mean() > beside.mean() and nats > LEAST_NATS:
+        nats, excess = _between(data, fit, left, level, parts)
+        if nats > LEAST_NATS:
             best, most = parts, nats
-            sure = not _mirrored(fit, parts, data.pulses) or there.mean() - 1 > IMAGE_FACTOR * image
+            sure = not _mirrored(fit, parts, data.pulses) or excess > IMAGE_FACTOR * image
             sure &= not may_come_back(last, fit.spacing)  # further lines fall between
     if best == 1:
         return data, comb
@@ -88,6 +79,65 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None) -> tup
     )
     told = replace(comb, fit=own, rest=rest, blades=best, blades_sure=sure and most > UNEQUAL_NATS)
     return data.left(data.samples - remove_bands(weak, data.strong.bands)), told
+
+
+def with_all_lines(data: Periodogram, comb: Comb, blades: int | None) -> Comb:
+    """A comb of unlike blades with the lines that it leaves out: the search may take two of four blades for all.
+
+    Parameters
+    ----------
+    data, comb, blades
+        As in `without_weak_lines`.
+
+    Returns
+    -------
+    Comb
+        The one given where nothing more is between its lines, or has no weak ones.
+    """
+    fit = comb.fit
+    numbers = [number for number in blade_numbers(blades) if number > comb.per_turn and number % comb.per_turn == 0]
+    if comb.per_turn == 1 or not numbers or data.one_channel or may_come_back(comb.last, fit.spacing):
+        return comb
+    left, level = LinesSeen(comb.rest[None]), data.level_of(comb.rest)
+    image = _image_of_lines(data, fit, left, level)
+    for parts in (number // comb.per_turn for number in numbers):
+        nats, excess = _between(data, fit, left, level, parts)
+        if nats < UNEQUAL_NATS:
+            continue
+        reach = (int(fit.orders.min()) * parts, int(fit.orders.max()) * parts)
+        fitted = fit_combs(data, fit.centre, [fit.spacing / parts], [reach])
+        if fitted is None or (_mirrored(fit, parts, data.pulses) and excess < IMAGE_FACTOR * image):
+            return replace(comb, blades_sure=False)
+        turn = comb.per_turn * parts
+        whole = replace(comb, fit=fitted[0][0], rest=fitted[1], last=comb.last * parts)
+        return replace(whole, per_turn=turn, blades=turn)
+    return comb
+
+
+def _between(
+    data: Periodogram, fit: CombFit, left: LinesSeen, level: Level, parts: int
+) -> tuple[float, float]:
+    """What speaks for lines at every part of a comb's spacing, beside what lies as far from any [nats].
+
+    Returns
+    -------
+    nats : float
+        0 where nothing does, or one of them holds too much of all.
+    excess : float
+        Their mean power over the noise, less that of noise [1].
+    """
+    if fit.spacing * data.pulses < LEAST_BINS * parts:
+        return 0.0, 0.0
+    last = int(np.abs(fit.orders).max())
+    order = np.arange(-last * parts, last * parts)
+    own = order[np.gcd(order, parts) == 1]  # those of fewer blades may be there without them
+    places = (fit.centre + fit.spacing * tried / parts for tried in (own, order + 0.5))
+    seen = [place[data.usable(place)] for place in places]
+    there, beside = (squared(left.means(place)[0]) * data.pulses / level(place) for place in seen)
+    few = min(len(there), len(beside)) < LEAST_LINES
+    if few or there.max() > MOST_SHARE * there.sum() or there.mean() <= beside.mean():
+        return 0.0, 0.0
+    return two_means_nats(there, beside), float(there.mean()) - 1
 
 
 def _mirrored(fit: CombFit, parts: int, pulses: int) -> bool:

@@ -72,6 +72,25 @@ def test_they_tell_the_number_of_blades(phases_rad):
         assert found.chopping_hz == pytest.approx(len(phases_rad) * rate_hz, rel=1e-4)
 
 
+@pytest.mark.parametrize("blades", [4, 5, 6])
+@pytest.mark.parametrize("stronger", [1.1, 1.4])
+def test_one_stronger_blade_of_many_tells_their_number(blades, stronger):
+    """Of four 19 in 20 passed for two, at twice their rate; five chopped once a turn; six passed for two or three."""
+    time_s, told = np.arange(PULSES) / PRF_HZ, []
+    strengths = np.append(stronger, np.ones(blades - 1))
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        rate_hz = rng.uniform(90, 150)
+        angle_rad = 2 * np.pi * rate_hz * time_s + rng.uniform(0, 2 * np.pi)
+        echo = rotor_echo(angle_rad, wavelength_m=WAVELENGTH_M, blade_length_m=0.12, blade_amplitudes=strengths)
+        echo = (echo / np.sqrt(np.mean(np.abs(echo) ** 2)) + 10) * moving_at(rng.uniform(-20, 20))
+        found = measure((echo + 0.1 * white(rng, PULSES)).astype(np.complex64), **RADAR)
+        assert found.chopping_hz == pytest.approx(blades * rate_hz, rel=1e-4)
+        told.append(found.rotation_hz == pytest.approx(rate_hz, rel=1e-4))
+        assert told[-1] or np.isnan(found.rotation_hz)
+    assert sum(told) >= (5 if stronger > 1.2 else 3)  # where an imbalance of the channels would show there too it is not
+
+
 def test_like_blades_have_none():
     told = 0
     for seed in range(30):
