@@ -63,6 +63,10 @@ def unmeasured(reason: str) -> dict[str, Any]:
     return out | {"rotors_resolved": False, "gear_reason": "no comb", "band_reason": "", "reason": reason}
 
 
+#: A comb that may hold several rotors is off the rate of any by so much of a bin at its outermost order, rms.
+HIDDEN_BINS = 0.12
+
+
 def measure_record(
     iq: NDArray[np.complex64], spectrum: Spectrum, blades: int | None, beta_rad: float | None
 ) -> dict[str, Any]:
@@ -183,14 +187,15 @@ def _turning(family: Family) -> dict[str, Any]:
         chopping = float(rotors.rates.mean()) * prf_hz
         # of two rotors nearer than the dwell tells apart one alone was counted
         std = float(np.hypot(np.sqrt((rotors.stds**2).sum()) / count, hidden_shift(rotors.fits))) * prf_hz
-    spread = max(rotors.spread, rotors.unseen)
+    spread, order, stds = max(rotors.spread, rotors.unseen), comb.last // comb.per_turn, rotors.stds
     if not rotors.resolved:  # the mean lies anywhere within what the unresolved rates span
         std = float(np.hypot(std, spread * prf_hz / np.sqrt(12)))
+        stds = np.hypot(stds, HIDDEN_BINS / (max(order, 1) * data.pulses))
     drifts, drift_stds = family.drifts * (rotors.rates if count > 1 else comb.chopping) * prf_hz**2
-    each = (rotors.rates * prf_hz, rotors.stds * prf_hz, drifts, drift_stds)
+    each = (rotors.rates * prf_hz, stds * prf_hz, drifts, drift_stds)
     padded = (np.pad(values, (0, MAX_ROTORS - count), constant_values=np.nan) for values in each)
     return _named(EACH_ROTOR, padded) | {
-        "comb_order": float(comb.last // comb.per_turn),
+        "comb_order": float(order),
         "comb_snr_db": float(10 * np.log10(max(comb.fit.snr.sum() / data.pulses, 1e-9))),
         "chopping_hz": chopping,
         "chopping_hz_std": std,

@@ -38,7 +38,8 @@ class Measurements:
     comb_snr_db : ndarray
         Power of the comb's lines over the noise, a sample [dB].
     rotor_rates_hz, rotor_rates_hz_std : ndarray, shape (..., MAX_ROTORS)
-        Chopping frequency of each single rotor, rising [Hz], padded with NaN.
+        Chopping frequency of each single rotor, rising [Hz], padded with NaN; where they are not resolved, that of
+        combs that may hold several, which the deviation allows for.
     rotor_drifts_hz_per_s, rotor_drifts_hz_per_s_std : ndarray, shape (..., MAX_ROTORS)
         Even change of each within the dwell [Hz/s], padded in the same way; NaN where they are not resolved.
     rotor_count : ndarray
@@ -52,7 +53,8 @@ class Measurements:
         Relative spread of the rotor rates from the growth of the line width with the order, and above 0.04, where
         lines widen no more, from the rates of rotors that are told apart [1].
     bandwidth_hz, bandwidth_hz_std : ndarray
-        Doppler bandwidth f_max - f_min from the fitted edge of the line family [Hz] (the paper's eq. 26).
+        Doppler bandwidth f_max - f_min from the fitted edge of the line family [Hz] (the paper's eq. 26); of a
+        helicopter, like tip speed and blade, that of the rotor whose chopping frequency is given.
     threshold_bandwidth_hz : ndarray
         The same by the paper's rule: the range over a threshold of 20 dB over the noise [Hz].
     tip_speed_mps, tip_speed_mps_std : ndarray

@@ -114,9 +114,7 @@ def with_all_lines(data: Periodogram, comb: Comb, blades: int | None) -> Comb:
     return comb
 
 
-def _between(
-    data: Periodogram, fit: CombFit, left: LinesSeen, level: Level, parts: int
-) -> tuple[float, float]:
+def _between(data: Periodogram, fit: CombFit, left: LinesSeen, level: Level, parts: int) -> tuple[float, float]:
     """What speaks for lines at every part of a comb's spacing, beside what lies as far from any [nats].
 
     Returns

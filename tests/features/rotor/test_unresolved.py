@@ -245,3 +245,20 @@ def test_four_rotors_of_few_lines_do_not_pass_for_one():
             told[count] += bool(found.rotors_resolved and found.rotor_count == 1)
     assert told[1] >= 10
     assert told[4] <= 3  # ten
+
+
+def test_rates_of_combs_that_may_hold_several_rotors_have_deviations_that_allow_for_it():
+    """Two in five were off by more than five deviations of the comb's own fit."""
+    off, times_s = [], np.arange(PULSES) / PRF_HZ
+    for seed in range(24):
+        rng = np.random.default_rng(seed)
+        rates_hz = rng.uniform(40, 100) * (1 + rng.uniform(-0.015, 0.015, 4))
+        iq = rotors_by_chance(rng, rates_hz, times_s, wavelength_m=WAVELENGTH_M, length_m=0.15) + 10
+        found = measure(10**0.75 * iq + white(rng, PULSES), **RADAR)
+        if not found.rotors_resolved and np.isfinite(found.chopping_hz):
+            told = found.rotor_rates_hz[: int(found.rotor_count)]
+            nearest = np.abs(told[:, None] - 2 * rates_hz).min(axis=1)
+            off += (nearest / found.rotor_rates_hz_std[: len(told)]).tolist()
+    assert len(off) >= 20
+    assert np.mean(np.array(off) > 5) < 0.05
+    assert 0.2 < np.mean(np.square(off)) < 3  # nor are they wider than that takes

@@ -88,7 +88,8 @@ def test_one_stronger_blade_of_many_tells_their_number(blades, stronger):
         assert found.chopping_hz == pytest.approx(blades * rate_hz, rel=1e-4)
         told.append(found.rotation_hz == pytest.approx(rate_hz, rel=1e-4))
         assert told[-1] or np.isnan(found.rotation_hz)
-    assert sum(told) >= (5 if stronger > 1.2 else 3)  # where an imbalance of the channels would show there too it is not
+    # where an imbalance of the channels would show there too it is not
+    assert sum(told) >= (5 if stronger > 1.2 else 3)
 
 
 def test_like_blades_have_none():
