@@ -17,6 +17,7 @@ from .one_channel import made_analytic
 from .samples import as_complex
 from .schema import AXIS_BINS, INPUT_SHAPES
 from .spectrum import doppler_spectrum
+from .stop_band import filled_ends
 from .vector import feature_vector
 from .window import HANN
 
@@ -38,7 +39,8 @@ def model_inputs(
     ----------
     iq : array_like of complex, shape (..., pulses)
         Slow-time samples of one range cell, any gain. Of one channel, I without Q, that holds noise they are made
-        analytic; a side of the spectrum that is empty, as it then is, is filled with noise (`empty_side`).
+        analytic; a side of the spectrum that is empty, as it then is, is filled with noise (`empty_side`), and so are
+        its outer ends where a filter took them out (`stop_band`).
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz].
     names : collection of str
@@ -99,7 +101,10 @@ class Dwells:
         radar = {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
         self._given = made_analytic(samples)
         spectrum = doppler_spectrum(self._given, **radar, window=HANN)
-        self._filled = rows, filled = filled_sides(self._given, spectrum)
+        # of an empty side and of ends that a filter took out no record has both
+        parts = [filled_sides(self._given, spectrum), filled_ends(self._given, spectrum)]
+        rows, filled = (np.concatenate(each) for each in zip(*parts, strict=True))
+        self._filled = rows, filled
         if len(rows):
             spectrum = spectrum.with_rows(rows, doppler_spectrum(filled, **radar, window=HANN))
         self._spectrum_of_dwell = spectrum

@@ -1,0 +1,118 @@
+"""The outer ends of a spectrum that a filter took out, filled with noise.
+
+What was sampled faster than its filter passes, or resampled, holds noise as far as that and next to nothing beyond, on
+both sides alike. Models saw noise end so of rotors alone, and call it UAV, surely (docs/ablation.md).
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from .fast import means
+from .lines import squared
+from .spectrum import Spectrum
+
+#: Each side is looked at in so many blocks of neighbouring bins, or in fewer of so many bins, but no fewer than this.
+MOST_BLOCKS, LEAST_BINS, LEAST_BLOCKS = 32, 16, 16
+
+#: Beyond the band the power is less by this factor than in so many blocks within, from the next but so many inwards.
+DROP, WITHIN, NEXT = 200.0, 3, 3
+
+#: There it is noise: no block is so many times another, and the median of its bins is its mean as noise's is, to this.
+FLAT, LIKE_NOISE = 4.0, 0.7
+
+#: And further in it is nowhere less than this share.
+LEAST_SHARE = 0.25
+
+#: A rotor's band may end so too, but its blades flash: mean fourth power over that of the square, of the outer so large
+#: a share of the band, in the middle of the dwell. Of noise it is 2.
+FLASHES, OUTER_SHARE, MIDDLE = 2.7, 0.5, 0.6
+
+#: Of the noise, which is the same for all records of so many pulses.
+_SEED = 21
+
+_NONE = np.empty(0, np.intp)
+
+
+@lru_cache(maxsize=16)
+def _noise(pulses: int) -> NDArray[np.complex128]:
+    """The transform of white noise of unit power a sample."""
+    out = np.random.default_rng((_SEED, pulses)).standard_normal((pulses, 2)).view(np.complex128)[:, 0]
+    out *= np.sqrt(pulses / 2)
+    out.flags.writeable = False
+    return out
+
+
+def filled_ends(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray[np.intp], NDArray[np.complex64]]:
+    """Records whose outer ends a filter took out, and these with noise there as strong as within.
+
+    Parameters
+    ----------
+    iq : ndarray of complex64, shape (records, pulses)
+        Slow-time samples.
+    spectrum : Spectrum
+        Of these.
+
+    Returns
+    -------
+    rows : ndarray of int, shape (filled,)
+        Which of the records.
+    samples : ndarray of complex64, shape (filled, pulses)
+        Theirs.
+    """
+    middle, half = spectrum.bins // 2, (spectrum.bins - 1) // 2
+    size = max(LEAST_BINS, half // MOST_BLOCKS)
+    count = half // size
+    if count < LEAST_BLOCKS:
+        return _NONE, iq[:0]
+    power = spectrum.relative_power
+
+    def both(first: int, stop: int) -> NDArray[np.float32]:
+        """Mean power of bins so far from the middle, on the lower and on the upper side, shape (2, records)."""
+        sides = power[:, middle - stop + 1 : middle - first + 1], power[:, middle + first : middle + stop]
+        return np.stack([means(side) for side in sides])
+
+    # most records have noise at the ends that is no less than further in: they are not looked at more closely
+    low = both(half // 8, half * 3 // 16).min(axis=0) > DROP * both(half - size, half).max(axis=0)
+    rows, found = [], []
+    for row in map(int, np.flatnonzero(low)):
+        sides = power[row, middle - count * size : middle][::-1], power[row, middle + 1 : middle + 1 + count * size]
+        end, level = _end_of_noise(np.stack(sides).reshape(2, count, size))
+        if end and not _flashes(spectrum, row, end * size):
+            away = np.abs(fft.fftfreq(spectrum.pulses)) * spectrum.bins
+            filling = np.where(away > end * size, _noise(spectrum.pulses), 0)
+            rows.append(row)
+            found.append(iq[row] + fft.ifft(filling) * np.sqrt(level * spectrum.floor[row]))
+    return np.array(rows, np.intp), np.array(found, np.complex64).reshape(len(rows), iq.shape[-1])
+
+
+def _end_of_noise(blocks: NDArray[np.float32]) -> tuple[int, float]:
+    """How many blocks of both sides, shape (2, blocks, bins), a filter passes, and the noise there; 0 where none ends."""
+    mean = means(blocks)
+    most, least = mean.max(axis=0), mean.min(axis=0)
+    beyond = np.maximum.accumulate(most[::-1])[::-1]  # the most there is from each block outwards
+    inner = np.minimum(np.minimum(least[:-2], least[1:-1]), least[2:])
+    falls = inner[: len(least) - WITHIN - NEXT] > DROP * beyond[WITHIN + NEXT :]
+    for end in np.flatnonzero(falls) + WITHIN:
+        level = _noise_level(blocks[:, end - WITHIN : end])
+        if level and least[1:end].min() > LEAST_SHARE * level:
+            return int(end + (most[end:] < level / 2).argmax()), level
+    return 0, 0.0
+
+
+def _noise_level(power: NDArray[np.float32]) -> float:
+    """Mean power of bins, shape (2, blocks, bins), if they hold noise alone, of one level; else 0."""
+    blocks, level = power.mean(axis=-1), float(power.mean())
+    even = blocks.max() < FLAT * blocks.min() and np.median(power) > LIKE_NOISE * np.log(2) * level
+    return level if even else 0.0
+
+
+def _flashes(spectrum: Spectrum, row: int, end: int) -> bool:
+    """Whether the outer part of a band of so many bins to each side comes and goes as blades do."""
+    away = np.abs(np.arange(spectrum.bins) - spectrum.bins // 2)
+    outer = np.where((away <= end) & (away > OUTER_SHARE * end), spectrum.transform[row], 0)
+    some = slice(round((1 - MIDDLE) / 2 * spectrum.pulses), round((1 + MIDDLE) / 2 * spectrum.pulses))
+    power = squared(fft.ifft(outer)[some] / spectrum.window.taper(spectrum.pulses)[some])
+    return bool(np.mean(power**2) > FLASHES * np.mean(power) ** 2)
