@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .arrays import ARRAY_SUFFIXES, read_array
 from .clipping import clipped_values
+from .envelope import dwell_length
 from .errors import BadInput, unreadable
 from .limits import require_size
 from .samples import complex_samples, positive
@@ -76,7 +77,7 @@ class Recording:
         Parameters
         ----------
         dwell_s
-            Length of a dwell [s], above 0; a recording shorter than one dwell is taken whole.
+            Length of a dwell [s], above 0 and at most 5; a recording shorter than one dwell is taken whole.
         least
             Fewest pulses of a dwell; the recording must hold as many.
 
@@ -88,9 +89,9 @@ class Recording:
         Raises
         ------
         BadInput
-            `dwell_s` is no time above 0, or shorter than from one pulse to the next.
+            `dwell_s` is no time above 0, longer than 5 s, or shorter than from one pulse to the next.
         """
-        dwell_s = positive(dwell_s, "dwell_s")
+        dwell_s = dwell_length(dwell_s)
         if dwell_s * self.prf_hz < 0.5:
             asked = f"a dwell of {dwell_s:g} s holds no pulse at a PRF of {self.prf_hz:g} Hz"
             cure = (
@@ -120,8 +121,8 @@ class Recording:
         >>> recording = Recording("walk", np.ones(1000, np.complex64), 24e9, 1e4)
         >>> recording.cut_sentence(0.08, recording.dwells(0.08))
         'the last 0.02 s, shorter than a dwell, are left out'
-        >>> recording.cut_sentence(80, recording.dwells(80))
-        'its 0.1 s, shorter than a dwell of 80 s, are taken whole'
+        >>> recording.cut_sentence(0.5, recording.dwells(0.5))
+        'its 0.1 s, shorter than a dwell of 0.5 s, are taken whole'
         """
         if dwell_s * self.prf_hz > len(self.iq) + 0.5:
             return f"its {len(self.iq) / self.prf_hz:.6g} s, shorter than a dwell of {dwell_s:g} s, are taken whole"

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .envelope import dwell_length
 from .fusion import CORRELATION, LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
-from .samples import positive
 
 FITTED_DWELL_S = 0.08
 """Dwell that `LOOKS` was fitted to [s]."""
@@ -96,17 +96,17 @@ def fuse(
     correlation
         Between the evidence of two dwells, 0 (independent) to 1 (many are worth one).
     dwell_s
-        Length of a dwell [s], above 0: what a look counts depends on how long it is.
+        Length of a dwell [s], above 0 and at most 5: what a look counts depends on how long it is.
 
     Raises
     ------
     ValueError
         The shapes do not match, a row of probabilities is none, looks are of a length without a weight, `shown` holds
-        something else, `dwell_s` is not above 0, or `correlation` is outside 0 to 1.
+        something else, `dwell_s` is not above 0 or above 5, or `correlation` is outside 0 to 1.
     """
     if not 0 <= correlation <= 1:
         raise ValueError(f"correlation is {correlation}: it must be in 0 to 1")
-    positive(dwell_s, "dwell_s")
+    dwell_length(dwell_s)
     for name in shown:
         if name not in ODDS:
             raise ValueError(f"shown holds {name!r}: it may hold {', '.join(ODDS)}")

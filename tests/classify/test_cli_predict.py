@@ -278,6 +278,7 @@ def test_names_are_never_taken_for_markup_or_escape_codes(run, sigmf_pair):
         (("{rec}", "--carrier-hz", "9e9"), "carrier 9000000000 Hz given, but the file says 10000000000 Hz"),
         (("{rec}", "--carrier-hz", "0"), "carrier given (--carrier-hz) is 0"),
         (("{rec}", "--prf-hz", "x"), "--prf-hz is 'x': it must be a number"),
+        (("{npy}", "--carrier-hz", "9e9", "--prf-hz", "25"), "x.npy: PRF 25 Hz is below 1000 Hz: give 25 kHz as 25e3"),
         (("{rec}", "--variable", "x"), "variable 'x' given"),
         (("{rec}", "--max-false-alarm", "0"), "--max-false-alarm is 0: it must be a finite number above 0"),
         (("{rec}", "--coverage", "-1"), "--coverage is -1"),
@@ -291,7 +292,9 @@ def test_names_are_never_taken_for_markup_or_escape_codes(run, sigmf_pair):
 @pytest.mark.parametrize("as_json", [(), ("--json",)])
 def test_bad_arguments(run, sigmf_pair, tmp_path, arguments, said, as_json):
     meta = sigmf_pair()
-    refused(run(*as_json, *(text.format(rec=meta, folder=tmp_path) for text in arguments)), said)
+    npy = tmp_path / "x.npy"
+    np.save(npy, noise(1000))
+    refused(run(*as_json, *(text.format(rec=meta, folder=tmp_path, npy=npy) for text in arguments)), said)
 
 
 @pytest.mark.parametrize(
@@ -303,6 +306,7 @@ def test_bad_arguments(run, sigmf_pair, tmp_path, arguments, said, as_json):
         ({"sample_rate": None}, "give --prf-hz"),
         ({"captures": []}, "give --carrier-hz"),
         ({"captures": [{"core:sample_start": 0, "core:frequency": f} for f in (9e9, 10e9)]}, "2 carriers"),
+        ({"sample_rate": 25.0}, "PRF 25 Hz is below 1000 Hz: give 25 kHz as 25e3"),
         ({"num_channels": 2}, "2 channels"),
         ({"datatype": "ri16_le"}, "real samples"),
         ({"iq": np.full(100, np.nan, dtype=np.complex64)}, "sample 0 is"),

@@ -278,7 +278,7 @@ def test_what_is_shorter_than_a_dwell_is_said_to_be_left_out(folder, capsys):
 @pytest.mark.parametrize("dwell_s", ["80", "5.1", "1e305"])
 def test_a_dwell_of_seconds_where_milliseconds_were_meant_is_refused(command, dwell_s, folder, capsys):
     assert main([command, str(folder / "drone.npy"), *RADAR, "--dwell", dwell_s]) == 2
-    said = f"--dwell [s] is {float(dwell_s):g}: it must be at most 5: 80 ms are 0.08"
+    said = f"--dwell [s] is {float(dwell_s):g}: it must be at most 5 [s]: 80 ms are 0.08"
     assert said in " ".join(capsys.readouterr().err.split())
 
 
