@@ -107,7 +107,9 @@ class Answer:
         track = {
             "label": self.track.label,
             "probabilities": _named(self.track.probabilities),
+            "reason": self.track.reason or None,
             "dwells": len(self.dwells.labels),
+            "used": self.track.used,
             "declared": self.track.declared or None,
             "declared_s": self.declared_s,
             "comb_hz": rates.get("comb"),
@@ -125,6 +127,13 @@ class Answer:
         goes_on = (reasons[1:] != "") & (reasons[1:] == reasons[:-1]) & (p[1:] == p[:-1]).all(axis=1)
         ends = np.append(np.flatnonzero(~goes_on) + 1, len(reasons))
         yield from zip(np.append(0, ends[:-1]).tolist(), np.diff(ends, prepend=0).tolist(), strict=True)
+
+    def _heard(self) -> str:
+        """How many dwells were named, whatever they were named, how many were not sure, and how many not judged."""
+        named = int(np.count_nonzero(self.dwells.labels != UNKNOWN))
+        counts = {"named": named, "unsure": self.track.used - named}
+        counts["not judged"] = len(self.dwells.labels) - self.track.used
+        return ", ".join(f"{number} {words}" for words, number in counts.items() if number)
 
     def print(self, console: "Console") -> None:
         """Write a table, one line a dwell or a run of dwells refused alike, and the line of the recording."""
@@ -149,7 +158,7 @@ class Answer:
         print_table(console, table)
         shares = "  ".join(f"{name} {share:.2f}" for name, share in zip(CLASSES, self.track.probabilities, strict=True))
         line = Text("track: ").append(self.track.label, style=_COLOURS[self.track.label])
-        line.append(f"  {shares}  from {self.track.used} of {counted(len(self.dwells.labels))}")
+        line.append(f"  {shares}  from {counted(len(self.dwells.labels))}: {self._heard()}")
         if self.track.reason:
             line.append(f"  ({self.track.reason})")
         print_words(console, line)

@@ -61,7 +61,18 @@ def test_one_line_a_dwell_and_a_closing_line(run_json, sigmf_pair):
     assert second == said | {"start_s": 0.08, "stop_s": 0.16, "reason": None}
     assert list(first) == ["file", "start_s", "stop_s", "label", "probabilities", "reason"]
     assert list(closing) == ["file", "track"]
-    told = ["label", "probabilities", "dwells", "declared", "declared_s", *STILL, "left_out_s", "remarks"]
+    told = [
+        "label",
+        "probabilities",
+        "reason",
+        "dwells",
+        "used",
+        "declared",
+        "declared_s",
+        *STILL,
+        "left_out_s",
+        "remarks",
+    ]
     assert list(closing["track"]) == told
     assert closing["track"]["left_out_s"] == 0.04
     assert closing["track"]["remarks"] == ["the last 0.04 s, shorter than a dwell, are left out"]
@@ -102,7 +113,8 @@ def test_outside_the_envelope_is_answered_unknown_with_the_cure(run_json, sigmf_
     }
     assert dwells[0]["probabilities"] == dict.fromkeys(NAMES, 0.333333)
     nothing = {"label": "unknown", "probabilities": dict.fromkeys(NAMES, 0.333333), "declared": None}
-    assert closing["track"] == nothing | {"dwells": 4, "declared_s": None, "left_out_s": 0.0, "remarks": []} | STILL
+    nothing |= {"reason": "no dwell could be judged", "dwells": 4, "used": 0}
+    assert closing["track"] == nothing | {"declared_s": None, "left_out_s": 0.0, "remarks": []} | STILL
 
 
 def test_a_dwell_too_short_is_unknown(run_json, sigmf_pair):
@@ -137,7 +149,7 @@ def test_a_silent_dwell_is_unknown_and_left_out_of_the_track(run_json, sigmf_pai
     (remark,) = closing["track"].pop("remarks")
     assert remark.startswith("silence: 1600 pulses in a row are exactly 0 from 0 s on")
     assert (silent["label"], silent["reason"]) == ("unknown", "no signal: every sample is 0")
-    said = {"label": "uav", "probabilities": heard["probabilities"], "dwells": 2}
+    said = {"label": "uav", "probabilities": heard["probabilities"], "reason": None, "dwells": 2, "used": 1}
     assert closing["track"] == said | {
         "declared": "uav",
         "declared_s": 0.16,
@@ -204,14 +216,14 @@ def test_people_get_a_table_that_fits_80_columns(run, sigmf_pair):
     assert lines[0].endswith("one.sigmf-meta")
     assert lines[1].split() == ["start", "s", "stop", "s", "label", *NAMES, "reason"]
     assert lines[2].split() == ["0.000", "0.200", "uav", "0.80", "0.15", "0.05"]
-    assert lines[3] == "track: uav  uav 0.80  bird 0.15  clutter 0.05  from 1 of 1 dwell"
+    assert lines[3] == "track: uav  uav 0.80  bird 0.15  clutter 0.05  from 1 dwell: 1 named"
     assert lines[4] == "its 0.2 s, shorter than a dwell of 1 s, are taken whole"
     assert lines[5] == "declared uav after 0.2 s"
     text = " ".join(out.split())
     assert "unambiguous velocity 7.5 m/s is below 10 m/s" in text
     assert "0.000 4.000 unknown 0.33 0.33 0.33 4 dwells: unambiguous" in text  # one reason for all
     assert text.count("unknown 0.33") == 1
-    assert "from 0 of 4 dwells (no dwell could be judged)" in text
+    assert "from 4 dwells: 4 not judged (no dwell could be judged)" in text
     assert lines[-1] == "2 recordings: 1 uav, 1 unknown"
 
 
@@ -234,7 +246,7 @@ def test_words_are_wrapped_at_the_width_of_the_terminal_and_a_reason_is_no_thin_
     assert "0.33 50 dwells: unambiguous velocity 7.5 m/s is below 10 m/s (wavelength x PRF / 4): raise" in row
     assert max(map(len, words)) <= 40
     assert not [line for line in words if line.endswith(" ")]
-    assert " ".join(" ".join(words).split()).endswith("from 0 of 50 dwells (no dwell could be judged)")
+    assert " ".join(" ".join(words).split()).endswith("from 50 dwells: 50 not judged (no dwell could be judged)")
 
 
 def test_the_summary_counts_the_unreadable(run, sigmf_pair, tmp_path):

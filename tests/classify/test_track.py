@@ -490,3 +490,15 @@ def test_a_recording_whose_prf_is_plainly_in_kilohertz_is_refused_as_measure_doe
     recording = Recording("x", np.ones(2000, np.complex64), 9.85e9, 25.0)
     with pytest.raises(BadInput, match=r"^x: PRF 25 Hz is below 1000 Hz: give 25 kHz as 25e3$"):
         answer(recording, Classifier.load(uav_model))
+
+
+def test_a_track_says_how_many_of_its_dwells_were_named(capsys):
+    p = np.float32([[0.9, 0.05, 0.05], [0.1, 0.8, 0.1], [0.5, 0.3, 0.2], [1 / 3] * 3])
+    labels, reasons = np.array(["uav", "bird", UNKNOWN, UNKNOWN]), np.array(["", "", "not sure", "no signal"])
+    track = fused(p, labels)
+    given = Answer("x", np.arange(4.0), np.arange(1.0, 5.0), Prediction(labels, p, reasons, np.zeros(4)), track)
+    given.print(Console(width=200))
+    assert "from 4 dwells: 2 named, 1 unsure, 1 not judged" in capsys.readouterr().out
+    *_, closing = given.json_objects()
+    assert closing["track"]["reason"] == track.reason != ""
+    assert (closing["track"]["dwells"], closing["track"]["used"]) == (4, 3)
