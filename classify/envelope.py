@@ -34,11 +34,21 @@ def require_hertz(name: str, carrier_hz: float, prf_hz: float) -> None:
     BadInput
         One is.
     """
+    refuse_exchanged(name, carrier_hz, prf_hz)
     if beyond := beyond_radars(carrier_hz, prf_hz):
-        what = f"{beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3"
-        if not beyond_radars(prf_hz, carrier_hz):
-            what = exchanged(carrier_hz, prf_hz)
-        raise BadInput(f"{name}: {what}")
+        raise BadInput(f"{name}: {beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3")
+
+
+def refuse_exchanged(name: str, carrier_hz: float, prf_hz: float) -> None:
+    """Refuse a recording whose carrier and PRF are a radar's if exchanged, and only then.
+
+    Raises
+    ------
+    BadInput
+        They are.
+    """
+    if beyond_radars(carrier_hz, prf_hz) and not beyond_radars(prf_hz, carrier_hz):
+        raise BadInput(f"{name}: {exchanged(carrier_hz, prf_hz)}")
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .arrays import ARRAY_SUFFIXES, read_array
 from .clipping import clipped_values
-from .envelope import dwell_length
+from .envelope import dwell_length, refuse_exchanged
 from .errors import BadInput, unreadable
 from .limits import require_size
 from .samples import complex_samples, positive
@@ -46,8 +46,8 @@ class Recording:
     Raises
     ------
     BadInput
-        The samples are no complex numbers, not finite, none or of several cells, a frequency is not above 0, or the
-        start is no time.
+        The samples are no complex numbers, not finite, none or of several cells, a frequency is not above 0,
+        carrier and PRF stand in each other's place, or the start is no time.
     """
 
     name: str
@@ -68,6 +68,7 @@ class Recording:
         object.__setattr__(self, "iq", iq)
         for name in ("carrier_hz", "prf_hz"):
             object.__setattr__(self, name, positive(getattr(self, name), f"{self.name}: {name}"))
+        refuse_exchanged(self.name, self.carrier_hz, self.prf_hz)
         if not math.isfinite(self.start_s):
             raise BadInput(f"{self.name}: start_s is {self.start_s}: it must be a finite time [s]")
 
@@ -182,6 +183,7 @@ def load_recording(
     carrier_hz: float | None = None,
     prf_hz: float | None = None,
     variable: str | None = None,
+    options: bool = False,
 ) -> Recording:
     """Read a SigMF recording, or IQ from a .npy, .npz or .mat file.
 
@@ -194,6 +196,8 @@ def load_recording(
         Carrier and pulse repetition frequency [Hz], where the file does not say.
     variable
         Which array of an .npz or .mat file; needed where it holds several complex ones.
+    options
+        Whether errors name the options of the command line, in place of the arguments.
 
     Raises
     ------
@@ -212,15 +216,15 @@ def load_recording(
     else:
         samples, file_carrier_hz, file_prf_hz, first = read_sigmf(found)
     iq = _one_range_cell(samples, name)
-    carrier = _agreed(name, "carrier", "--carrier-hz", carrier_hz, file_carrier_hz)
-    prf = _agreed(name, "PRF", "--prf-hz", prf_hz, file_prf_hz)
+    of_carrier, of_prf = ("--carrier-hz", "--prf-hz") if options else ("carrier_hz=", "prf_hz=")
+    carrier = _agreed(name, "carrier", of_carrier, carrier_hz, file_carrier_hz)
+    prf = _agreed(name, "PRF", of_prf, prf_hz, file_prf_hz)
     if carrier is None or prf is None:
         missing = {"carrier (SigMF core:frequency)": carrier, "PRF (SigMF core:sample_rate)": prf}
         of_array = found.suffix.lower() in ARRAY_SUFFIXES
         no = " and no ".join(what for what, value in missing.items() if value is None)
         says = "of arrays the samples alone are read" if of_array else f"the file says no {no}"
-        options = {"--carrier-hz": carrier, "--prf-hz": prf}
-        give = " and ".join(option for option, value in options.items() if value is None)
+        give = " and ".join(option for option, value in ((of_carrier, carrier), (of_prf, prf)) if value is None)
         raise BadInput(f"{name}: {says}: give {give} [Hz]")
     return Recording(name, iq, carrier, prf, first / prf)
 
@@ -284,7 +288,7 @@ def of_each(
     """
     for path in _distinct(paths):
         try:
-            yield work(load_recording(path, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable))
+            yield work(load_recording(path, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable, options=True))
         except BadInput as error:
             yield error
 
@@ -329,7 +333,5 @@ def _agreed(name: str, what: str, option: str, given: float | None, in_file: flo
     if given is None or in_file is None:
         return in_file if given is None else given
     if abs(given - in_file) > _SAME * in_file:
-        raise BadInput(
-            f"{name}: {what} {given:.12g} Hz given, but the file says {in_file:.12g} Hz: leave the option out"
-        )
+        raise BadInput(f"{name}: {what} {given:.12g} Hz given, but the file says {in_file:.12g} Hz: leave {option} out")
     return in_file

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .envelope import dwell_length
+from .errors import BadInput
 from .fusion import CORRELATION, LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
 
@@ -171,12 +172,16 @@ def _heard(
     probabilities: ArrayLike, labels: Sequence[str] | NDArray[np.str_]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """The looks, checked, and which of them carry evidence."""
-    p = np.asarray(probabilities, dtype=np.float64)
+    rule = f"must be numbers of shape (dwells, {len(CLASSES)}): labels come second"
+    try:
+        p = np.asarray(probabilities, dtype=np.float64)
+    except ValueError:
+        raise BadInput(f"probabilities {rule}") from None
+    if p.ndim != 2 or p.shape[1] != len(CLASSES):
+        raise BadInput(f"probabilities {p.shape} {rule}")
     answers = np.asarray(labels, dtype=np.str_)
-    if p.ndim != 2 or p.shape[1] != len(CLASSES) or answers.shape != p.shape[:1]:
-        raise ValueError(
-            f"probabilities {p.shape} and labels {answers.shape} must have shapes (dwells, 3) and (dwells,)"
-        )
+    if answers.shape != p.shape[:1]:
+        raise BadInput(f"labels {answers.shape} must have shape {p.shape[:1]}, one for each dwell")
     if not np.isfinite(p).all():
         raise ValueError(f"probabilities of look {int(np.argmin(np.isfinite(p).all(axis=1)))} are not finite")
     if not (right := (p >= 0).all(axis=1) & (np.abs(p.sum(axis=1) - 1) < _OFF)).all():

@@ -502,3 +502,15 @@ def test_a_track_says_how_many_of_its_dwells_were_named(capsys):
     *_, closing = given.json_objects()
     assert closing["track"]["reason"] == track.reason != ""
     assert (closing["track"]["dwells"], closing["track"]["used"]) == (4, 3)
+
+
+@pytest.mark.parametrize("given", [(["uav"], [[0.8, 0.1, 0.1]]), ([0.8, 0.1, 0.1], ["uav"]), ([[0.8, 0.2]], ["uav"])])
+def test_labels_in_the_place_of_probabilities_are_told_as_such(given):
+    said = r"^probabilities (\S+ )*must be numbers of shape \(dwells, 3\): labels come second$"
+    with pytest.raises(BadInput, match=said):
+        fused(*given)
+
+
+def test_labels_of_other_dwells_are_refused():
+    with pytest.raises(BadInput, match=r"^labels \(2,\) must have shape \(1,\), one for each dwell$"):
+        fused([[0.8, 0.1, 0.1]], ["uav", "uav"])
