@@ -252,7 +252,7 @@ def find_recording(path: str | os.PathLike[str]) -> Path:
         if sigmf is not None:
             return sigmf
         if given.is_dir():
-            raise BadInput(f"{path} is a directory: name the recordings in it, such as {given}/*.sigmf-meta")
+            raise _folder(given)
         if not given.exists():
             raise BadInput(f"{path}: no such file, and no {given.name}.sigmf-meta beside it")
         require_size(given)
@@ -265,6 +265,15 @@ def find_recording(path: str | os.PathLike[str]) -> Path:
             'scipy.io.wavfile.read(path)[1].ravel() of WAV; np.save("cell.npy", x[::2] + 1j * x[1::2]))'
         )
     return given
+
+
+def _folder(given: Path) -> BadInput:
+    """What is said of a folder, by what it holds."""
+    kinds = ("*.sigmf-meta", "*.sigmf", *(f"*{suffix}" for suffix in ARRAY_SUFFIXES))
+    held = next((kind for kind in kinds if any(given.glob(kind))), None)
+    if held is None:
+        return BadInput(f"{given} is a directory that holds no recording: name a SigMF, .npy, .npz or .mat file")
+    return BadInput(f"{given} is a directory: name the recordings in it, such as {given}/{held}")
 
 
 def of_each(

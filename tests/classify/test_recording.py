@@ -120,7 +120,11 @@ def test_standard_input_is_no_recording(name):
         load_recording(name, **RADAR)
 
 
-def test_a_directory_is_refused_with_the_cure(tmp_path):
+def test_a_directory_is_refused_with_the_cure(tmp_path, npy, sigmf_pair):
+    assert "is a directory that holds no recording: name a SigMF, .npy, .npz or .mat file" in refused(tmp_path)
+    npy(noise(100))
+    assert refused(tmp_path).endswith(f"is a directory: name the recordings in it, such as {tmp_path}/*.npy")
+    sigmf_pair()
     with pytest.raises(BadInput, match=r"is a directory: name the recordings in it, such as .*/\*\.sigmf-meta"):
         load_recording(tmp_path)
 
