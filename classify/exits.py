@@ -3,6 +3,7 @@
 import errno
 import io
 import os
+import re
 import sys
 from collections.abc import Callable
 from typing import IO, NoReturn, cast
@@ -114,9 +115,12 @@ def _usage(error: Exception) -> int:
         name = getattr(error, "param").opts[0]  # noqa: B009 - the class of the error has no public name
         rule = _NUMBERS.get(wrong[0]["type"], wrong[0]["msg"].removeprefix("Input should "))
         message = f"{name} is {wrong[0]['input']!r}: it must {rule}"
+    message = " ".join(message.split())
+    if re.match("No such option: -[^-]", message):  # no command has any of one letter but -h
+        message += ": a name that begins with - is given after --, as in -- -name.npy"
     context = getattr(error, "ctx", None)  # the parser does not tell whose option lacks its value
     command = f"{context.command_path} " if context is not None else ""
-    complain(f"{' '.join(message.split())} (see {command}--help)")
+    complain(f"{message} (see {command}--help)")
     return 2
 
 
