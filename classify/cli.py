@@ -134,7 +134,7 @@ def predict(
     from .recording import of_each
     from .samples import positive
 
-    dwell_s = dwell_length(dwell)
+    dwell_s = dwell_length(dwell, "--dwell [s]")
     rule = {"--budget-us": budget_us, "--max-false-alarm": max_false_alarm, "--coverage": coverage}
     for option, value in rule.items():
         if value is not None:

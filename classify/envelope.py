@@ -12,6 +12,7 @@ from .errors import BadInput
 from .samples import positive
 
 _ROUNDING = 1e-9  # relative: 0.005 s x 25 kHz must be 125 pulses, whatever the last bit says
+_ADC_HZ = 1e6  # no radar repeats its pulses faster: what samples so fast is a converter, within each of them
 
 
 def exchanged(carrier_hz: float, prf_hz: float) -> str:
@@ -33,11 +34,21 @@ def require_hertz(name: str, carrier_hz: float, prf_hz: float) -> None:
     BadInput
         One is.
     """
+    refuse_exchanged(name, carrier_hz, prf_hz)
     if beyond := beyond_radars(carrier_hz, prf_hz):
-        what = f"{beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3"
-        if not beyond_radars(prf_hz, carrier_hz):
-            what = exchanged(carrier_hz, prf_hz)
-        raise BadInput(f"{name}: {what}")
+        raise BadInput(f"{name}: {beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3")
+
+
+def refuse_exchanged(name: str, carrier_hz: float, prf_hz: float) -> None:
+    """Refuse a recording whose carrier and PRF are a radar's if exchanged, and only then.
+
+    Raises
+    ------
+    BadInput
+        They are.
+    """
+    if beyond_radars(carrier_hz, prf_hz) and not beyond_radars(prf_hz, carrier_hz):
+        raise BadInput(f"{name}: {exchanged(carrier_hz, prf_hz)}")
 
 
 @dataclass(frozen=True)
@@ -133,8 +144,14 @@ class Envelope:
             return f"PRF {prf_hz:g} Hz is below {self.prf_min_hz:g} Hz: {cure}{self._raise_prf(carrier_hz)}"
         if prf_hz > self.prf_max_hz:
             step = math.ceil(prf_hz / self.prf_max_hz)
+            cure = f"sum every {step} pulses into one"
+            if prf_hz > _ADC_HZ:
+                cure = (
+                    "of a pulsed or FMCW radar give one range cell, one sample a pulse or chirp, and their rate; "
+                    f"of CW alone sum every {step} samples into one"
+                )
             return (
-                f"PRF {prf_hz:g} Hz is above {self.prf_max_hz:g} Hz: sum every {step} pulses into one, "
+                f"PRF {prf_hz:g} Hz is above {self.prf_max_hz:g} Hz: {cure}, "
                 f"for a PRF of {prf_hz / step:g} Hz (PRF / {step})"
             )
         if unambiguous_mps < self.unambiguous_min_mps * (1 - _ROUNDING):
@@ -196,17 +213,24 @@ def _four_digits(value: float, whole: Callable[[float], int], slack: float) -> s
     return f"{whole(value / step * slack) * step:.4g}"
 
 
-def dwell_length(value: object) -> float:
+def dwell_length(value: object, name: str = "dwell_s") -> float:
     """Check the length of a dwell [s]: above 0, and none of seconds where thousandths were meant.
 
     None is longer than models know of, and rotors keep their rates for tenths of a second.
+
+    Parameters
+    ----------
+    value
+        What was given.
+    name
+        What it is called there: the argument, or the option.
 
     Raises
     ------
     BadInput
         It is not.
     """
-    dwell_s = positive(value, "--dwell [s]")
-    if dwell_s > Envelope.dwell_max_s:
-        raise BadInput(f"--dwell [s] is {dwell_s:g}: it must be at most {Envelope.dwell_max_s:g}: 80 ms are 0.08")
+    dwell_s = positive(value, name)
+    if dwell_s > Envelope.dwell_max_s * (1 + _ROUNDING):
+        raise BadInput(f"{name} is {dwell_s:g}: it must be at most {Envelope.dwell_max_s:g} [s]: 80 ms are 0.08")
     return dwell_s

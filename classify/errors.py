@@ -1,5 +1,8 @@
 """The exceptions that are told in one line: what a user can put right, and a long run that was stopped."""
 
+import os
+from pathlib import Path
+
 
 class BadInput(ValueError):  # noqa: N818 - it is the user's input that is bad
     """Something given is wrong: a file, a field or a value.
@@ -19,11 +22,17 @@ def unreadable(path: object, error: OSError, cure: str = "name a file that can b
     return BadInput(f"{error.filename or path}: cannot be read: {error.strerror or error}: {cure}")
 
 
-def unwritable(path: object, error: OSError, cure: str) -> BadInput:
-    """What the system says of a file or a folder that it did not write; one whose folder is missing has that cure."""
+def unwritable(path: str | os.PathLike[str], error: OSError, cure: str) -> BadInput:
+    """What the system says of a file or a folder that it did not write; what is wrong with its folder comes first."""
+    reason, folder = error.strerror or error, Path(path).parent
     if isinstance(error, FileNotFoundError):
         cure = "make its folder first"
-    return BadInput(f"{path}: cannot be written: {error.strerror or error}: {cure}")
+        if folder.is_dir():  # as of /proc, whose files are the system's
+            reason, cure = f"{folder} takes no files", "give another folder"
+    elif isinstance(error, NotADirectoryError):
+        above = next((one for one in (folder, *folder.parents) if one.is_file()), folder)
+        reason, cure = f"{above} is a file", "give another folder"
+    return BadInput(f"{path}: cannot be written: {reason}: {cure}")
 
 
 class Interrupted(Exception):  # noqa: N818 - no error: the user stopped it

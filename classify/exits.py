@@ -3,9 +3,10 @@
 import errno
 import io
 import os
+import re
 import sys
 from collections.abc import Callable
-from typing import cast
+from typing import IO, NoReturn, cast
 
 import typer
 
@@ -16,10 +17,10 @@ _UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])
 
 # As modules, or as the packages that hold them: an account of a training asks for their versions.
 _TRAIN_EXTRA = {"torch", "sklearn", "scikit-learn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2", "mpmath"}
-# A disk that is full, read-only or out of bounds is the user's to mend.
+# A disk that is full, read-only or out of bounds is the user's to mend, and so is an output that is closed.
 _DISK_ERRORS = {
     errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EFBIG, errno.ENOTDIR, errno.EISDIR,
-    errno.EEXIST, errno.ENAMETOOLONG, errno.ENOENT,
+    errno.EEXIST, errno.ENAMETOOLONG, errno.ENOENT, errno.EBADF,
 }  # fmt: skip
 _TRACEBACK = "BLADEWING_TRACEBACK"
 # What others' errors say may hold whole models.
@@ -27,11 +28,22 @@ _MOST_SAID = 300
 _NUMBERS = {"int_parsing": "be a whole number", "float_parsing": "be a number"}
 
 
+class _Closed(io.TextIOBase):
+    """An output that is closed: answers that nobody gets are an error, as where the disk is full."""
+
+    def __init__(self, place: IO[str]) -> None:
+        self.place = place  # where it would be, kept open
+
+    def write(self, text: str) -> NoReturn:
+        raise OSError(errno.EBADF, "it is closed")
+
+
 def mend_streams() -> None:
-    """Make sure that what is printed goes somewhere, whatever characters it holds."""
+    """Make sure that what is printed goes somewhere or is missed, whatever characters it holds."""
     for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by whoever calls: nobody reads them
-            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
+        if getattr(sys, name) is None:  # closed by whoever calls: no file that is opened may take its place
+            place = open(os.devnull, "w")  # noqa: SIM115
+            setattr(sys, name, _Closed(place) if name == "stdout" else place)
         elif isinstance(getattr(sys, name), io.TextIOWrapper):  # a name its encoding cannot hold is shown escaped
             getattr(sys, name).reconfigure(errors="backslashreplace")
 
@@ -103,9 +115,12 @@ def _usage(error: Exception) -> int:
         name = getattr(error, "param").opts[0]  # noqa: B009 - the class of the error has no public name
         rule = _NUMBERS.get(wrong[0]["type"], wrong[0]["msg"].removeprefix("Input should "))
         message = f"{name} is {wrong[0]['input']!r}: it must {rule}"
+    message = " ".join(message.split())
+    if re.match("No such option: -[^-]", message):  # no command has any of one letter but -h
+        message += ": a name that begins with - is given after --, as in -- -name.npy"
     context = getattr(error, "ctx", None)  # the parser does not tell whose option lacks its value
     command = f"{context.command_path} " if context is not None else ""
-    complain(f"{' '.join(message.split())} (see {command}--help)")
+    complain(f"{message} (see {command}--help)")
     return 2
 
 

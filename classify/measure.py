@@ -119,7 +119,7 @@ class Settings:
             raise BadInput(f"--blades is {blades}: it must be a whole number of 1 to {MOST_BLADES_GIVEN}")
         if beta_deg is not None and not 0 <= beta_deg < 90:
             raise BadInput(f"--beta-deg is {beta_deg:g}: it must be at least 0 and below 90 [deg]")
-        return cls(dwell_length(dwell_s), blades, None if beta_deg is None else math.radians(beta_deg))
+        return cls(dwell_length(dwell_s, "--dwell [s]"), blades, None if beta_deg is None else math.radians(beta_deg))
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import numpy as np
 from bladewing.features.measurements import Measurements
@@ -15,7 +16,12 @@ from .recording import Recording
 #: Colours of what is drawn behind the spectrum.
 _LEGEND = (("#dbe9f6", "band"), ("#f3d9b1", "notch"), ("#c0392b", "comb"), ("#1e8449", "2nd comb"))
 
-_WIDTH, _HEIGHT, _LEFT, _BOTTOM, _TOP = 960, 470, 56, 44, 80
+_WIDTH, _HEIGHT, _LEFT, _RIGHT, _BOTTOM, _TOP = 960, 470, 56, 12, 44, 80
+
+#: Middle of what is drawn on.
+_MIDDLE_X, _MIDDLE_Y = (_LEFT + _WIDTH - _RIGHT) / 2, (_TOP + _HEIGHT - _BOTTOM) / 2
+
+_MINUS = "\u2212"
 
 #: Letters of a name that fit above the picture.
 _LONGEST_NAME = 100
@@ -43,7 +49,7 @@ class _Frame:
     top_db: float
 
     def x(self, hz: float) -> float:
-        return _LEFT + (hz - self.low) / (self.high - self.low) * (_WIDTH - _LEFT - 12)
+        return _LEFT + (hz - self.low) / (self.high - self.low) * (_WIDTH - _LEFT - _RIGHT)
 
     def y(self, db: float) -> float:
         return _TOP + (self.top_db - db) / (self.top_db - self.bottom_db) * (_HEIGHT - _TOP - _BOTTOM)
@@ -82,12 +88,13 @@ class _Frame:
             for value in np.arange(np.ceil(first / step), np.floor(last / step) + 1) * step:
                 at = self.x(value * per_unit)
                 yield f'<path d="M{at:.1f} {edge:.1f}v{tick}" stroke="#222" stroke-width="0.8"/>'
-                yield f'<text x="{at:.1f}" y="{label_y:.1f}" text-anchor="middle">{value + 0.0:.6g}</text>'
+                said = f"{value + 0.0:.6g}".replace("-", _MINUS)
+                yield f'<text x="{at:.1f}" y="{label_y:.1f}" text-anchor="middle">{said}</text>'
 
     def levels(self) -> Iterator[str]:
         """A line every 20 dB from the noise up."""
         for db in np.arange(0, self.top_db + 1, 20):
-            yield f'<path d="M{_LEFT} {self.y(db):.1f}H{_WIDTH - 12}" stroke="#ccc" stroke-width="0.5"/>'
+            yield f'<path d="M{_LEFT} {self.y(db):.1f}H{_WIDTH - _RIGHT}" stroke="#ccc" stroke-width="0.5"/>'
             yield f'<text x="{_LEFT - 6}" y="{self.y(db) + 4:.1f}" text-anchor="end">{db:.0f}</text>'
 
 
@@ -150,6 +157,9 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
     if len(rates_hz) > 1:
         combs = f"combs of {len(rates_hz)} rotors, every {rates_hz[0]:.2f} to {rates_hz[-1]:.2f} Hz"
     said = str(values.reason[index]) or f"{combs}, {wide}"
+    if level.max() <= _BOTTOM_DB:  # nothing is drawn
+        why = escape(one_line(said))
+        parts.append(f'<text x="{_MIDDLE_X}" y="{_MIDDLE_Y - 20}" font-size="16" text-anchor="middle">{why}</text>')
     if np.isfinite(both_hz).all():
         said += f"; main {both_hz[0]:.2f} Hz, tail {both_hz[1]:.2f} Hz, ratio {values.gear_ratio[index]:.3f}"
     return _picture(recording.name, start_s, said, parts)
@@ -159,15 +169,13 @@ def _legend(drawn: Sequence[bool]) -> Iterator[str]:
     """What the colours are, of those that are drawn."""
     entries = [entry for entry, shown in zip(_LEGEND, drawn, strict=True) if shown]
     for number, (colour, words) in enumerate(entries):
-        left = _WIDTH - 12 - 76 * (len(entries) - number)
+        left = _WIDTH - _RIGHT - 76 * (len(entries) - number)
         yield f'<rect x="{left}" y="30" width="12" height="12" fill="{colour}" stroke="#888"/>'
         yield f'<text x="{left + 18}" y="40">{words}</text>'
 
 
 def _picture(recording: str, start_s: float, said: str, parts: Sequence[str]) -> str:
     """The whole of it: parts under a title, and what is said of them."""
-    from xml.sax.saxutils import escape
-
     # the folder would push the words off the picture, and so would the middle of a long name
     name = one_line(Path(recording).name)
     if len(name) > _LONGEST_NAME:
@@ -180,8 +188,8 @@ def _picture(recording: str, start_s: float, said: str, parts: Sequence[str]) ->
         f'<text x="{_LEFT}" y="20" font-size="13">{title}</text>\n'
         f'<text x="{_LEFT}" y="38" font-size="12">{words}</text>\n'
         + "\n".join(parts)
-        + f'\n<text x="{_WIDTH / 2}" y="{_HEIGHT - 6}" text-anchor="middle">Doppler frequency [Hz]</text>\n'
-        f'<text x="{_WIDTH / 2}" y="{_TOP - 24}" text-anchor="middle">radial velocity [m/s]</text>\n'
-        f'<text transform="translate(14 {_HEIGHT / 2}) rotate(-90)" text-anchor="middle">level over noise [dB]</text>\n'
+        + f'\n<text x="{_MIDDLE_X}" y="{_HEIGHT - 6}" text-anchor="middle">Doppler frequency [Hz]</text>\n'
+        f'<text x="{_MIDDLE_X}" y="{_TOP - 24}" text-anchor="middle">radial velocity [m/s]</text>\n'
+        f'<text transform="translate(14 {_MIDDLE_Y}) rotate(-90)" text-anchor="middle">level over noise [dB]</text>\n'
         "</svg>\n"
     )

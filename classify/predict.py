@@ -11,13 +11,12 @@ from bladewing.features.one_channel import made_analytic
 from bladewing.features.steady_comb import steady_comb
 from bladewing.features.wingbeat import wingbeat
 
-from .envelope import require_hertz
+from .envelope import Envelope, dwell_length, in_kilohertz, require_hertz
 from .errors import BadInput, one_line
 from .fusion import LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
 from .limits import DWELL_S
 from .recording import Recording
-from .samples import positive
 from .terminal import counted, print_table, print_words
 from .track import Track, fuse
 
@@ -108,7 +107,9 @@ class Answer:
         track = {
             "label": self.track.label,
             "probabilities": _named(self.track.probabilities),
+            "reason": self.track.reason or None,
             "dwells": len(self.dwells.labels),
+            "used": self.track.used,
             "declared": self.track.declared or None,
             "declared_s": self.declared_s,
             "comb_hz": rates.get("comb"),
@@ -126,6 +127,13 @@ class Answer:
         goes_on = (reasons[1:] != "") & (reasons[1:] == reasons[:-1]) & (p[1:] == p[:-1]).all(axis=1)
         ends = np.append(np.flatnonzero(~goes_on) + 1, len(reasons))
         yield from zip(np.append(0, ends[:-1]).tolist(), np.diff(ends, prepend=0).tolist(), strict=True)
+
+    def _heard(self) -> str:
+        """How many dwells were named, whatever they were named, how many were not sure, and how many not judged."""
+        named = int(np.count_nonzero(self.dwells.labels != UNKNOWN))
+        counts = {"named": named, "unsure": self.track.used - named}
+        counts["not judged"] = len(self.dwells.labels) - self.track.used
+        return ", ".join(f"{number} {words}" for words, number in counts.items() if number)
 
     def print(self, console: "Console") -> None:
         """Write a table, one line a dwell or a run of dwells refused alike, and the line of the recording."""
@@ -150,7 +158,7 @@ class Answer:
         print_table(console, table)
         shares = "  ".join(f"{name} {share:.2f}" for name, share in zip(CLASSES, self.track.probabilities, strict=True))
         line = Text("track: ").append(self.track.label, style=_COLOURS[self.track.label])
-        line.append(f"  {shares}  from {self.track.used} of {counted(len(self.dwells.labels))}")
+        line.append(f"  {shares}  from {counted(len(self.dwells.labels))}: {self._heard()}")
         if self.track.reason:
             line.append(f"  ({self.track.reason})")
         print_words(console, line)
@@ -179,14 +187,14 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
     classifier
         The model to ask.
     dwell_s
-        Length of a dwell [s], above 0. Dwells follow one another without overlap; a rest shorter than a dwell is
-        left out, but a recording shorter than one dwell is taken whole.
+        Length of a dwell [s], above 0 and at most 5. Dwells follow one another without overlap; a rest shorter than a
+        dwell is left out, but a recording shorter than one dwell is taken whole.
 
     Raises
     ------
     BadInput
-        `dwell_s` is not above 0, `recording` is a path or samples alone, its carrier or PRF is no radar's, or
-        `classifier` is a name.
+        `dwell_s` is not above 0 or longer than 5 s, `recording` is a path or samples alone, its carrier or PRF is no
+        radar's, its PRF seems to be given in kilohertz, or `classifier` is a name.
     """
     if not isinstance(recording, Recording):
         raise BadInput(
@@ -198,7 +206,10 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
             f"classifier is {classifier!r}: it must be a Classifier: Classifier.load({classifier!r}) gives one"
         )
     require_hertz(recording.name, recording.carrier_hz, recording.prf_hz)
-    dwell_s = positive(dwell_s, "dwell_s")
+    if meant := in_kilohertz(recording.prf_hz):  # all dwells would be refused alike, thousands of a few pulses each
+        least_hz = classifier.envelope.prf_min_hz
+        raise BadInput(f"{recording.name}: PRF {recording.prf_hz:g} Hz is below {least_hz:g} Hz: {meant}")
+    dwell_s = dwell_length(dwell_s)
     iq = recording.dwells(dwell_s)
     count, wanted = iq.shape
     dwells = classifier.predict(iq, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
@@ -219,7 +230,7 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
         longer=longer,
         shown=shown,
         rule=classifier.decide,
-        dwell_s=wanted / recording.prf_hz,
+        dwell_s=min(wanted / recording.prf_hz, Envelope.dwell_max_s),  # of whole pulses it may be a trifle longer
     )
     stop_s = start_s + wanted / recording.prf_hz
     left_out_s, remarks = recording.left_out_s(iq), recording.remarks(dwell_s, iq)

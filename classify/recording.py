@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from .arrays import ARRAY_SUFFIXES, read_array
 from .clipping import clipped_values
+from .envelope import dwell_length, refuse_exchanged
 from .errors import BadInput, unreadable
 from .limits import require_size
 from .samples import complex_samples, positive
@@ -46,8 +47,8 @@ class Recording:
     Raises
     ------
     BadInput
-        The samples are no complex numbers, not finite, none or of several cells, a frequency is not above 0, or the
-        start is no time.
+        The samples are no complex numbers, not finite, none or of several cells, a frequency is not above 0,
+        carrier and PRF stand in each other's place, or the start is no time.
     """
 
     name: str
@@ -68,6 +69,7 @@ class Recording:
         object.__setattr__(self, "iq", iq)
         for name in ("carrier_hz", "prf_hz"):
             object.__setattr__(self, name, positive(getattr(self, name), f"{self.name}: {name}"))
+        refuse_exchanged(self.name, self.carrier_hz, self.prf_hz)
         if not math.isfinite(self.start_s):
             raise BadInput(f"{self.name}: start_s is {self.start_s}: it must be a finite time [s]")
 
@@ -77,7 +79,7 @@ class Recording:
         Parameters
         ----------
         dwell_s
-            Length of a dwell [s], above 0; a recording shorter than one dwell is taken whole.
+            Length of a dwell [s], above 0 and at most 5; a recording shorter than one dwell is taken whole.
         least
             Fewest pulses of a dwell; the recording must hold as many.
 
@@ -89,9 +91,9 @@ class Recording:
         Raises
         ------
         BadInput
-            `dwell_s` is no time above 0, or shorter than from one pulse to the next.
+            `dwell_s` is no time above 0, longer than 5 s, or shorter than from one pulse to the next.
         """
-        dwell_s = positive(dwell_s, "dwell_s")
+        dwell_s = dwell_length(dwell_s)
         if dwell_s * self.prf_hz < 0.5:
             asked = f"a dwell of {dwell_s:g} s holds no pulse at a PRF of {self.prf_hz:g} Hz"
             cure = (
@@ -121,8 +123,8 @@ class Recording:
         >>> recording = Recording("walk", np.ones(1000, np.complex64), 24e9, 1e4)
         >>> recording.cut_sentence(0.08, recording.dwells(0.08))
         'the last 0.02 s, shorter than a dwell, are left out'
-        >>> recording.cut_sentence(80, recording.dwells(80))
-        'its 0.1 s, shorter than a dwell of 80 s, are taken whole'
+        >>> recording.cut_sentence(0.5, recording.dwells(0.5))
+        'its 0.1 s, shorter than a dwell of 0.5 s, are taken whole'
         """
         if dwell_s * self.prf_hz > len(self.iq) + 0.5:
             return f"its {len(self.iq) / self.prf_hz:.6g} s, shorter than a dwell of {dwell_s:g} s, are taken whole"
@@ -182,6 +184,7 @@ def load_recording(
     carrier_hz: float | None = None,
     prf_hz: float | None = None,
     variable: str | None = None,
+    options: bool = False,
 ) -> Recording:
     """Read a SigMF recording, or IQ from a .npy, .npz or .mat file.
 
@@ -194,6 +197,8 @@ def load_recording(
         Carrier and pulse repetition frequency [Hz], where the file does not say.
     variable
         Which array of an .npz or .mat file; needed where it holds several complex ones.
+    options
+        Whether errors name the options of the command line, in place of the arguments.
 
     Raises
     ------
@@ -212,15 +217,15 @@ def load_recording(
     else:
         samples, file_carrier_hz, file_prf_hz, first = read_sigmf(found)
     iq = _one_range_cell(samples, name)
-    carrier = _agreed(name, "carrier", "--carrier-hz", carrier_hz, file_carrier_hz)
-    prf = _agreed(name, "PRF", "--prf-hz", prf_hz, file_prf_hz)
+    of_carrier, of_prf = ("--carrier-hz", "--prf-hz") if options else ("carrier_hz=", "prf_hz=")
+    carrier = _agreed(name, "carrier", of_carrier, carrier_hz, file_carrier_hz)
+    prf = _agreed(name, "PRF", of_prf, prf_hz, file_prf_hz)
     if carrier is None or prf is None:
         missing = {"carrier (SigMF core:frequency)": carrier, "PRF (SigMF core:sample_rate)": prf}
         of_array = found.suffix.lower() in ARRAY_SUFFIXES
         no = " and no ".join(what for what, value in missing.items() if value is None)
         says = "of arrays the samples alone are read" if of_array else f"the file says no {no}"
-        options = {"--carrier-hz": carrier, "--prf-hz": prf}
-        give = " and ".join(option for option, value in options.items() if value is None)
+        give = " and ".join(option for option, value in ((of_carrier, carrier), (of_prf, prf)) if value is None)
         raise BadInput(f"{name}: {says}: give {give} [Hz]")
     return Recording(name, iq, carrier, prf, first / prf)
 
@@ -248,7 +253,7 @@ def find_recording(path: str | os.PathLike[str]) -> Path:
         if sigmf is not None:
             return sigmf
         if given.is_dir():
-            raise BadInput(f"{path} is a directory: name the recordings in it, such as {given}/*.sigmf-meta")
+            raise _folder(given)
         if not given.exists():
             raise BadInput(f"{path}: no such file, and no {given.name}.sigmf-meta beside it")
         require_size(given)
@@ -261,6 +266,15 @@ def find_recording(path: str | os.PathLike[str]) -> Path:
             'scipy.io.wavfile.read(path)[1].ravel() of WAV; np.save("cell.npy", x[::2] + 1j * x[1::2]))'
         )
     return given
+
+
+def _folder(given: Path) -> BadInput:
+    """What is said of a folder, by what it holds."""
+    kinds = ("*.sigmf-meta", "*.sigmf", *(f"*{suffix}" for suffix in ARRAY_SUFFIXES))
+    held = next((kind for kind in kinds if any(given.glob(kind))), None)
+    if held is None:
+        return BadInput(f"{given} is a directory that holds no recording: name a SigMF, .npy, .npz or .mat file")
+    return BadInput(f"{given} is a directory: name the recordings in it, such as {given}/{held}")
 
 
 def of_each(
@@ -284,7 +298,7 @@ def of_each(
     """
     for path in _distinct(paths):
         try:
-            yield work(load_recording(path, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable))
+            yield work(load_recording(path, carrier_hz=carrier_hz, prf_hz=prf_hz, variable=variable, options=True))
         except BadInput as error:
             yield error
 
@@ -329,7 +343,5 @@ def _agreed(name: str, what: str, option: str, given: float | None, in_file: flo
     if given is None or in_file is None:
         return in_file if given is None else given
     if abs(given - in_file) > _SAME * in_file:
-        raise BadInput(
-            f"{name}: {what} {given:.12g} Hz given, but the file says {in_file:.12g} Hz: leave the option out"
-        )
+        raise BadInput(f"{name}: {what} {given:.12g} Hz given, but the file says {in_file:.12g} Hz: leave {option} out")
     return in_file

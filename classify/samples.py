@@ -27,8 +27,10 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
     Raises
     ------
     BadInput
-        The samples are not complex numbers, one is not finite as complex64, or all vanish in it.
+        The samples are a Recording, or not complex numbers, one is not finite as complex64, or all vanish in it.
     """
+    if type(values).__name__ == "Recording":  # not by its type: its module imports this one
+        raise BadInput(f"{name} is a Recording: give recording.dwells(0.08), or call answer(recording, classifier)")
     if np.ma.is_masked(values):
         hidden = np.ma.count_masked(values)
         raise BadInput(f"{name}: {hidden} samples are masked: every sample counts: {FILL_IN}")

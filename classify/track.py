@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .envelope import dwell_length
+from .errors import BadInput
 from .fusion import CORRELATION, LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
-from .samples import positive
 
 FITTED_DWELL_S = 0.08
 """Dwell that `LOOKS` was fitted to [s]."""
@@ -96,17 +97,17 @@ def fuse(
     correlation
         Between the evidence of two dwells, 0 (independent) to 1 (many are worth one).
     dwell_s
-        Length of a dwell [s], above 0: what a look counts depends on how long it is.
+        Length of a dwell [s], above 0 and at most 5: what a look counts depends on how long it is.
 
     Raises
     ------
     ValueError
         The shapes do not match, a row of probabilities is none, looks are of a length without a weight, `shown` holds
-        something else, `dwell_s` is not above 0, or `correlation` is outside 0 to 1.
+        something else, `dwell_s` is not above 0 or above 5, or `correlation` is outside 0 to 1.
     """
     if not 0 <= correlation <= 1:
         raise ValueError(f"correlation is {correlation}: it must be in 0 to 1")
-    positive(dwell_s, "dwell_s")
+    dwell_length(dwell_s)
     for name in shown:
         if name not in ODDS:
             raise ValueError(f"shown holds {name!r}: it may hold {', '.join(ODDS)}")
@@ -171,12 +172,16 @@ def _heard(
     probabilities: ArrayLike, labels: Sequence[str] | NDArray[np.str_]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """The looks, checked, and which of them carry evidence."""
-    p = np.asarray(probabilities, dtype=np.float64)
+    rule = f"must be numbers of shape (dwells, {len(CLASSES)}): labels come second"
+    try:
+        p = np.asarray(probabilities, dtype=np.float64)
+    except ValueError:
+        raise BadInput(f"probabilities {rule}") from None
+    if p.ndim != 2 or p.shape[1] != len(CLASSES):
+        raise BadInput(f"probabilities {p.shape} {rule}")
     answers = np.asarray(labels, dtype=np.str_)
-    if p.ndim != 2 or p.shape[1] != len(CLASSES) or answers.shape != p.shape[:1]:
-        raise ValueError(
-            f"probabilities {p.shape} and labels {answers.shape} must have shapes (dwells, 3) and (dwells,)"
-        )
+    if answers.shape != p.shape[:1]:
+        raise BadInput(f"labels {answers.shape} must have shape {p.shape[:1]}, one for each dwell")
     if not np.isfinite(p).all():
         raise ValueError(f"probabilities of look {int(np.argmin(np.isfinite(p).all(axis=1)))} are not finite")
     if not (right := (p >= 0).all(axis=1) & (np.abs(p.sum(axis=1) - 1) < _OFF)).all():

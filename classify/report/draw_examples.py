@@ -12,6 +12,8 @@ from matplotlib.axes import Axes
 from .svg import MUTED, NARROW_IN, SERIES, Panel, drawing, panel
 from .words import number, percent, size, spoken
 
+# The strongest colour [dB over the median]: a body's own level would leave nothing of what moves about it.
+CLIPPED_DB = 45.0
 # Short strokes at the right edge.
 _TEETH: dict[str, Any] = {"color": SERIES[3], "linestyle": "none", "marker": 0, "markersize": 6, "markeredgewidth": 0.8}
 
@@ -80,6 +82,7 @@ def _show(axes: Axes, picture: Mapping[str, Any]) -> None:
         aspect="auto",
         cmap="cividis",
         vmin=0.0,
+        vmax=CLIPPED_DB,
         extent=(1e3 * picture["time_s"][0], 1e3 * picture["time_s"][1], *picture["velocity_mps"]),
         interpolation="nearest",
     )

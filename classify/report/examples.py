@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import scipy.fft
 from bladewing.features import measure
 from bladewing.features.notch import NOTCH_MPS
 from bladewing.features.spectrum import doppler_spectrum
-from bladewing.simulate import Radar, Records
+from bladewing.simulate import Radar, Records, draw_records
 from numpy.typing import NDArray
 
 from .pictures import STFT_SETTINGS
@@ -17,14 +18,31 @@ from .stft import STFT_BINS, frames, stft
 
 # The paper's middle window [samples] and its largest overlap.
 WINDOW, OVERLAP = STFT_SETTINGS[0]
+# Of one record a class: long enough for a wing to beat, and windows long enough to part lines from the body.
+EXAMPLE_RADAR, EXAMPLE_WINDOW = Radar(carrier_hz=9.85e9, prf_hz=10e3, pulses=3000), 160
+# Kinds that show what their class is about, and of how many records the first fitting one is shown.
+EXAMPLE_KINDS, EXAMPLES_DRAWN = ("quadcopter", "flapping_bird", "vehicle"), 100
 # Strong enough to see, weak enough to be honest [dB].
-SNR_SHOWN_DB = (5.0, 20.0)
+SNR_SHOWN_DB = (12.0, 20.0)
 # ... and with a line this far over the noise, if any has one [dB].
 CLEAR_DB = 20.0
 # Shown resolution: neighbouring values are pooled by their maximum, so that no line is lost.
 POINTS, ROWS, COLUMNS = 400, 128, 90
 # The velocities shown reach past the fastest line this strong [dB over the noise], and at least so far [m/s].
-LINE_DB, MARGIN, LEAST_SPAN_MPS = 10.0, 1.4, 15.0
+LINE_DB, MARGIN, LEAST_SPAN_MPS = 10.0, 1.4, 25.0
+
+
+def draw_examples(seed: int, classes: tuple[str, ...]) -> list[dict[str, Any]]:
+    """One fitting record of each of `EXAMPLE_KINDS`, as `show_examples` gives them.
+
+    Parameters
+    ----------
+    seed : int
+        Root of their randomness.
+    classes : tuple of str
+    """
+    drawn = (draw_records(EXAMPLE_RADAR, EXAMPLES_DRAWN, seed, purpose="bench", kind=kind) for kind in EXAMPLE_KINDS)
+    return [one for records in drawn for one in show_examples(records, classes)]
 
 
 def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, Any]]:
@@ -33,7 +51,7 @@ def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, 
     Parameters
     ----------
     records : Records
-        Those of 5 to 20 dB SNR are preferred.
+        Those of 12 to 20 dB SNR are preferred, of these those without a background.
     classes : tuple of str
 
     Returns
@@ -51,11 +69,8 @@ def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, 
         where = np.flatnonzero(np.asarray(records.labels) == name)
         if where.size == 0:
             continue
+        index = min(map(int, where), key=partial(_flaws, records))
         snr_db = np.asarray(records.truth["snr_db"], np.float64)
-        low, high = SNR_SHOWN_DB
-        fitting = where[(snr_db[where] >= low) & (snr_db[where] <= high)]
-        seen = [row for row in fitting if _spectrum(radar, records.iq[row])[1].max() > CLEAR_DB]
-        index = int([*seen, *fitting, *where][0])
         known = float(snr_db[index]) if np.isfinite(snr_db[index]) else None
         velocity, level = _spectrum(radar, records.iq[index])
         span = _span_mps(radar, velocity, level)
@@ -68,10 +83,22 @@ def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, 
                 "dwell_s": radar.dwell_s,
                 "spectrum": _curve(velocity[inside], level[inside]),
                 "measured": _measured(radar, records.iq[index]),
-                "picture": _picture(radar, records.iq[index], span, window=WINDOW, overlap=OVERLAP),
+                "picture": _picture(radar, records.iq[index], span, window=EXAMPLE_WINDOW, overlap=OVERLAP),
             }
         )
     return shown
+
+
+def _flaws(records: Records, row: int) -> tuple[bool, bool, bool]:
+    """What speaks against showing a record, the worst first: its SNR, a background, nothing clear to be seen."""
+    low, high = SNR_SHOWN_DB
+    if not low <= records.truth["snr_db"][row] <= high:
+        return True, True, True
+    alone = "background_db" not in records.truth or np.isnan(records.truth["background_db"][row])
+    clear = _spectrum(records.radar, records.iq[row])[1].max() > CLEAR_DB
+    if clear and alone and records.labels[row] == "uav":  # its comb and band are drawn in
+        clear = not _measured(records.radar, records.iq[row])["reason"]
+    return False, not alone, not clear
 
 
 def show_stfts(seed: int) -> dict[str, Any]:

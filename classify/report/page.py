@@ -11,7 +11,8 @@ from markupsafe import Markup
 
 from ..errors import BadInput
 from . import draw_cost, draw_examples, draw_front, draw_scores, scores, summary, words
-from .series import Look, choice_looks, looks
+from .examples import EXAMPLE_WINDOW
+from .series import EIGHT_BITS, Look, choice_looks, looks
 
 SCHEMA_VERSION = "3"
 
@@ -82,7 +83,10 @@ def draw_page(report: Mapping[str, Any]) -> str:
         headline=summary.headline_model(report),
         sentences=summary.sentences(report),
         budget_sentence=summary.budget_sentence,
+        tried=EIGHT_BITS if (EIGHT_BITS, "model") in drawn else "",
         stage_name=draw_cost.stage_name,
+        example_window=EXAMPLE_WINDOW,
+        clipped_db=draw_examples.CLIPPED_DB,
         figures={
             "snr": draw_scores.accuracy_by_snr(report),
             "dwell": draw_scores.accuracy_by_dwell(report),

@@ -37,17 +37,16 @@ from ..training_config import TrainingConfig
 from . import cost, evaluate, scores, stft, storage, trade
 from .card import model_card
 from .choices import FEATURES, classifier_of
-from .examples import OVERLAP, WINDOW, show_examples, show_stfts
+from .examples import OVERLAP, WINDOW, draw_examples, show_stfts
 from .families import left_out
 from .front import Given, measure_front
 from .machine import describe_machine
 from .page import SCHEMA_VERSION, draw_page
 from .pictures import PICTURES
-from .series import LADDER
+from .series import EIGHT_BITS, LADDER
 from .settings import ReportConfig, report_config
 
 #: Name of the default model with its products in eight bits, which is not shipped.
-EIGHT_BITS = f"{DEFAULT_MODEL}-int8-trial"
 
 # The paper's measured radar: X band, PRF 20 to 30 kHz, 80 ms.
 REFERENCE = Radar(carrier_hz=9.85e9, prf_hz=25e3, pulses=2000)
@@ -154,7 +153,7 @@ def measured_report(
         "fft_against_stft": against["against"],
         "time_law": against["law"],
         "storage": storage.weigh(_forms(reference)),
-        "examples": show_examples(reference, CLASSES),
+        "examples": draw_examples(config.seed, CLASSES),
         "stft_pictures": show_stfts(config.seed),
         "tables": parts.take("tables", tables),
         "training": _training(account),

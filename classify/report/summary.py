@@ -48,7 +48,8 @@ def sentences(report: Mapping[str, Any]) -> list[tuple[str, list[str]]]:
 def _failures(report: Mapping[str, Any], name: str, found: Mapping[str, Any]) -> Iterator[str]:
     yield (
         "Every record here is synthetic, from the same simulator that made the training records. "
-        "No measured record was scored: expect less on your own radar."
+        "No measured record is scored in this report (what the shipped models say of some stands in docs/expect.md): "
+        "expect less on your own radar."
     )
     wrong = found["false_uav"]
     worst = sorted(

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 # Stand-in colour -> what the page puts there. Series are the page's --s0, --s1, ...
 INK, GRID, MUTED, PAPER = "#010101", "#020202", "#030303", "#040404"
-SERIES = tuple(f"#0a00{number:02x}" for number in range(8))
+SERIES = tuple(f"#0a00{number:02x}" for number in range(11))
 _CSS = {INK: "currentColor", GRID: "var(--grid)", MUTED: "var(--muted)", PAPER: "var(--paper)"} | {
     colour: f"var(--s{number})" for number, colour in enumerate(SERIES)
 }

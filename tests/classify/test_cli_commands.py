@@ -274,3 +274,12 @@ def test_an_output_that_is_full_is_told_from_the_files_that_are_written(tmp_path
     assert done.returncode == 2
     assert "standard output: No space left on device: what was to be printed is lost" in done.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["cell.sigmf-data", "cell.sigmf-meta"]
+
+
+def test_answers_that_nobody_can_read_are_an_error(tmp_path, sigmf_pair, uav_model):
+    python = "import sys; from bladewing.classify.cli import main; sys.exit(main())"
+    command = f'exec 1>&-; exec "{sys.executable}" -c "{python}" predict "{sigmf_pair()}" --model "{uav_model}"'
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    lost = "standard output: it is closed: what was to be printed is lost; files are written whole or not"
+    assert done.stderr == f"bladewing: error: {lost}\n"

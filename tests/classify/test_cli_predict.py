@@ -61,7 +61,18 @@ def test_one_line_a_dwell_and_a_closing_line(run_json, sigmf_pair):
     assert second == said | {"start_s": 0.08, "stop_s": 0.16, "reason": None}
     assert list(first) == ["file", "start_s", "stop_s", "label", "probabilities", "reason"]
     assert list(closing) == ["file", "track"]
-    told = ["label", "probabilities", "dwells", "declared", "declared_s", *STILL, "left_out_s", "remarks"]
+    told = [
+        "label",
+        "probabilities",
+        "reason",
+        "dwells",
+        "used",
+        "declared",
+        "declared_s",
+        *STILL,
+        "left_out_s",
+        "remarks",
+    ]
     assert list(closing["track"]) == told
     assert closing["track"]["left_out_s"] == 0.04
     assert closing["track"]["remarks"] == ["the last 0.04 s, shorter than a dwell, are left out"]
@@ -102,7 +113,8 @@ def test_outside_the_envelope_is_answered_unknown_with_the_cure(run_json, sigmf_
     }
     assert dwells[0]["probabilities"] == dict.fromkeys(NAMES, 0.333333)
     nothing = {"label": "unknown", "probabilities": dict.fromkeys(NAMES, 0.333333), "declared": None}
-    assert closing["track"] == nothing | {"dwells": 4, "declared_s": None, "left_out_s": 0.0, "remarks": []} | STILL
+    nothing |= {"reason": "no dwell could be judged", "dwells": 4, "used": 0}
+    assert closing["track"] == nothing | {"declared_s": None, "left_out_s": 0.0, "remarks": []} | STILL
 
 
 def test_a_dwell_too_short_is_unknown(run_json, sigmf_pair):
@@ -137,7 +149,7 @@ def test_a_silent_dwell_is_unknown_and_left_out_of_the_track(run_json, sigmf_pai
     (remark,) = closing["track"].pop("remarks")
     assert remark.startswith("silence: 1600 pulses in a row are exactly 0 from 0 s on")
     assert (silent["label"], silent["reason"]) == ("unknown", "no signal: every sample is 0")
-    said = {"label": "uav", "probabilities": heard["probabilities"], "dwells": 2}
+    said = {"label": "uav", "probabilities": heard["probabilities"], "reason": None, "dwells": 2, "used": 1}
     assert closing["track"] == said | {
         "declared": "uav",
         "declared_s": 0.16,
@@ -204,14 +216,14 @@ def test_people_get_a_table_that_fits_80_columns(run, sigmf_pair):
     assert lines[0].endswith("one.sigmf-meta")
     assert lines[1].split() == ["start", "s", "stop", "s", "label", *NAMES, "reason"]
     assert lines[2].split() == ["0.000", "0.200", "uav", "0.80", "0.15", "0.05"]
-    assert lines[3] == "track: uav  uav 0.80  bird 0.15  clutter 0.05  from 1 of 1 dwell"
+    assert lines[3] == "track: uav  uav 0.80  bird 0.15  clutter 0.05  from 1 dwell: 1 named"
     assert lines[4] == "its 0.2 s, shorter than a dwell of 1 s, are taken whole"
     assert lines[5] == "declared uav after 0.2 s"
     text = " ".join(out.split())
     assert "unambiguous velocity 7.5 m/s is below 10 m/s" in text
     assert "0.000 4.000 unknown 0.33 0.33 0.33 4 dwells: unambiguous" in text  # one reason for all
     assert text.count("unknown 0.33") == 1
-    assert "from 0 of 4 dwells (no dwell could be judged)" in text
+    assert "from 4 dwells: 4 not judged (no dwell could be judged)" in text
     assert lines[-1] == "2 recordings: 1 uav, 1 unknown"
 
 
@@ -234,7 +246,7 @@ def test_words_are_wrapped_at_the_width_of_the_terminal_and_a_reason_is_no_thin_
     assert "0.33 50 dwells: unambiguous velocity 7.5 m/s is below 10 m/s (wavelength x PRF / 4): raise" in row
     assert max(map(len, words)) <= 40
     assert not [line for line in words if line.endswith(" ")]
-    assert " ".join(" ".join(words).split()).endswith("from 0 of 50 dwells (no dwell could be judged)")
+    assert " ".join(" ".join(words).split()).endswith("from 50 dwells: 50 not judged (no dwell could be judged)")
 
 
 def test_the_summary_counts_the_unreadable(run, sigmf_pair, tmp_path):
@@ -278,11 +290,13 @@ def test_names_are_never_taken_for_markup_or_escape_codes(run, sigmf_pair):
         (("{rec}", "--carrier-hz", "9e9"), "carrier 9000000000 Hz given, but the file says 10000000000 Hz"),
         (("{rec}", "--carrier-hz", "0"), "carrier given (--carrier-hz) is 0"),
         (("{rec}", "--prf-hz", "x"), "--prf-hz is 'x': it must be a number"),
+        (("{npy}", "--carrier-hz", "9e9", "--prf-hz", "25"), "x.npy: PRF 25 Hz is below 1000 Hz: give 25 kHz as 25e3"),
         (("{rec}", "--variable", "x"), "variable 'x' given"),
         (("{rec}", "--max-false-alarm", "0"), "--max-false-alarm is 0: it must be a finite number above 0"),
         (("{rec}", "--coverage", "-1"), "--coverage is -1"),
         (("{rec}", "--budget-us", "nan"), "--budget-us is nan"),
-        (("{rec}", "--no-such-option"), "No such option: --no-such-option"),
+        (("{rec}", "--no-such-option"), "No such option: --no-such-option (see bladewing predict --help)"),
+        (("-cell.npy",), "No such option: -c: a name that begins with - is given after --, as in -- -name.npy"),
         ((), "Missing argument 'RECORDING'"),
         (("{folder}",), "is a directory: name the recordings in it"),
         (("{folder}/gone.npy",), "no such file"),
@@ -291,7 +305,9 @@ def test_names_are_never_taken_for_markup_or_escape_codes(run, sigmf_pair):
 @pytest.mark.parametrize("as_json", [(), ("--json",)])
 def test_bad_arguments(run, sigmf_pair, tmp_path, arguments, said, as_json):
     meta = sigmf_pair()
-    refused(run(*as_json, *(text.format(rec=meta, folder=tmp_path) for text in arguments)), said)
+    npy = tmp_path / "x.npy"
+    np.save(npy, noise(1000))
+    refused(run(*as_json, *(text.format(rec=meta, folder=tmp_path, npy=npy) for text in arguments)), said)
 
 
 @pytest.mark.parametrize(
@@ -303,6 +319,7 @@ def test_bad_arguments(run, sigmf_pair, tmp_path, arguments, said, as_json):
         ({"sample_rate": None}, "give --prf-hz"),
         ({"captures": []}, "give --carrier-hz"),
         ({"captures": [{"core:sample_start": 0, "core:frequency": f} for f in (9e9, 10e9)]}, "2 carriers"),
+        ({"sample_rate": 25.0}, "PRF 25 Hz is below 1000 Hz: give 25 kHz as 25e3"),
         ({"num_channels": 2}, "2 channels"),
         ({"datatype": "ri16_le"}, "real samples"),
         ({"iq": np.full(100, np.nan, dtype=np.complex64)}, "sample 0 is"),

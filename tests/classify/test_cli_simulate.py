@@ -229,3 +229,15 @@ def test_a_folder_is_no_name_for_a_recording(scene_file, tmp_path, capsys):
         f"{tmp_path} is a folder: name the recording in it: give --out {tmp_path / 'NAME'}" in capsys.readouterr().err
     )
     assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="no folder of the system's own files")
+def test_a_folder_that_is_none_or_takes_no_files_is_told_as_such(scene_file, capsys):
+    for out, said in (
+        (scene_file / "x", f"{scene_file / 'x'}: cannot be written: {scene_file} is a file: give another folder"),
+        (scene_file / "y" / "x", f"{scene_file} is a file: give another folder"),
+        ("/proc/q", "/proc/q: cannot be written: /proc takes no files: give another folder"),
+        (scene_file.parent / "gone" / "x", "make its folder first"),
+    ):
+        assert main(["simulate", str(scene_file), "--out", str(out)]) == 2
+        assert said in capsys.readouterr().err

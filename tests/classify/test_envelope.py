@@ -28,6 +28,9 @@ C_MPS = 299_792_458.0
         (10e9, 999.0, 1000, "PRF 999 Hz is below 1000 Hz: raise the PRF to 1335 Hz or more"),
         (10e9, 250e3, 1000, "PRF 250000 Hz is above 100000 Hz: sum every 3 pulses into one, "
                             "for a PRF of 83333.3 Hz (PRF / 3)"),
+        (10e9, 20e6, 1000, "PRF 2e+07 Hz is above 100000 Hz: of a pulsed or FMCW radar give one range cell, one sample "
+                           "a pulse or chirp, and their rate; of CW alone sum every 200 samples into one, "
+                           "for a PRF of 100000 Hz (PRF / 200)"),
         (10e9, 5e3, 63, "63 pulses are fewer than 64: take 64 pulses, 0.0128 s, or more (dwell = pulses / PRF)"),
         (10e9, 50e3, 63, "63 pulses are fewer than 64: take 250 pulses, 0.005 s, or more (dwell = pulses / PRF)"),
         (10e9, 20e3, 99, "dwell 4.95 ms is below 5 ms: take 100 pulses, 0.005 s, or more (dwell = pulses / PRF)"),

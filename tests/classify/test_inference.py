@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from bladewing.classify import BadInput, Classifier, inference, model_file
+from bladewing.classify import BadInput, Classifier, Recording, inference, model_file
 from bladewing.classify.model_file import chosen_name, model_names
 from bladewing.features import model_inputs
 from bladewing.models import DEFAULT_MODEL
@@ -393,3 +393,10 @@ def test_frequencies_and_threads_may_be_numbers_of_any_kind(always_uav):
     with pytest.raises(BadInput, match=r"carrier_hz is .*above 0"):
         always_uav.predict(noise(200), carrier_hz=np.array([9.85e9]), prf_hz=20e3)
     assert Classifier.load(threads=np.int64(1)).classes == always_uav.classes
+
+
+def test_a_recording_is_not_its_samples(mixed_model):
+    recording = Recording("x", noise(2000), 9.85e9, 25e3)
+    said = r"^iq is a Recording: give recording\.dwells\(0\.08\), or call answer\(recording, classifier\)$"
+    with pytest.raises(BadInput, match=said):
+        Classifier.load(mixed_model).predict(recording, carrier_hz=9.85e9, prf_hz=25e3)

@@ -278,7 +278,7 @@ def test_what_is_shorter_than_a_dwell_is_said_to_be_left_out(folder, capsys):
 @pytest.mark.parametrize("dwell_s", ["80", "5.1", "1e305"])
 def test_a_dwell_of_seconds_where_milliseconds_were_meant_is_refused(command, dwell_s, folder, capsys):
     assert main([command, str(folder / "drone.npy"), *RADAR, "--dwell", dwell_s]) == 2
-    said = f"--dwell [s] is {float(dwell_s):g}: it must be at most 5: 80 ms are 0.08"
+    said = f"--dwell [s] is {float(dwell_s):g}: it must be at most 5 [s]: 80 ms are 0.08"
     assert said in " ".join(capsys.readouterr().err.split())
 
 
@@ -415,6 +415,28 @@ def test_the_plot_of_silence_is_a_line_at_the_foot(tmp_path):
     words = {e.text for e in ET.fromstring(target.read_text()).iter() if e.tag.endswith("text")}
     assert "notch" in words
     assert not {"band", "comb", "2nd comb"} & words
+
+
+def test_what_stands_at_the_axes_of_a_plot_is_centred_on_them_and_has_a_minus_sign(folder, tmp_path):
+    target = tmp_path / "drone.svg"
+    assert main(["measure", str(folder / "drone.npy"), *RADAR, "--plot", str(target)]) == 0
+    root = ET.fromstring(target.read_text(encoding="utf-8"))
+    texts = [e for e in root.iter() if e.tag.endswith("text")]
+    (axis,) = {e.get("x") for e in texts if e.text in ("Doppler frequency [Hz]", "radial velocity [m/s]")}
+    (line,) = {e.get("d").split("H")[1] for e in root.iter() if "H" in (e.get("d") or "")}  # of the levels
+    left = next(e.get("d") for e in root.iter() if "H" in (e.get("d") or "")).removeprefix("M").split()[0]
+    assert float(axis) == (float(left) + float(line)) / 2
+    ticks = [e.text for e in texts if e.get("text-anchor") == "middle"]
+    assert any(text.startswith("\u2212") for text in ticks)
+    assert not any(text.startswith("-") for text in ticks)
+
+
+def test_a_plot_of_nothing_says_why_where_the_spectrum_would_be(tmp_path):
+    np.save(tmp_path / "silence.npy", np.zeros(2000, np.complex64))
+    target = tmp_path / "silence.svg"
+    assert main(["measure", str(tmp_path / "silence.npy"), *RADAR, "--plot", str(target)]) == 0
+    texts = [e for e in ET.fromstring(target.read_text()).iter() if e.tag.endswith("text") and e.text == "no signal"]
+    assert [e.get("text-anchor") for e in texts] == [None, "middle"]  # above the picture, and in its middle
 
 
 def test_a_long_name_is_shortened_in_its_middle_so_that_the_words_fit(tmp_path):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bladewing.classify.errors import BadInput, unreadable
-from bladewing.classify.recording import Recording, find_recording, load_recording
+from bladewing.classify.recording import Recording, find_recording, load_recording, of_each
 
 from .conftest import CARRIER_HZ, PRF_HZ, noise
 
@@ -78,13 +78,13 @@ def test_samples_that_are_refused(npy, array, said):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({}, "of arrays the samples alone are read: give --carrier-hz and --prf-hz"),
-        ({"prf_hz": PRF_HZ}, "of arrays the samples alone are read: give --carrier-hz .Hz.$"),
-        ({"carrier_hz": CARRIER_HZ}, "of arrays the samples alone are read: give --prf-hz .Hz.$"),
-        (RADAR | {"prf_hz": 0.0}, r"PRF given \(--prf-hz\) is 0: it must be a finite number above 0"),
-        (RADAR | {"prf_hz": -5.0}, r"PRF given \(--prf-hz\) is -5"),
-        (RADAR | {"carrier_hz": float("nan")}, r"carrier given \(--carrier-hz\) is nan"),
-        (RADAR | {"carrier_hz": float("inf")}, r"carrier given \(--carrier-hz\) is inf"),
+        ({}, "of arrays the samples alone are read: give carrier_hz= and prf_hz="),
+        ({"prf_hz": PRF_HZ}, "of arrays the samples alone are read: give carrier_hz= .Hz.$"),
+        ({"carrier_hz": CARRIER_HZ}, "of arrays the samples alone are read: give prf_hz= .Hz.$"),
+        (RADAR | {"prf_hz": 0.0}, r"PRF given \(prf_hz=\) is 0: it must be a finite number above 0"),
+        (RADAR | {"prf_hz": -5.0}, r"PRF given \(prf_hz=\) is -5"),
+        (RADAR | {"carrier_hz": float("nan")}, r"carrier given \(carrier_hz=\) is nan"),
+        (RADAR | {"carrier_hz": float("inf")}, r"carrier given \(carrier_hz=\) is inf"),
     ],
 )
 def test_carrier_and_prf_must_be_known(npy, options, said):
@@ -120,7 +120,11 @@ def test_standard_input_is_no_recording(name):
         load_recording(name, **RADAR)
 
 
-def test_a_directory_is_refused_with_the_cure(tmp_path):
+def test_a_directory_is_refused_with_the_cure(tmp_path, npy, sigmf_pair):
+    assert "is a directory that holds no recording: name a SigMF, .npy, .npz or .mat file" in refused(tmp_path)
+    npy(noise(100))
+    assert refused(tmp_path).endswith(f"is a directory: name the recordings in it, such as {tmp_path}/*.npy")
+    sigmf_pair()
     with pytest.raises(BadInput, match=r"is a directory: name the recordings in it, such as .*/\*\.sigmf-meta"):
         load_recording(tmp_path)
 
@@ -207,3 +211,15 @@ def test_a_name_that_is_no_text_can_be_written_as_text(tmp_path):
         np.save(file, noise(100))
     name = load_recording(os.fsdecode(path), **RADAR).name
     assert name.encode().endswith(rb"/drone\udcff.npy")
+
+
+def test_carrier_and_prf_that_stand_in_each_others_place_are_told_where_they_are_given(npy):
+    said = "carrier 25000 Hz and PRF 9.85e+09 Hz stand in each other's place: exchange them"
+    with pytest.raises(BadInput, match=re.escape(f"walk: {said}")):
+        Recording("walk", noise(50), 25e3, 9.85e9)
+    assert said in refused(npy(noise(50)), carrier_hz=25e3, prf_hz=9.85e9)
+
+
+def test_the_command_line_names_its_options_where_python_names_arguments(npy):
+    (error,) = of_each(lambda recording: recording, [npy(noise(100))])
+    assert str(error).endswith("of arrays the samples alone are read: give --carrier-hz and --prf-hz [Hz]")

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
-from bladewing.classify.report.examples import show_examples
+from bladewing.classify.report.draw_examples import CLIPPED_DB
+from bladewing.classify.report.examples import draw_examples, show_examples
 from bladewing.simulate import Radar, Records
 
 RADAR = Radar(carrier_hz=9.85e9, prf_hz=25e3, pulses=2000)
@@ -41,3 +42,23 @@ def test_records_of_fitting_snr_are_preferred() -> None:
     several = Records(RADAR, np.repeat(some.iq, 3, axis=0), np.repeat(some.labels, 3), truth)
     (one,) = show_examples(several, ("uav", "bird", "clutter"))
     assert (one["kind"], one["snr_db"]) == ("person", 12.0)
+
+
+def test_of_fitting_records_those_without_a_background_are_preferred() -> None:
+    some = moving_at(5.0)
+    truth = {"kind": np.array(["rain", "sea", "person"]), "snr_db": np.array([15.0, 40.0, 12.0])}
+    truth["background_db"] = np.array([10.0, np.nan, np.nan])
+    several = Records(RADAR, np.repeat(some.iq, 3, axis=0), np.repeat(some.labels, 3), truth)
+    (one,) = show_examples(several, ("uav", "bird", "clutter"))
+    assert one["kind"] == "person"
+
+
+def test_one_record_of_each_class_is_drawn_long_enough_to_see_it_move() -> None:
+    shown = draw_examples(0, ("uav", "bird", "clutter"))
+    assert [one["class"] for one in shown] == ["uav", "bird", "clutter"]
+    assert {one["dwell_s"] for one in shown} == {0.3}
+    assert shown[0]["measured"]["chopping_hz"], "the comb of the UAV's rotors is drawn in"
+    # the body is a narrow line, no slab: most of what is shown is not clipped
+    for one in shown:
+        level = np.array(one["picture"]["level_db"])
+        assert (level >= CLIPPED_DB).mean() < 0.2

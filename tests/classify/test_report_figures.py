@@ -96,3 +96,9 @@ def test_a_step_of_few_records_breaks_the_lines_of_its_class_alone(report: dict[
     assert [one == other for one, other in zip(whole, broken, strict=True)] == [group != "uav" for group in GROUPS]
     begun = [len(re.findall(r"\bM -?\d", svgs[GROUPS.index("uav")])) for svgs in (whole, broken)]
     assert begun[1] >= begun[0] + len(report["models"])  # each line begins once more
+
+
+def test_the_card_sends_who_asks_for_measured_recordings_to_where_they_stand(report: dict[str, Any]) -> None:
+    assert "No measured record is scored in this report" in model_card(report)
+    assert "**On measured recordings**" in (ROOT / "docs" / "expect.md").read_text(encoding="utf-8")
+    assert "docs/expect.md" in model_card(report)

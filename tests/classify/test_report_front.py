@@ -276,6 +276,29 @@ def test_no_two_choices_look_alike() -> None:
     assert len(set(choice_looks(rows).values())) == len(rows)
 
 
+def test_choices_of_a_page_of_the_shipped_models_have_colours_of_their_own_whatever_else_is_on_it() -> None:
+    from bladewing.classify.ladder import CASCADE
+    from bladewing.classify.report.series import EIGHT_BITS, choice_looks
+
+    shipped = ("spectrum-cnn-fast", "spectrum-cnn", "spectrum-cnn-wide", EIGHT_BITS, CASCADE)
+    models = [{"name": name, "kind": "model"} for name in shipped]
+    pages = [{"name": name, "kind": "picture"} for name in pictures.PICTURES] + [
+        {"name": "features", "kind": "features"}
+    ]
+    drawn = choice_looks([*pages, *models])
+    families = {name: look.number for (name, kind), look in drawn.items() if not name.startswith("stft")}
+    assert len({*families.values(), drawn["stft-80-90", "picture"].number}) == len(families) + 1
+    for rows in (pages[:1] + models[1:], pages[3:] + models[:1]):
+        assert all(look.number == drawn[key].number for key, look in choice_looks(rows).items())
+
+
+def test_the_page_says_what_the_model_in_eight_bits_is(report: dict[str, Any]) -> None:
+    from bladewing.classify.report.page import draw_page
+
+    page = draw_page(report)
+    assert "“spectrum-cnn-wide-int8-trial” is the default model with its products in eight bits" in page
+
+
 def test_what_is_marked_is_not_beaten_and_a_budget_buys_the_best_within(report: dict[str, Any]) -> None:
     points = [(row, point) for row in report["front"]["choices"] for point in row["dwells"]]
     for place, batch in enumerate((1, 64)):

@@ -455,14 +455,62 @@ def test_a_recording_outside_the_envelope_is_refused_before_its_dwells_are_read(
         raise AssertionError("dwells were read")
 
     monkeypatch.setattr("bladewing.classify.inference.mended", read)
-    recording = Recording("x", np.ones(40_000, np.complex64), 9.85e9, 25.0)
-    given = answer(recording, Classifier.load())
+    recording = Recording("x", np.ones(40_000, np.complex64), 9.85e9, 250.0)
+    given = answer(recording, Classifier.load(), dwell_s=0.008)
     assert len(given.dwells.reasons) == 20_000
     assert set(given.dwells.reasons) == {given.dwells.reasons[0]}
-    assert "give 25 kHz as 25e3" in given.dwells.reasons[0]
+    assert "raise the PRF to 1315 Hz or more" in given.dwells.reasons[0]
     assert given.dwells.reasons.strides == (0,)  # one text for all of them, however many
 
 
 def test_a_model_is_loaded_before_it_is_asked():
     with pytest.raises(BadInput, match=r"classifier is 'fast': .*Classifier\.load\('fast'\)"):
         answer(Recording("x", np.ones(400, np.complex64), 9.85e9, 25e3), "fast")
+
+
+def test_dwells_of_milliseconds_are_refused_in_python_as_on_the_command_line(uav_model):
+    recording, classifier = recorded(40_000), Classifier.load(uav_model)
+    p = np.float32([[0.8, 0.1, 0.1]])
+    for ask in (
+        recording.dwells,
+        lambda dwell_s: answer(recording, classifier, dwell_s=dwell_s),
+        lambda dwell_s: fused(p, ["uav"], dwell_s=dwell_s),
+    ):
+        with pytest.raises(BadInput, match=r"^dwell_s is 80: it must be at most 5 \[s\]: 80 ms are 0\.08$"):
+            ask(80)
+
+
+def test_the_longest_dwell_may_be_a_part_of_a_pulse_longer(uav_model):
+    """5 s at 1000.7 Hz are 5003.5 pulses, and dwells are of whole ones: 5004."""
+    recording = Recording("x", np.ones(6000, np.complex64), 3e9, 1000.7)
+    assert answer(recording, Classifier.load(uav_model), dwell_s=5.0).stop_s[0] > 5.0
+
+
+def test_a_recording_whose_prf_is_plainly_in_kilohertz_is_refused_as_measure_does(uav_model):
+    recording = Recording("x", np.ones(2000, np.complex64), 9.85e9, 25.0)
+    with pytest.raises(BadInput, match=r"^x: PRF 25 Hz is below 1000 Hz: give 25 kHz as 25e3$"):
+        answer(recording, Classifier.load(uav_model))
+
+
+def test_a_track_says_how_many_of_its_dwells_were_named(capsys):
+    p = np.float32([[0.9, 0.05, 0.05], [0.1, 0.8, 0.1], [0.5, 0.3, 0.2], [1 / 3] * 3])
+    labels, reasons = np.array(["uav", "bird", UNKNOWN, UNKNOWN]), np.array(["", "", "not sure", "no signal"])
+    track = fused(p, labels)
+    given = Answer("x", np.arange(4.0), np.arange(1.0, 5.0), Prediction(labels, p, reasons, np.zeros(4)), track)
+    given.print(Console(width=200))
+    assert "from 4 dwells: 2 named, 1 unsure, 1 not judged" in capsys.readouterr().out
+    *_, closing = given.json_objects()
+    assert closing["track"]["reason"] == track.reason != ""
+    assert (closing["track"]["dwells"], closing["track"]["used"]) == (4, 3)
+
+
+@pytest.mark.parametrize("given", [(["uav"], [[0.8, 0.1, 0.1]]), ([0.8, 0.1, 0.1], ["uav"]), ([[0.8, 0.2]], ["uav"])])
+def test_labels_in_the_place_of_probabilities_are_told_as_such(given):
+    said = r"^probabilities (\S+ )*must be numbers of shape \(dwells, 3\): labels come second$"
+    with pytest.raises(BadInput, match=said):
+        fused(*given)
+
+
+def test_labels_of_other_dwells_are_refused():
+    with pytest.raises(BadInput, match=r"^labels \(2,\) must have shape \(1,\), one for each dwell$"):
+        fused([[0.8, 0.1, 0.1]], ["uav", "uav"])
