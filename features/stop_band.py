@@ -15,7 +15,7 @@ from .lines import squared
 from .spectrum import Spectrum
 
 #: Each side is looked at in so many blocks of neighbouring bins, or in fewer of so many bins, but no fewer than this.
-MOST_BLOCKS, LEAST_BINS, LEAST_BLOCKS = 32, 16, 16
+MOST_BLOCKS, LEAST_BINS, LEAST_BLOCKS = 32, 8, 15
 
 #: Beyond the band the power is less by this factor than in so many blocks within, from the next but so many inwards.
 DROP, WITHIN, NEXT = 200.0, 3, 3
@@ -89,7 +89,7 @@ def filled_ends(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray[
 
 
 def _end_of_noise(blocks: NDArray[np.float32]) -> tuple[int, float]:
-    """How many blocks of both sides, shape (2, blocks, bins), a filter passes, and the noise there; 0 where none ends."""
+    """How many blocks of both sides, shape (2, blocks, bins), a filter passes, and the noise there; 0 if none ends."""
     mean = means(blocks)
     most, least = mean.max(axis=0), mean.min(axis=0)
     beyond = np.maximum.accumulate(most[::-1])[::-1]  # the most there is from each block outwards

@@ -46,8 +46,6 @@ from .pictures import PICTURES
 from .series import EIGHT_BITS, LADDER
 from .settings import ReportConfig, report_config
 
-#: Name of the default model with its products in eight bits, which is not shipped.
-
 # The paper's measured radar: X band, PRF 20 to 30 kHz, 80 ms.
 REFERENCE = Radar(carrier_hz=9.85e9, prf_hz=25e3, pulses=2000)
 # Purpose of the records that are timed, weighed and shown: apart from those that are scored.
