@@ -15,7 +15,7 @@ from .lines import squared
 from .spectrum import Spectrum
 
 #: Each side is looked at in so many blocks of neighbouring bins, or in fewer of so many bins, but no fewer than this.
-MOST_BLOCKS, LEAST_BINS, LEAST_BLOCKS = 32, 8, 15
+MOST_BLOCKS, LEAST_BINS, LEAST_BLOCKS = 32, 8, 24
 
 #: Beyond the band the power is less by this factor than in so many blocks within, from the next but so many inwards.
 DROP, WITHIN, NEXT = 200.0, 3, 3
