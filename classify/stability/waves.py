@@ -67,7 +67,7 @@ def _phases() -> Iterator[Cell]:
         1e-3,
         _PHASE_GUARD,
         lambda a: _phase_error(straight_path(np.linspace(0, 60, 9), 12.3, a), _CARRIER_HZ),
-        "{:g} m/s^2".format,
+        "{:g} m/s²".format,
     )
     unambiguous = SPEED_OF_LIGHT_MPS / _CARRIER_HZ * _PRF_HZ / 4
     yield from sweep(
@@ -145,7 +145,7 @@ def _blades() -> Iterator[Cell]:
         limit,
         "sin(x)/x = 1 where no phase is left: the echo stands still",
         lambda beta: _blade_error(beta_rad=beta),
-        lambda beta: f"{np.rad2deg(beta):.9g} degrees",
+        lambda beta: f"{np.rad2deg(beta):.9g}°",
     )
     yield from sweep(
         stage,
@@ -203,7 +203,7 @@ def _lines(quick: bool) -> Iterator[Cell]:
         _line_error,
     )
     yield from sweep(
-        "Bessel lines",
+        "Power of Bessel lines",
         "Gamma, whole blade",
         gammas,
         "error of the power of all lines, relative [1]",
