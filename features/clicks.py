@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .dropouts import filled
 from .fast import power_of
 from .lines import squared
 from .samples import scaled, unit_scale
@@ -25,6 +24,9 @@ EMPTY_RISE = 1.1
 #: where a sample alone has so many times the mean power: of noise one in 9 million has.
 LEAST_PULSES, OVER_MEAN = 256, 16.0
 
+#: What a click hid is told by the lines of the record: bins with so many times the median power.
+LINE_POWER = 15.0
+
 #: Largest parts of samples between these have squares that float32 holds; others are looked through in any case.
 _SQUARED = 1e-15, 1e15
 
@@ -43,7 +45,7 @@ def clicks(samples: NDArray[np.complexfloating]) -> NDArray[np.bool_]:
         False throughout where there are none, or nothing but them.
     """
     power = squared(samples)
-    noise = float(np.median(power)) / np.log(2)
+    noise = float(_of_rank(power, 0.5)) / np.log(2)
     beside = np.maximum(np.roll(power, 1), np.roll(power, -1))
     beside[[0, -1]] = np.inf  # the record may have cut a flash there
     found = (power > CLICK_POWER * noise) & (power > CLICK_OVER_BESIDE * beside) & (noise > 0)
@@ -52,7 +54,7 @@ def clicks(samples: NDArray[np.complexfloating]) -> NDArray[np.bool_]:
     if not len(places) or (len(places) > MOST_CLICKS and not _at_random(places, len(samples))):
         return none
     both = np.stack([samples, np.where(found, 0.0, samples)])
-    before, after = np.quantile(squared(fft.fft(both)), 0.25, axis=-1)
+    before, after = _of_rank(squared(fft.fft(both)), 0.25)
     return found if after < EMPTY_RISE * before else none
 
 
@@ -68,9 +70,10 @@ def without_clicks(samples: NDArray[np.complex128]) -> NDArray[np.complex128]:
 
 
 def clicks_filled(iq: NDArray[np.complex64], largest: NDArray[np.float32]) -> NDArray[np.complex64]:
-    """Records with their clicks filled in by what the pulses beside them tell of them, as lost ones are.
+    """Records with what their lines tell of the pulses that clicks hid in their place.
 
-    One click lifts the floor under all of the spectrum: what lies below it is no longer seen.
+    One click lifts the floor under all of the spectrum: what lies below it is no longer seen. An autoregressive law,
+    which fills in lost pulses (`dropouts`), takes thirty times as long.
 
     Parameters
     ----------
@@ -95,15 +98,29 @@ def clicks_filled(iq: NDArray[np.complex64], largest: NDArray[np.float32]) -> ND
     if not np.count_nonzero(maybe):
         return out
     rows = np.flatnonzero(maybe)
-    records = scaled(iq[rows], unit_scale(iq[rows]))
+    scale = unit_scale(iq[rows])
+    records = scaled(iq[rows], scale)
     power = power_of(records)
     row, pulse = np.nonzero(power > OVER_MEAN * power.mean(axis=1, keepdims=True))
     beside = np.maximum(power[row, pulse - 1], power[row, (pulse + 1) % pulses])
     for index in np.unique(row[power[row, pulse] > CLICK_OVER_BESIDE * beside]):
         if (found := clicks(records[index])).any():
             out = iq.copy() if out is iq else out
-            out[rows[index]] = filled(iq[rows[index]], found)
+            out[rows[index], found] = _hidden(records[index], found) / scale[index]
     return out
+
+
+def _hidden(record: NDArray[np.complex64], found: NDArray[np.bool_]) -> NDArray[np.complex128]:
+    """What the lines of a record come to at its clicks, shape (clicks,)."""
+    transform = fft.fft(np.where(found, 0, record))
+    power = squared(transform)
+    return np.asarray(fft.ifft(np.where(power > LINE_POWER * _of_rank(power, 0.5), transform, 0))[found], np.complex128)
+
+
+def _of_rank(values: NDArray[np.floating], share: float) -> NDArray[np.floating]:
+    """The value that so large a share of others lies below: a quantile of the library takes five times as long."""
+    rank = round(share * (values.shape[-1] - 1))
+    return np.asarray(np.partition(values, rank, axis=-1)[..., rank])
 
 
 def _at_random(places: NDArray[np.intp], pulses: int) -> bool:

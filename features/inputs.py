@@ -101,9 +101,10 @@ class Dwells:
         radar = {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
         self._given = made_analytic(samples)
         spectrum = doppler_spectrum(self._given, **radar, window=HANN)
-        # of an empty side and of ends that a filter took out no record has both
-        parts = [filled_sides(self._given, spectrum), filled_ends(self._given, spectrum)]
-        rows, filled = (np.concatenate(each) for each in zip(*parts, strict=True))
+        rows, filled = filled_sides(self._given, spectrum)
+        ended, whole = filled_ends(self._given, spectrum)
+        if len(ended):  # no record has an empty side as well
+            rows, filled = np.concatenate([rows, ended]), np.concatenate([filled, whole])
         self._filled = rows, filled
         if len(rows):
             spectrum = spectrum.with_rows(rows, doppler_spectrum(filled, **radar, window=HANN))

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .fast import means
+from .fast import means, sums
 from .lines import squared
 from .spectrum import Spectrum
 
-#: Each side is looked at in so many blocks of neighbouring bins, or in fewer of so many bins, but no fewer than this.
-MOST_BLOCKS, LEAST_BINS, LEAST_BLOCKS = 32, 8, 24
+#: Each side is looked at in 24 to 32 blocks of neighbouring bins, each of as many as tell noise, or of eight at least.
+LEAST_BLOCKS, MOST_BLOCKS, ENOUGH_BINS, LEAST_BINS = 24, 32, 16, 8
 
 #: Beyond the band the power is less by this factor than in so many blocks within, from the next but so many inwards.
 DROP, WITHIN, NEXT = 200.0, 3, 3
@@ -63,19 +63,18 @@ def filled_ends(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray[
         Theirs.
     """
     middle, half = spectrum.bins // 2, (spectrum.bins - 1) // 2
-    size = max(LEAST_BINS, half // MOST_BLOCKS)
-    count = half // size
-    if count < LEAST_BLOCKS:
+    size = max(half // MOST_BLOCKS, min(ENOUGH_BINS, half // LEAST_BLOCKS))
+    if size < LEAST_BINS:
         return _NONE, iq[:0]
-    power = spectrum.relative_power
-
-    def both(first: int, stop: int) -> NDArray[np.float32]:
-        """Mean power of bins so far from the middle, on the lower and on the upper side, shape (2, records)."""
-        sides = power[:, middle - stop + 1 : middle - first + 1], power[:, middle + first : middle + stop]
-        return np.stack([means(side) for side in sides])
+    count, power = half // size, spectrum.relative_power
 
     # most records have noise at the ends that is no less than further in: they are not looked at more closely
-    low = both(half // 8, half * 3 // 16).min(axis=0) > DROP * both(half - size, half).max(axis=0)
+    near, far = half // 8, half * 3 // 16
+    within = np.minimum(sums(power[:, middle - far : middle - near]), sums(power[:, middle + near : middle + far]))
+    ends = np.maximum(sums(power[:, middle - half : middle - half + size]), sums(power[:, middle + half - size :]))
+    low = within > np.float32(DROP * (far - near) / size) * ends
+    if not np.count_nonzero(low):
+        return _NONE, iq[:0]
     rows, found = [], []
     for row in map(int, np.flatnonzero(low)):
         sides = power[row, middle - count * size : middle][::-1], power[row, middle + 1 : middle + 1 + count * size]
