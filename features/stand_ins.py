@@ -27,9 +27,10 @@ def stand_ins(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
         Exact zeros are none of them (`dropouts`), nor is what stands at a clipping converter's ends.
     """
     none = np.zeros(len(iq), bool)
-    if not len(iq):
-        return none
     as_one = np.ascontiguousarray(iq).view(np.int64)
+    rising = np.sort(as_one)
+    if not np.any(rising[1:] == rising[:-1]):  # as where samples have no steps: a tenth of the time
+        return none
     values, place, counts = np.unique(as_one, return_inverse=True, return_counts=True)
     inside = iq != 0
     for part in (iq.real, iq.imag):
