@@ -56,7 +56,7 @@ def export_raw_iq(
         and "label", int64 (batch,): the place in (uav, bird, clutter, unknown). A record without signal, or with a
         sample that is not finite, three and more lost pulses (exactly 0, which `Classifier.predict` fills in) or one
         channel alone (which that makes analytic), is unknown with probabilities of 1/3. Pulses that interference hit,
-        which that fills in too, are taken as they are.
+        and ends of the span that a filter took out, which that fills in too, are taken as they are.
     carrier_hz, prf_hz
         Carrier and pulse repetition frequency [Hz] that it is made for.
     pulses
