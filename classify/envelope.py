@@ -27,14 +27,13 @@ def in_kilohertz(prf_hz: float) -> str:
 
 
 def require_hertz(name: str, carrier_hz: float, prf_hz: float) -> None:
-    """Refuse a recording whose carrier or PRF is no radar's, or stands in the other's place.
+    """Refuse a recording whose carrier or PRF is no radar's; one that has them exchanged is never made.
 
     Raises
     ------
     BadInput
         One is.
     """
-    refuse_exchanged(name, carrier_hz, prf_hz)
     if beyond := beyond_radars(carrier_hz, prf_hz):
         raise BadInput(f"{name}: {beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3")
 

@@ -303,16 +303,17 @@ class Classifier:
     ) -> tuple[NDArray[np.float32], NDArray[np.str_], NDArray[np.str_]]:
         """What is told (see `_TOLD`), labels and reasons of (records, pulses) inside the envelope."""
         largest = largest_part(records)
+        records = clicks_filled(records, largest)
         live = largest >= LEAST_PART
         if np.count_nonzero(live) == live.size:
-            told = self._told(clicks_filled(records, largest), None, carrier_hz, prf_hz)
+            told = self._told(records, None, carrier_hz, prf_hz)
             labels, why = self.decide(told[:, :-1])
             return told, labels, np.array(why, dtype=np.str_)
         told, labels = _untold(len(records))
         reasons = np.full(len(records), "no signal: every sample is 0", dtype=object)
         reasons[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
         rows = np.flatnonzero(live)
-        told[rows] = self._told(clicks_filled(records, largest), rows, carrier_hz, prf_hz)
+        told[rows] = self._told(records, rows, carrier_hz, prf_hz)
         labels[rows], reasons[rows] = self.decide(told[rows, :-1])
         return told, labels, reasons.astype(np.str_)
 

@@ -6,7 +6,7 @@ from scipy import fft
 
 from .fast import power_of
 from .lines import squared
-from .samples import scaled, unit_scale
+from .samples import energies, scaled, unit_scale
 
 #: A click: one sample so many times over the noise, and over both beside it; fewer in a record than a rotor's flashes.
 #: A flash is as long as the rotor's band is narrow: its samples beside are as strong.
@@ -26,9 +26,6 @@ LEAST_PULSES, OVER_MEAN = 256, 16.0
 
 #: What a click hid is told by the lines of the record: bins with so many times the median power.
 LINE_POWER = 15.0
-
-#: Largest parts of samples between these have squares that float32 holds; others are looked through in any case.
-_SQUARED = 1e-15, 1e15
 
 
 def clicks(samples: NDArray[np.complexfloating]) -> NDArray[np.bool_]:
@@ -90,10 +87,9 @@ def clicks_filled(iq: NDArray[np.complex64], largest: NDArray[np.float32]) -> ND
     pulses = iq.shape[-1]
     if pulses < LEAST_PULSES:
         return iq
-    parts = np.ascontiguousarray(iq).view(np.float32)
-    with np.errstate(over="ignore", under="ignore"):
-        maybe = 2 * pulses * np.square(largest) > OVER_MEAN * np.vecdot(parts, parts)
-    maybe |= ~((largest > _SQUARED[0]) & (largest < _SQUARED[1]))
+    energy, safe = energies(iq)
+    with np.errstate(over="ignore", under="ignore"):  # of those that are not safe, which are looked through in any case
+        maybe = (2 * pulses * np.square(largest) > OVER_MEAN * energy) | ~safe
     out = iq
     if not np.count_nonzero(maybe):
         return out

@@ -22,15 +22,22 @@ _SEED = 20
 _NONE = np.empty(0, np.intp)
 
 
+@lru_cache(maxsize=32)
+def noise_transform(pulses: int, seed: int) -> NDArray[np.complex128]:
+    """The transform of white noise of unit power a sample, the same for all records of so many pulses, read-only."""
+    out = np.random.default_rng((seed, pulses)).standard_normal((pulses, 2)).view(np.complex128)[:, 0]
+    out *= np.sqrt(pulses / 2)
+    out.flags.writeable = False
+    return out
+
+
 @lru_cache(maxsize=16)
 def side_noise(pulses: int) -> NDArray[np.complex64]:
     """Noise on the lower and on the upper side of the spectrum, mirror images, shape (2, pulses).
 
     As dense there as white noise of unit power a sample.
     """
-    rng = np.random.default_rng((_SEED, pulses))
-    transform = rng.standard_normal((pulses, 2)).view(np.complex128)[:, 0] * np.sqrt(pulses / 2)
-    transform[fft.fftfreq(pulses) <= 0] = 0
+    transform = np.where(fft.fftfreq(pulses) > 0, noise_transform(pulses, _SEED), 0)
     upper = fft.ifft(transform).astype(np.complex64)
     out = np.stack([upper.conj(), upper])
     out.flags.writeable = False

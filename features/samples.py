@@ -122,15 +122,20 @@ def unit_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
     return np.ldexp(np.float32(1), -np.minimum(np.maximum(exponent, -126), 126))
 
 
-def safe_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """`unit_scale` of the records that need it, 1 of the others: it changes no digit, and to scale is a pass more."""
+def energies(iq: NDArray[np.complex64]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Energy of each record, shape (...), and whether float32 holds the squares that it is the sum of."""
     parts = np.ascontiguousarray(iq).view(np.float32)
     with np.errstate(over="ignore", under="ignore"):
         energy = np.vecdot(parts, parts)
     least, most = _SAFE_ENERGY
-    safe = (energy > least) & (energy < most)
-    if np.count_nonzero(safe) == energy.size:
-        return ones(energy.size).reshape(*energy.shape, 1)
+    return energy, np.asarray((energy > least) & (energy < most), np.bool_)
+
+
+def safe_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """`unit_scale` of the records that need it, 1 of the others: it changes no digit, and to scale is a pass more."""
+    _, safe = energies(iq)
+    if np.count_nonzero(safe) == safe.size:
+        return ones(safe.size).reshape(*safe.shape, 1)
     return np.where(safe[..., None], np.float32(1), unit_scale(iq))
 
 

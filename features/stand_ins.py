@@ -31,12 +31,12 @@ def stand_ins(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     rising = np.sort(as_one)
     if not np.any(rising[1:] == rising[:-1]):  # as where samples have no steps: a tenth of the time
         return none
-    values, place, counts = np.unique(as_one, return_inverse=True, return_counts=True)
+    values, counts = np.unique(rising, return_counts=True)
     inside = iq != 0
     for part in (iq.real, iq.imag):
         if part.any():  # or there is one channel
             inside &= (part > part.min()) & (part < part.max())
-    again = (place == counts.argmax()) & inside
+    again = (as_one == values[counts.argmax()]) & inside
     if _stands_out(again, len(values) - 1) and counts.max() >= OFTEN * np.sort(counts)[-2:][0]:
         return again
     # as zeros are judged, what lies from each to the next: a line that turns slowly is nearly alike from pulse to pulse

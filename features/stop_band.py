@@ -4,12 +4,11 @@ What was sampled faster than its filter passes, or resampled, holds noise as far
 both sides alike. Models saw noise end so of rotors alone, and call it UAV, surely (docs/ablation.md).
 """
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .empty_side import noise_transform
 from .fast import means, sums
 from .lines import squared
 from .spectrum import Spectrum
@@ -30,19 +29,10 @@ LEAST_SHARE = 0.25
 #: a share of the band, in the middle of the dwell. Of noise it is 2.
 FLASHES, OUTER_SHARE, MIDDLE = 2.7, 0.5, 0.6
 
-#: Of the noise, which is the same for all records of so many pulses.
+#: Of the noise.
 _SEED = 21
 
 _NONE = np.empty(0, np.intp)
-
-
-@lru_cache(maxsize=16)
-def _noise(pulses: int) -> NDArray[np.complex128]:
-    """The transform of white noise of unit power a sample."""
-    out = np.random.default_rng((_SEED, pulses)).standard_normal((pulses, 2)).view(np.complex128)[:, 0]
-    out *= np.sqrt(pulses / 2)
-    out.flags.writeable = False
-    return out
 
 
 def filled_ends(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray[np.intp], NDArray[np.complex64]]:
@@ -81,7 +71,7 @@ def filled_ends(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray[
         end, level = _end_of_noise(np.stack(sides).reshape(2, count, size))
         if end and not _flashes(spectrum, row, end * size):
             away = np.abs(fft.fftfreq(spectrum.pulses)) * spectrum.bins
-            filling = np.where(away > end * size, _noise(spectrum.pulses), 0)
+            filling = np.where(away > end * size, noise_transform(spectrum.pulses, _SEED), 0)
             rows.append(row)
             found.append(iq[row] + fft.ifft(filling) * np.sqrt(level * spectrum.floor[row]))
     return np.array(rows, np.intp), np.array(found, np.complex64).reshape(len(rows), iq.shape[-1])

@@ -108,9 +108,9 @@ def with_all_lines(data: Periodogram, comb: Comb, blades: int | None) -> Comb:
         fitted = fit_combs(data, fit.centre, [fit.spacing / parts], [reach])
         if fitted is None or (_mirrored(fit, parts, data.pulses) and excess < IMAGE_FACTOR * image):
             return replace(comb, blades_sure=False)
+        (whole,), rest = fitted
         turn = comb.per_turn * parts
-        whole = replace(comb, fit=fitted[0][0], rest=fitted[1], last=comb.last * parts)
-        return replace(whole, per_turn=turn, blades=turn)
+        return replace(comb, fit=whole, rest=rest, last=comb.last * parts, per_turn=turn, blades=turn)
     return comb
 
 
