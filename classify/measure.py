@@ -393,8 +393,7 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
             f"{math.ceil(1e4 * MIN_PULSES / recording.prf_hz) / 1e4:g} or more"
         )
     whole = made_analytic(recording.iq)  # as a whole: dwells made so would each have ends of their own
-    if whole is not recording.iq:  # what is silent stays so
-        iq = np.where(iq.any(axis=-1, keepdims=True), whole[: iq.size].reshape(iq.shape), np.complex64(0))
+    iq = whole[: iq.size].reshape(len(iq), iq.shape[1])
     count, pulses = iq.shape
     radar = {"carrier_hz": recording.carrier_hz, "prf_hz": recording.prf_hz}
     acceleration, acceleration_std, smeared = body_acceleration(iq, **radar)

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .dropouts import keep_within
 from .fast import power_of
 from .lines import squared
 from .samples import energies, scaled, unit_scale
@@ -103,6 +104,7 @@ def clicks_filled(iq: NDArray[np.complex64], largest: NDArray[np.float32]) -> ND
         if (found := clicks(records[index])).any():
             out = iq.copy() if out is iq else out
             out[rows[index], found] = _hidden(records[index], found) / scale[index]
+            keep_within(out[rows[index]], found)
     return out
 
 

@@ -32,7 +32,7 @@ BEYOND_FILLING_IN = "lost pulses: so many are exactly 0 that they cannot be fill
 #: Two truths beside each other, as one number.
 _TWO_TRUE = np.array([True, True]).view(np.uint16)
 
-#: Fewer sizes that differ are a converter's that hardly steps at all: it gives 0 most of the time.
+#: Fewer sizes that differ are a converter's that hardly steps at all: it may give 0 most of the time.
 LEAST_DISTINCT = 8
 
 #: A converter's steps that were turned in phase, or whose channels were set right, show about 0 alone: several of the
@@ -190,9 +190,24 @@ def _silences(iq: NDArray[np.complex64]) -> tuple[NDArray[np.intp], NDArray[np.i
     zero = _zeros(iq)
     starts, lengths = _runs(zero)
     long = lengths > MOST_IN_A_ROW
-    if lengths.max(initial=0) == len(iq) or (long.any() and _hardly_steps(*_sorted_steps(_sizes(iq)[~zero]))):
-        long[:] = False  # what hardly steps is often 0
+    if lengths.max(initial=0) == len(iq):
+        long[:] = False
+    elif long.any() and _hardly_steps(*_sorted_steps(_sizes(iq)[~zero])):
+        # what hardly steps is often 0: so long in a row by chance, by how often it is elsewhere?
+        others = len(iq) - int(lengths[long].sum())
+        share = int(lengths[~long].sum()) / others
+        if others < LEAST_DISTINCT or others * share**MOST_IN_A_ROW > CHANCE:
+            long[:] = False
     return starts[long], lengths[long]
+
+
+def silent(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
+    """Where samples of one record are of a run of zeros that is too long to be filled in, shape (pulses,)."""
+    out = np.zeros(len(iq), bool)
+    starts, lengths = _silences(iq)
+    for start, length in zip(starts, lengths, strict=True):
+        out[start : start + length] = True
+    return out
 
 
 def longest_silence(iq: NDArray[np.complex64]) -> tuple[int, int]:
@@ -230,8 +245,8 @@ def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.com
 
     By the law by which each pulse of a block follows from those beside it (an autoregressive one, fitted forwards and
     backwards), those that are missing are what leaves the least of it unexplained: exact for a few lines, and of noise
-    next to nothing, so that they draw no line of their own. Nor is I or Q beyond what it is elsewhere: a converter that
-    clipped does so there too, and a channel that is the same in every pulse stays so.
+    next to nothing, so that they draw no line of their own. Nor is I or Q beyond what it is elsewhere (`keep_within`):
+    a converter that clipped does so there too, and a channel that is the same in every pulse stays so.
 
     Parameters
     ----------
@@ -258,12 +273,26 @@ def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.com
                 start = max(block[0] - 2 * MOST_ORDERS, 0)
                 part = slice(start, block[-1] + 1 + 2 * MOST_ORDERS)
                 out[block[own]] = _filled_block(iq[part].astype(np.complex128), lost[part])[block[own] - start]
-    for found, given in ((out.real, iq.real[~lost]), (out.imag, iq.imag[~lost])):
-        found[lost] = np.clip(found[lost], given.min(), given.max())
-    for sign in (1, -1):  # of one channel in both, to the bit
-        if (iq.real[~lost] == sign * iq.imag[~lost]).all():
-            out.imag[lost] = sign * out.real[lost]
+    keep_within(out, lost)
     return out
+
+
+def keep_within(iq: NDArray[np.complex64], filled_in: NDArray[np.bool_]) -> None:
+    """Hold what was filled in, in place, to what I and Q are elsewhere; one channel stays that, to the bit.
+
+    Parameters
+    ----------
+    iq
+        Samples of one record, shape (pulses,), finite.
+    filled_in
+        Which of them, same shape; not all.
+    """
+    for part in (iq.real, iq.imag):
+        given = part[~filled_in]
+        part[filled_in] = np.clip(part[filled_in], given.min(), given.max())
+    for sign in (1, -1):
+        if (iq.real[~filled_in] == sign * iq.imag[~filled_in]).all():
+            iq.imag[filled_in] = sign * iq.real[filled_in]
 
 
 def _filled_block(iq: NDArray[np.complex128], lost: NDArray[np.bool_]) -> NDArray[np.complex128]:

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .dropouts import silent
 from .spectrum import doppler_spectrum
 
 #: A side of the spectrum so far below the noise of the other is empty; one bin in so many does not count at either end.
@@ -33,7 +34,8 @@ def varies(part: NDArray[np.float32]) -> NDArray[np.bool_]:
 def made_analytic(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
     """Records of one channel without the other side of their spectrum, all others as they are: same shape.
 
-    What holds no noise at all was never recorded: two equal blades at rest give such a record, of which I is all.
+    What is silent stays so. What holds no noise at all was never recorded: two equal blades at rest give such a record,
+    of which I is all.
     """
     first, last = iq[..., 0], iq[..., -1]
     # few records are looked at further than these two pulses
@@ -47,7 +49,9 @@ def made_analytic(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
         return iq
     made, some = iq.copy(), iq[one]
     channel = np.where(varies(some.real)[:, None], some.real, some.imag)
-    made.real[one], made.imag[one] = channel, _quadrature(channel)
+    quadrature = _quadrature(channel)
+    quadrature[np.stack([silent(record) for record in some])] = 0
+    made.real[one], made.imag[one] = channel, quadrature
     return made
 
 

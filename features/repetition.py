@@ -59,8 +59,6 @@ class Repetition:
         What is left at the rate's multiples beside the common course, over what chance leaves [standard deviations].
     moving_share : float
         Share of the repeating pattern that is no common course of all velocities, 0..1.
-    share : float
-        Share of the cells' fluctuation that repeats, 0..1.
     cells : ndarray of bool, shape (cells,)
         Where the pattern repeats.
     """
@@ -69,7 +67,6 @@ class Repetition:
     rate_hz_std: float
     evidence: float
     moving_share: float
-    share: float
     cells: NDArray[np.bool_]
 
 
@@ -205,7 +202,7 @@ def repetition(levels: LevelSpectrum, low_hz: float, high_hz: float) -> Repetiti
         (power - 1).sum(axis=0) > max(limit, 0.03 * (power - 1).sum(axis=0).max())
     )
     rate, std = _refined(levels, float(rates[chosen]), multiples, cells)
-    return Repetition(rate, std, float(best[chosen]), _moving_share(levels, place), _share(levels, power), cells)
+    return Repetition(rate, std, float(best[chosen]), _moving_share(levels, place), cells)
 
 
 def while_moving(levels: LevelSpectrum, found: Repetition) -> tuple[float, float]:
@@ -244,13 +241,6 @@ def _moving_share(levels: LevelSpectrum, place: NDArray[np.intp]) -> float:
     noise = levels.weight.sum() * len(place)
     over = strength[1:].sum() - noise * (number - 1) / number
     return float(np.clip(over / max(strength.sum() - noise, 1e-9), 0, 1))
-
-
-def _share(levels: LevelSpectrum, power: NDArray[np.float64]) -> float:
-    """Share of the weighted fluctuation that lies at the multiples."""
-    resolution = 1.5 * _PADDING  # the taper's noise bandwidth, in steps
-    repeats = float(((power - 1) @ levels.weight).sum()) * resolution
-    return float(np.clip(repeats / (repeats + len(levels.whole) * levels.weight.sum()), 0, 1)) if repeats > 0 else 0.0
 
 
 def _refined(

@@ -60,8 +60,6 @@ class Wingbeat:
     ----------
     wingbeat_hz, wingbeat_hz_std : ndarray of float64, shape (...)
         Wingbeat rate [Hz], while the wings beat: of a bird that glides or bounds in between less well known.
-    repeat : ndarray of float64, shape (...)
-        Share of the pattern's fluctuation that repeats, 0..1.
     velocity_mps : ndarray of float64, shape (...)
         Radial velocity of the body in the middle of the recording [m/s].
     acceleration_mps2, acceleration_mps2_std : ndarray of float64, shape (...)
@@ -72,7 +70,6 @@ class Wingbeat:
 
     wingbeat_hz: NDArray[np.float64]
     wingbeat_hz_std: NDArray[np.float64]
-    repeat: NDArray[np.float64]
     velocity_mps: NDArray[np.float64]
     acceleration_mps2: NDArray[np.float64]
     acceleration_mps2_std: NDArray[np.float64]
@@ -127,7 +124,7 @@ def wingbeat(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: floa
 
 def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     """The fields of `Wingbeat` of one recording."""
-    nothing = (np.nan,) * 6
+    nothing = (np.nan,) * 5
     if len(iq) < LEAST_S * prf_hz:
         return (*nothing, f"no wingbeat: {len(iq) / prf_hz:.2g} s, less than {LEAST_S:g} s")
     if not iq.any():
@@ -155,17 +152,17 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     velocities = velocity - frames.frequency_hz * wavelength_m / 2
     near = np.abs(velocities - velocity) <= WING_MPS
     if near.sum() < LEAST_CELLS:  # the frames are too short for so long a wave
-        return (np.nan, np.nan, np.nan, *body, "no wingbeat: wings are slower than this carrier tells apart")
+        return (np.nan, np.nan, *body, "no wingbeat: wings are slower than this carrier tells apart")
     levels = level_spectrum(frames.power[:, near], floor, frames.frame_rate_hz, HIGHEST_HZ)
     if levels is None:
-        return (np.nan, np.nan, np.nan, *body, "no wingbeat: nothing moves")
+        return (np.nan, np.nan, *body, "no wingbeat: nothing moves")
     found = repetition(levels, WINGBEAT_RANGE_HZ[0] - SLOWER_HZ, WINGBEAT_RANGE_HZ[1])
     far = level_spectrum(frames.power[:, ~near], floor, frames.frame_rate_hz, HIGHEST_HZ)
     motion = _motion(found, frames.power[:, near], floor, velocities[near], velocity, frames.frame_rate_hz)
     reason = _not_wings(found, velocity, motion, far)
     if reason:
-        return (np.nan, np.nan, found.share, *body, f"no wingbeat: {reason}")
-    return (*while_moving(levels, found), found.share, *body, "")
+        return (np.nan, np.nan, *body, f"no wingbeat: {reason}")
+    return (*while_moving(levels, found), *body, "")
 
 
 def _motion(

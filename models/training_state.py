@@ -85,7 +85,7 @@ class Work:
         Raises
         ------
         ForeignSnapshot
-            It is not of a training with this network, these epochs and this kind of device.
+            It is not of a training with this network and so many epochs.
         """
         columns = {name: values for name, values in snapshot.items() if name.startswith(_HISTORY)}
         told = {_HISTORY + "validation_loss", _HISTORY + "seconds"} <= columns.keys()

@@ -14,8 +14,8 @@
 ``cost``             threads, and one entry a batch size: see `cost.time_chain`
 ``trade``            accuracy against cost, the front and the budgets: see `trade.weigh_up`
 ``front``            every choice of picture, model and dwell: see `front.measure_front`
-``fft_against_stft`` one a record length: see `stft.time_fft_against_stft`
-``time_law``         time against operations: see `stft.time_law`
+``fft_against_stft`` one a record length: see `fft_against_stft.time_fft_against_stft`
+``time_law``         time against operations: see `fft_against_stft.time_law`
 ``storage``          one a form of a record: see `storage.weigh`
 ``examples``         one a class: see `examples.show_examples`
 ``stft_pictures``    the paper's four STFTs: see `examples.show_stfts`

@@ -13,8 +13,8 @@ from bladewing.features.spectrum import doppler_spectrum
 from bladewing.simulate import Radar, Records, draw_records
 from numpy.typing import NDArray
 
+from .fft_against_stft import STFT_BINS, frames, stft
 from .pictures import STFT_SETTINGS
-from .stft import STFT_BINS, frames, stft
 
 # The paper's middle window [samples] and its largest overlap.
 WINDOW, OVERLAP = STFT_SETTINGS[0]

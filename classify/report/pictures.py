@@ -21,7 +21,7 @@ from bladewing.features.window import HANN
 from bladewing.simulate import Radar
 from numpy.typing import NDArray
 
-from .stft import STFT_BINS, frames, transformed
+from .fft_against_stft import STFT_BINS, frames, transformed
 
 #: The four STFTs of the paper that are pictured and weighed: window [samples], overlap.
 STFT_SETTINGS = ((80, 0.9), (200, 0.9), (20, 0.9), (80, 0.5))

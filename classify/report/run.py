@@ -34,11 +34,12 @@ from ..parts import REPORT_PARTS, Parts
 from ..progress import Progress
 from ..stability.run import worst_of_each
 from ..training_config import TrainingConfig
-from . import cost, evaluate, scores, stft, storage, trade
+from . import cost, evaluate, fft_against_stft, scores, storage, trade
 from .card import model_card
 from .choices import FEATURES, classifier_of
 from .examples import OVERLAP, WINDOW, draw_examples, show_stfts
 from .families import left_out
+from .fft_against_stft import stft
 from .front import Given, measure_front
 from .machine import describe_machine
 from .page import SCHEMA_VERSION, draw_page
@@ -114,8 +115,8 @@ def measured_report(
     def transforms() -> dict[str, Any]:
         effort: dict[str, Any] = {"seed": config.seed, "seconds": config.stft_s, "least_rounds": config.repeats}
         with progress.phase("Timing FFT against STFT", 1.0) as done:
-            against = stft.time_fft_against_stft(**effort, on_share=lambda share: done(0.8 * share))
-            law = stft.time_law(against, **effort, on_share=lambda share: done(0.8 + 0.2 * share))
+            against = fft_against_stft.time_fft_against_stft(**effort, on_share=lambda share: done(0.8 * share))
+            law = fft_against_stft.time_law(against, **effort, on_share=lambda share: done(0.8 + 0.2 * share))
         return {"against": against, "law": law}
 
     def tables() -> dict[str, Any]:
@@ -183,7 +184,7 @@ def _forms(reference: Records) -> dict[str, NDArray[np.generic]]:
     carrier_hz, prf_hz = REFERENCE.carrier_hz, REFERENCE.prf_hz
     forms: dict[str, NDArray[np.generic]] = {"raw IQ": reference.iq}
     forms |= model_inputs(reference.iq, carrier_hz=carrier_hz, prf_hz=prf_hz, names=tuple(INPUT_SHAPES))
-    forms["STFT, complex"] = np.stack([stft.stft(one, window=WINDOW, overlap=OVERLAP) for one in reference.iq[:16]])
+    forms["STFT, complex"] = np.stack([stft(one, window=WINDOW, overlap=OVERLAP) for one in reference.iq[:16]])
     return forms
 
 

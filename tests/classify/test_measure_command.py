@@ -615,3 +615,16 @@ def test_silent_dwells_of_one_channel_hold_no_signal(tmp_path, capsys):
     dwells = [json.loads(line) for line in capsys.readouterr().out.splitlines()][:-1]
     assert [dwell["reason"] for dwell in dwells] == [None, "no signal", None]
     assert dwells[1]["body_velocity_mps"] is None
+
+
+@pytest.mark.parametrize("of", [np.asarray, np.real], ids=["I and Q", "I"])
+def test_silences_within_the_dwells_are_no_comb_whatever_the_channels(tmp_path, capsys, of):
+    """Made analytic as a whole, one channel held tails in them, and the holes were a rotor's flashes."""
+    rng = np.random.default_rng(0)
+    iq = of(10 * np.exp(0.3j * np.arange(14_000)) + white(rng, 14_000)) + 0j
+    iq[np.arange(14_000) % 250 < 50] = 0
+    np.save(tmp_path / "holes.npy", iq.astype(np.complex64))
+    assert main(["measure", str(tmp_path / "holes.npy"), *RADAR, "--dwell", "0.08", "--json"]) == 0
+    *dwells, closing = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [dwell["chopping_hz"] for dwell in dwells] == [None] * 5
+    assert closing["recording"]["with_comb"] == 0

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.fft
-from bladewing.classify.report import front, pictures, stft
+from bladewing.classify.report import fft_against_stft as against_stft
+from bladewing.classify.report import front, pictures
 from bladewing.classify.report.detection_bound import detection_bound
 from bladewing.classify.report.memory import peak_bytes
 from bladewing.classify.report.operations import counted_transforms, network_operations
@@ -86,9 +87,9 @@ def test_a_comb_is_one_peak_of_the_cepstrogram_at_its_period() -> None:
 @pytest.mark.parametrize(("window", "overlap"), pictures.STFT_SETTINGS)
 def test_a_pooled_stft_keeps_the_power_of_the_whole_one(window: int, overlap: float) -> None:
     iq = noise(1, 2000)[0]
-    whole = np.abs(stft.stft(iq, window=window, overlap=overlap)) ** 2
-    pooled = pictures._pooled_power(stft.frames(iq, window=window, overlap=overlap))
-    assert pooled.shape == (pictures.IMAGE_FRAMES, stft.STFT_BINS)
+    whole = np.abs(against_stft.stft(iq, window=window, overlap=overlap)) ** 2
+    pooled = pictures._pooled_power(against_stft.frames(iq, window=window, overlap=overlap))
+    assert pooled.shape == (pictures.IMAGE_FRAMES, against_stft.STFT_BINS)
     starts = np.arange(pictures.IMAGE_FRAMES) * len(whole) // pictures.IMAGE_FRAMES
     expected = [part.mean(axis=0) for part in np.split(whole, starts[1:])]
     np.testing.assert_allclose(pooled, expected, rtol=2e-4, atol=1e-4 * whole.max())
@@ -344,7 +345,7 @@ def test_time_to_declare_is_the_first_dwell_that_finds_enough() -> None:
 
 def test_law_is_found_again_from_times_that_follow_it() -> None:
     points = [{"operations": n, "time_us": 4.0 + 2e-4 * n} for n in (1e3, 1e4, 1e5, 1e6)]
-    found = stft._fitted(copy.deepcopy(points))
+    found = against_stft._fitted(copy.deepcopy(points))
     assert (found["call_us"], found["ns_each"]) == pytest.approx((4.0, 0.2))
     assert found["worst_factor"] == pytest.approx(1.0)
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from bladewing.features.clicks import LEAST_PULSES, clicks_filled
+from bladewing.features.one_channel import one_channel
 from bladewing.features.samples import largest_part
 
 from .signals import white
@@ -33,6 +34,17 @@ def test_a_pulse_that_interference_hit_is_filled_in(times: float, gain: complex)
     np.testing.assert_array_equal(out[1, rest], given[1, rest])
     assert np.abs(out[1, PLACES] / gain - whole[PLACES]).max() < 4.0  # the line is there again
     np.testing.assert_array_equal(filled_in(given[1:2])[0], out[1])  # each as if it were alone
+
+
+@pytest.mark.parametrize("turn", [1.0, 1j, 1 + 1j, 1 - 1j])
+def test_one_channel_that_a_pulse_hit_stays_one(turn: complex) -> None:
+    """What was filled in left rounding in the other, and both sides of the spectrum were believed."""
+    hit = noise(1).real + 8 * np.cos(0.2 * np.arange(2000)).astype(np.float32)
+    hit[PLACES] += 200
+    given = (hit * np.complex64(turn)).astype(np.complex64)
+    found = filled_in(given[None])
+    assert np.abs(found).max() < 20
+    assert one_channel(found) == [True]
 
 
 def test_clicks_at_random_times_are_filled_in_and_flashes_are_not() -> None:

@@ -11,8 +11,10 @@ from bladewing.features.dropouts import (
     LEAST_DISTINCT,
     MOST_IN_A_ROW,
     filled,
+    longest_silence,
     lost_pulses,
     mended,
+    silent,
     unbroken,
 )
 from bladewing.features.one_channel import one_channel
@@ -140,6 +142,26 @@ def test_what_is_left_is_the_longest_stretch_without_a_silence(pieces: list[tupl
     if not lost_pulses(iq).any():  # or they would be filled in first
         _, stretches = mended(np.stack([iq, noise(np.random.default_rng(2), len(iq))]))
         assert stretches == ({} if found == slice(0, len(iq)) else {(0,): found})
+
+
+@pytest.mark.parametrize(("steps", "is_silence"), [(0.4, False), (0.55, False), (0.8, True), (2.0, True)])
+def test_long_zeros_of_a_converter_of_few_steps_are_a_silence_where_it_is_hardly_ever_0(steps, is_silence) -> None:
+    """Of any such converter they passed for its own: judged with holes in it, a line was a rotor's comb."""
+    rng = np.random.default_rng(7)
+    codes = np.round(np.clip(steps * noise(rng, 20_000).view(np.float32), -3, 3)).view(np.complex64)
+    assert unbroken(codes) == slice(0, 20_000)
+    gated = np.where(np.arange(20_000) % 160 < 40, 0, codes)
+    assert (longest_silence(gated)[1] >= 40) == is_silence
+    assert silent(gated).any() == is_silence
+    assert not gated[silent(gated)].any()
+
+
+def test_holes_in_a_line_of_few_steps_are_no_rotor() -> None:
+    line = 0.4 * np.sqrt(2) * noise(np.random.default_rng(0), 10_000) + 2.2 * np.exp(0.08j * np.arange(10_000))
+    codes = np.round(line.astype(np.complex64).view(np.float32)).view(np.complex64)
+    for every, gone in ((250, 60), (160, 40), (400, 100)):
+        gated = np.where(np.arange(10_000) % every < gone, 0, codes).astype(np.complex64).reshape(5, 2000)
+        assert np.isnan(measure(gated, carrier_hz=CARRIER_HZ, prf_hz=25e3).chopping_hz).all()
 
 
 def test_a_record_that_a_silence_breaks_is_measured_by_its_longest_stretch() -> None:

@@ -142,6 +142,16 @@ def test_one_channel_in_both_parts_is_read_as_that_channel_whichever_sign_they_h
     np.testing.assert_array_equal(made_analytic(iq * np.complex64(both)), both.real * wanted)
 
 
+def test_what_is_silent_of_one_channel_stays_so():
+    """The tails of what was beside it stood there, and nothing found the silence any more."""
+    channel = white(np.random.default_rng(9), 2 * PULSES).real.astype(np.complex64).reshape(2, PULSES)
+    channel[0, 500:600] = channel[1, :100] = 0
+    made = made_analytic(channel)
+    for given, found in zip(channel, made, strict=True):
+        np.testing.assert_array_equal(found == 0, given == 0)
+        np.testing.assert_array_equal(made_analytic(given), found)
+
+
 def test_one_channel_at_the_ends_of_float32_is_made_analytic_without_infinities():
     """What is a quarter of a turn behind a jump stands higher than the jump."""
     jumps = 3.4e38 * np.sign(white(np.random.default_rng(8), 4000).real).repeat(5)
