@@ -137,7 +137,7 @@ def _whole_graph(
     judged = after.where(live.on(after), Value(after, f"{IQ}_model_probabilities", np.float32), 1 / len(CLASSES))
     after.name(judged, "probabilities")
     best = judged.argmax()
-    least = after.constant(classifier.accept, np.float64).take_rows(best)
+    least = after.constant(classifier.rules.of(pulses).accept, np.float64).take_rows(best)
     accepted = (judged.max().to(np.float64) >= least) & live.on(after)
     label = after.where(accepted, best, np.array(len(CLASSES)))
     after.name(label.squeeze(), "label")
@@ -173,7 +173,7 @@ def _sealed(
     metadata = {key: value for key, value in classifier.metadata.items() if key not in (SEAL_KEY, "inputs")}
     metadata |= {
         "product": EXPORTED,
-        "accept": json.dumps(classifier.accept),
+        "accept": json.dumps(classifier.rules.of(pulses).accept),
         "labels": json.dumps([*CLASSES, UNKNOWN]),
         "carrier_hz": repr(carrier_hz),
         "prf_hz": repr(prf_hz),

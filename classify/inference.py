@@ -35,7 +35,9 @@ from .model_file import (
     point_of_curve,
     prediction_sets,
     read_model,
+    rules_by_pulses,
 )
+from .rules import Limits, Rule, Rules
 from .samples import complex_samples, positive
 
 # One step of the work: bounded in records and in samples, so that memory stays flat however large the batch is.
@@ -108,8 +110,10 @@ class Classifier:
     envelope
         The radars it answers for.
     accept
-        Least probability at which each class is named; under a `coverage` without effect, but for that of "uav" where
-        `max_false_alarm` set it.
+        Least probability at which each class is named whatever the number of pulses, as of a track; under a `coverage`
+        without effect, but for that of "uav" where `max_false_alarm` set it.
+    rules
+        The same of a record, by how many pulses it has.
     inputs
         Names of the inputs it reads, keys of `bladewing.features.schema.INPUT_SHAPES`.
     operating_point
@@ -129,7 +133,8 @@ class Classifier:
     classes: tuple[str, str, str] = CLASSES
     metadata: Mapping[str, str]
     envelope: Envelope
-    accept: tuple[float, float, float]
+    accept: Limits
+    rules: Rules
     inputs: tuple[str, ...]
     operating_point: OperatingPoint | None
     coverage: float | None
@@ -162,11 +167,12 @@ class Classifier:
         self._outputs = ["probabilities", *([KIND_SCORES] if kinds else [])]
         self._noise = place_of_noise(kinds)
         self.operating_point = None
+        self.coverage = coverage
+        sets = {} if coverage is None else {coverage: prediction_sets(self.metadata, coverage, source)}
+        self._of_all = Rule(1, self.accept, sets)
+        self.rules = rules_by_pulses(self.metadata, self._of_all, source)
         if max_false_alarm is not None:
             self._keep_to(max_false_alarm, source)
-        self.coverage = coverage
-        if coverage is not None:
-            self._sets_hold = prediction_sets(self.metadata, coverage, source)
 
     @classmethod
     def load(
@@ -225,21 +231,33 @@ class Classifier:
     def _keep_to(self, max_false_alarm: float, source: str, models: int = 1) -> OperatingPoint:
         """Choose the threshold on "uav" for a false-alarm rate that so many models share."""
         self.operating_point = point = point_of_curve(self.metadata, max_false_alarm, source, models)
-        self.accept = (point.threshold, *self.accept[1:])
+        self._of_all = self._of_all.naming_uav_from(point.threshold)
+        self.accept = self._of_all.accept
+        self.rules = self.rules.naming_uav_from(point.threshold)
         return point
 
-    def decide(self, probabilities: NDArray[np.floating]) -> tuple[NDArray[np.str_], list[str]]:
+    def decide(
+        self, probabilities: NDArray[np.floating], pulses: int | NDArray[np.integer] | None = None
+    ) -> tuple[NDArray[np.str_], list[str]]:
         """Name a class or say "unknown", and why, by the rule that this classifier was loaded with.
 
         Parameters
         ----------
         probabilities
             Shape (records, 3), as `predict` gives them.
+        pulses
+            Of all records or of each, shape (records,); None where they have no such number, as a track.
         """
+        limits: Limits | NDArray[np.float64]
+        if pulses is None or isinstance(pulses, int):
+            rule = self._of_all if pulses is None else self.rules.of(pulses)
+            limits = rule.accept if self.coverage is None else rule.sets[self.coverage]
+        else:
+            limits = self.rules.accept(pulses) if self.coverage is None else self.rules.sets(pulses, self.coverage)
         if self.coverage is not None:
             least_uav = self.operating_point.threshold if self.operating_point else None
-            return decide_by_sets(probabilities, self._sets_hold, self.coverage, least_uav)
-        return decide(probabilities, self.accept)
+            return decide_by_sets(probabilities, limits, self.coverage, least_uav)
+        return decide(probabilities, limits)
 
     def predict(self, iq: ArrayLike, *, carrier_hz: float, prf_hz: float) -> Prediction:
         """Tell UAV, bird and clutter apart.
@@ -307,14 +325,14 @@ class Classifier:
         live = largest >= LEAST_PART
         if np.count_nonzero(live) == live.size:
             told = self._told(records, None, carrier_hz, prf_hz)
-            labels, why = self.decide(told[:, :-1])
+            labels, why = self.decide(told[:, :-1], records.shape[-1])
             return told, labels, np.array(why, dtype=np.str_)
         told, labels = _untold(len(records))
         reasons = np.full(len(records), "no signal: every sample is 0", dtype=object)
         reasons[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
         rows = np.flatnonzero(live)
         told[rows] = self._told(records, rows, carrier_hz, prf_hz)
-        labels[rows], reasons[rows] = self.decide(told[rows, :-1])
+        labels[rows], reasons[rows] = self.decide(told[rows, :-1], records.shape[-1])
         return told, labels, reasons.astype(np.str_)
 
     def _of_stretches(

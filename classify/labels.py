@@ -11,7 +11,9 @@ UNKNOWN = "unknown"
 _LABEL = np.array([*CLASSES, UNKNOWN]).dtype
 
 
-def decide(probabilities: NDArray[np.floating], accept: Sequence[float]) -> tuple[NDArray[np.str_], list[str]]:
+def decide(
+    probabilities: NDArray[np.floating], accept: Sequence[float] | NDArray[np.floating]
+) -> tuple[NDArray[np.str_], list[str]]:
     """Name the most probable class, or say "unknown" where it is not probable enough.
 
     Parameters
@@ -19,7 +21,7 @@ def decide(probabilities: NDArray[np.floating], accept: Sequence[float]) -> tupl
     probabilities
         Shape (records, 3), order `CLASSES`.
     accept
-        Least probability at which each class is named, order `CLASSES`.
+        Least probability at which each class is named, order `CLASSES`: of all records, or an array of (records, 3).
 
     Returns
     -------
@@ -29,15 +31,19 @@ def decide(probabilities: NDArray[np.floating], accept: Sequence[float]) -> tupl
         Why a record is "unknown"; "" where it is named.
     """
     labels, reasons = [], []
-    for row, best in zip(probabilities.tolist(), probabilities.argmax(axis=-1).tolist(), strict=True):
-        named = row[best] >= accept[best]
+    winners = probabilities.argmax(axis=-1).tolist()
+    for row, best, least in zip(probabilities.tolist(), winners, _of_each(accept, len(winners)), strict=True):
+        named = row[best] >= least[best]
         labels.append(CLASSES[best] if named else UNKNOWN)
-        reasons.append("" if named else f"not sure: best {_below(CLASSES[best], row[best], accept[best])}")
+        reasons.append("" if named else f"not sure: best {_below(CLASSES[best], row[best], least[best])}")
     return np.array(labels, _LABEL), reasons
 
 
 def decide_by_sets(
-    probabilities: NDArray[np.floating], limits: Sequence[float], coverage: float, least_uav: float | None = None
+    probabilities: NDArray[np.floating],
+    limits: Sequence[float] | NDArray[np.floating],
+    coverage: float,
+    least_uav: float | None = None,
 ) -> tuple[NDArray[np.str_], list[str]]:
     """Name the class that a prediction set holds alone, or say "unknown" where it holds several or none.
 
@@ -46,7 +52,7 @@ def decide_by_sets(
     probabilities
         Shape (records, 3), order `CLASSES`.
     limits
-        Least probability at which the set holds each class, order `CLASSES`.
+        Least probability at which the set holds each class, order `CLASSES`: of all, or an array of (records, 3).
     coverage
         What the sets promise; the reasons quote it.
     least_uav
@@ -58,8 +64,9 @@ def decide_by_sets(
         As `decide`; the reason names the set, or the probability that was not reached.
     """
     labels, reasons = [], []
-    for row in np.asarray(probabilities, dtype=np.float64).tolist():
-        held = [name for name, p, limit in zip(CLASSES, row, limits, strict=True) if p >= limit]
+    rows = np.asarray(probabilities, dtype=np.float64).tolist()
+    for row, each in zip(rows, _of_each(limits, len(rows)), strict=True):
+        held = [name for name, p, limit in zip(CLASSES, row, each, strict=True) if p >= limit]
         reason = ""
         if len(held) != 1:
             reason = f"not sure: {' or '.join(held) or 'no class is likely'} at coverage {coverage:g}"
@@ -68,6 +75,11 @@ def decide_by_sets(
         labels.append(UNKNOWN if reason else held[0])
         reasons.append(reason)
     return np.array(labels, _LABEL), reasons
+
+
+def _of_each(limits: Sequence[float] | NDArray[np.floating], records: int) -> Sequence[Sequence[float]]:
+    """Limits of each record, of those of all or of each."""
+    return limits.tolist() if isinstance(limits, np.ndarray) else [limits] * records
 
 
 def _below(name: str, value: float, limit: float) -> str:

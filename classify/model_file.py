@@ -18,6 +18,7 @@ from .files import read_bounded
 from .labels import CLASSES
 from .ladder import CASCADE, PLACES, SHIPPED, by_budget, by_place, measured_fft_us, shipped_account
 from .limits import MOST_MODEL_BYTES
+from .rules import Limits, Rule, Rules
 from .samples import positive
 
 CURVE_KEY = "operating_curve"
@@ -25,6 +26,9 @@ CURVE_KEY = "operating_curve"
 
 SETS_KEY = "prediction_sets"
 """Metadata of the thresholds of prediction sets, rows of coverage and one a class; earlier models hold none."""
+
+RULES_KEY = "rules_by_pulses"
+"""Metadata of both by how many pulses a record has (see `rules`); earlier models hold none."""
 
 COVERAGES = (0.8, 0.9, 0.95, 0.98, 0.99)
 """Coverages that a training stores."""
@@ -121,7 +125,7 @@ def open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.In
         raise BadInput(f"{source}: onnxruntime {onnxruntime.__version__} cannot open the model: {error}") from None
 
 
-def checked_metadata(metadata: Mapping[str, str], source: str) -> tuple[Envelope, tuple[float, float, float]]:
+def checked_metadata(metadata: Mapping[str, str], source: str) -> tuple[Envelope, Limits]:
     """Check what a model says of itself against what this version can serve.
 
     Raises
@@ -172,8 +176,27 @@ def point_of_curve(metadata: Mapping[str, str], max_false_alarm: float, source: 
         raise BadInput(f"{source}: {error}") from None
 
 
-def prediction_sets(metadata: Mapping[str, str], coverage: float, source: str) -> tuple[float, ...]:
-    """The thresholds of the model's prediction sets of one coverage.
+def rules_by_pulses(metadata: Mapping[str, str], of_all: Rule, source: str) -> Rules:
+    """The model's rules by how many pulses a record has; that of all records where it holds none.
+
+    Raises
+    ------
+    BadInput
+        It holds damaged ones, or none of the coverages that are wanted.
+    """
+    if RULES_KEY not in metadata:
+        return Rules((of_all,))
+    try:
+        rules = Rules.from_json(metadata[RULES_KEY])
+        if missing := of_all.sets.keys() - rules.each[0].sets.keys():
+            raise ValueError(f"the rules by pulses hold no sets of the coverage {min(missing):g}")
+    except ValueError as error:
+        raise BadInput(f"{source}: damaged metadata: {error}: train it again") from None
+    return rules
+
+
+def prediction_sets(metadata: Mapping[str, str], coverage: float, source: str) -> Limits:
+    """The thresholds of the model's prediction sets of one coverage, of all records.
 
     Raises
     ------
@@ -183,8 +206,9 @@ def prediction_sets(metadata: Mapping[str, str], coverage: float, source: str) -
     if SETS_KEY not in metadata:
         raise BadInput(f"{source}: holds no prediction sets, so no coverage can be chosen: train it again")
     try:
-        rows = {float(row[0]): tuple(map(float, row[1:])) for row in json.loads(metadata[SETS_KEY])}
-        if any(len(limits) != len(CLASSES) or not np.isfinite(limits).all() for limits in rows.values()):
+        held = json.loads(metadata[SETS_KEY])
+        rows = {float(key): (float(uav), float(bird), float(clutter)) for key, uav, bird, clutter in held}
+        if any(not np.isfinite(limits).all() for limits in rows.values()):
             raise ValueError(f"there must be {len(CLASSES)} finite thresholds a coverage")
     except (TypeError, KeyError, IndexError, ValueError, OverflowError, RecursionError) as error:
         raise BadInput(f"{source}: damaged prediction sets: {error}: train it again") from None

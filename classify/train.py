@@ -24,9 +24,10 @@ from .gather import TASK_RECORDS, Gathered, TrainingSets, gather, gather_from, i
 from .inference import Classifier
 from .labels import CLASSES
 from .ladder import ACCOUNT, CASCADE
-from .model_file import COVERAGES, CURVE_KEY, FORMAT, KINDS_KEY, SETS_KEY
+from .model_file import COVERAGES, CURVE_KEY, FORMAT, KINDS_KEY, RULES_KEY, SETS_KEY
 from .parts import TRAIN_PARTS, Parts
 from .progress import Progress
+from .rules import Rule, Rules
 from .train_network import PUPIL_EPOCHS, OnFraction, ScoresOf, Taught, epochs_of, train_net
 from .training_account import covered, figures, print_account
 from .training_config import TrainingConfig, training_config
@@ -218,14 +219,9 @@ def train_one(
 
     A network learns from the answers of its teacher too, where these are given.
     """
-    from bladewing.models.calibration import (
-        acceptance_thresholds,
-        conformal_thresholds,
-        expected_calibration_error,
-        fit_vector_scaling,
-    )
+    from bladewing.models.calibration import expected_calibration_error, fit_vector_scaling
     from bladewing.models.export import NETWORK_TOLERANCE, TABULAR_TOLERANCE, attach_metadata, check_export
-    from bladewing.models.operating import least_named, operating_curve
+    from bladewing.models.operating import operating_curve
     from bladewing.models.seal import seal
 
     started = time.perf_counter()
@@ -235,23 +231,25 @@ def train_one(
     )
     calibration = fit_vector_scaling(scores_of(sets.calibrate), sets.calibrate.labels)
     calibrated = calibration.probabilities(scores_of(sets.calibrate))
-    accept = acceptance_thresholds(calibrated, sets.calibrate.labels, settings.precision)
-    # A false drone is what users complain of: "uav" must also keep the false-alarm rate, however many UAVs it costs.
-    accept[0] = max(accept[0], least_named(calibrated[sets.calibrate.labels != 0, 0], settings.false_alarm))
-    curve = operating_curve(calibrated, sets.calibrate.labels)
-    limits = np.array([conformal_thresholds(calibrated, sets.calibrate.labels, coverage) for coverage in COVERAGES])
+    known, (precision, false_alarm) = (calibrated, sets.calibrate.labels), (settings.precision, settings.false_alarm)
+    of_all = Rule.fitted(*known, precision=precision, false_alarm=false_alarm, coverages=COVERAGES)
+    of_pulses = sets.calibrate.truth["pulses"]
+    rules = Rules.fitted(*known, of_pulses, of_all, precision=precision, false_alarm=false_alarm)
+    curve = operating_curve(*known)
     onnx_bytes = export(calibration)
     probabilities = calibration.probabilities(scores_of(sets.test))
     tolerance = NETWORK_TOLERANCE if network else TABULAR_TOLERANCE
     difference = check_export(onnx_bytes, probabilities, sets.test.inputs, tolerance)
-    labels = sets.test.labels
+    labels, pulses = sets.test.labels, sets.test.truth["pulses"]
+    limits = np.array([rules.sets(pulses, coverage) for coverage in COVERAGES])
     account = {
         "inputs": list(LADDER[name].inputs),
-        "test": figures(probabilities, labels, accept, settings.false_alarm)
+        "test": figures(probabilities, labels, rules.accept(pulses), settings.false_alarm)
         | {"expected_calibration_error": round(expected_calibration_error(probabilities, labels), 4)}
         | {"coverage": [round(share, 4) for share in covered(probabilities, labels, limits)]},
         "calibration": {"scale": float(calibration.scale), "bias": [float(b) for b in calibration.bias]},
-        "accept": [float(limit) for limit in accept],
+        "accept": list(of_all.accept),
+        "accept_by_pulses": [[rule.pulses, *rule.accept] for rule in rules.each],
         "export_difference": difference,
         "seconds": round(time.perf_counter() - started, 1),
         **detail,  # a network's own seconds replace these: it may have begun before an interruption
@@ -269,7 +267,8 @@ def train_one(
         "accept": json.dumps(account["accept"]),
         CURVE_KEY: curve.to_json(),
         **({KINDS_KEY: json.dumps(KIND_CLASS)} if network else {}),
-        SETS_KEY: json.dumps([[coverage, *row] for coverage, row in zip(COVERAGES, limits.tolist(), strict=True)]),
+        SETS_KEY: json.dumps([[coverage, *row] for coverage, row in of_all.sets.items()]),
+        RULES_KEY: rules.to_json(),
         "training": settings.model_dump_json(),
     }
     sealed = seal(attach_metadata(onnx_bytes, metadata))

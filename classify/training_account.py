@@ -18,9 +18,9 @@ MOST_ASKED = 0.9
 def covered(
     probabilities: NDArray[np.floating], labels: NDArray[np.integer], limits: NDArray[np.floating]
 ) -> list[float]:
-    """Share of the records whose prediction set holds their class, for each row of thresholds (coverages, 3)."""
-    truth = probabilities[np.arange(len(labels)), labels]
-    return [float(np.mean(truth >= row[labels])) for row in limits]
+    """Share of the records whose prediction set holds their class, by thresholds of shape (coverages, records, 3)."""
+    each = np.arange(len(labels))
+    return [float(np.mean(probabilities[each, labels] >= of[each, labels])) for of in limits]
 
 
 def figures(
@@ -33,7 +33,7 @@ def figures(
     winner = probabilities.argmax(axis=1)
     recall = [float(np.mean(winner[labels == index] == index)) for index in range(len(CLASSES))]
     threshold = least_named(probabilities[labels != 0, 0], false_alarm)
-    named = probabilities.max(axis=1) >= accept[winner]
+    named = probabilities.max(axis=1) >= np.broadcast_to(accept, probabilities.shape)[np.arange(len(winner)), winner]
     return {
         "balanced_accuracy": round(float(np.mean(recall)), 4),
         "recall": {name: round(value, 4) for name, value in zip(CLASSES, recall, strict=True)},

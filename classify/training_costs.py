@@ -54,7 +54,7 @@ def add_costs(
         return None
     chosen_by = {}
     for name, classifier in classifiers.items():
-        said, accept = classifier.from_inputs(calibrate.inputs), np.asarray(classifier.accept)
+        said, accept = classifier.from_inputs(calibrate.inputs), classifier.rules.accept(calibrate.truth["pulses"])
         chosen_by[name] = models[name] | {"test": figures(said, calibrate.labels, accept, false_alarm)}
     stages = [by_place(place, chosen_by) for place in ("fast", "best")]
     if stages[0] == stages[1]:
@@ -67,10 +67,11 @@ def add_costs(
     return {
         STAGES_KEY: stages,
         "asked": round(float(np.mean(~sure)), 4),
-        "test": figures(probabilities, test.labels, np.asarray(cascade.accept), false_alarm)
+        "test": figures(probabilities, test.labels, cascade.rules.accept(test.truth["pulses"]), false_alarm)
         | {"expected_calibration_error": round(expected_calibration_error(probabilities, test.labels), 4)},
         COST_KEY: round(costs_ffts({CASCADE: cascade})[CASCADE], 1),
-        "accept": [float(limit) for limit in cascade.accept],
+        "accept": list(cascade.accept),
+        "accept_by_pulses": [[rule.pulses, *rule.accept] for rule in cascade.rules.each],
     }
 
 

@@ -14,7 +14,7 @@ from . import draw_cost, draw_examples, draw_front, draw_scores, scores, summary
 from .examples import EXAMPLE_WINDOW
 from .series import EIGHT_BITS, Look, choice_looks, looks
 
-SCHEMA_VERSION = "3"
+SCHEMA_VERSION = "4"
 
 # Marker outlines on a 14 x 14 field, in the order of `svg.MARKERS`.
 _OUTLINES = (
@@ -55,6 +55,7 @@ def draw_page(report: Mapping[str, Any]) -> str:
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {
         "percent": words.percent,
+        "limits": words.limits,
         "number": words.number,
         "count": words.count,
         "micros": words.micros,

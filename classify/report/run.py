@@ -211,6 +211,7 @@ def _describe(name: str, files: tuple[bytes, ...], classifier: Classifier) -> di
         "inputs": list(classifier.inputs),
         "input_bytes": sum(4 * int(np.prod(INPUT_SHAPES[one])) for one in classifier.inputs),
         "accept": list(classifier.accept),
+        "accept_by_pulses": [[rule.pulses, *rule.accept] for rule in classifier.rules.each],
         "envelope": json.loads(classifier.envelope.to_json()),
     }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 MINUS = "\u2212"
 # A number and its unit stay on one line.
 NBSP = "\u00a0"
@@ -27,6 +29,12 @@ def three_digits(value: float) -> float:
 def count(value: int) -> str:
     """Write a whole number in full, thousands apart from five digits on."""
     return f"{value:,}".replace(",", "\u202f") if abs(value) >= 10_000 else str(value)
+
+
+def limits(values: Sequence[float]) -> str:
+    """Least and largest of some thresholds [%], a probability's; never, where none is reached."""
+    low, high = (f"{100 * value:.0f}" if value <= 1 else "never" for value in (min(values), max(values)))
+    return low if low == high else f"{low}\u2013{high}"
 
 
 def micros(value: float) -> str:

@@ -13,7 +13,7 @@ from bladewing.classify.report import front, pictures
 from bladewing.classify.report.detection_bound import detection_bound
 from bladewing.classify.report.memory import peak_bytes
 from bladewing.classify.report.operations import counted_transforms, network_operations
-from bladewing.classify.report.words import micros, millis, number, size
+from bladewing.classify.report.words import limits, micros, millis, number, size
 from bladewing.classify.timing import Laps, quote, ratio
 from bladewing.simulate import Radar
 
@@ -363,3 +363,9 @@ def test_stored_bytes_are_numbered_in_whole_bytes(report: dict[str, Any]) -> Non
     svg = stored(report)[0].svg
     assert ">1024</text>" in svg
     assert ">bytes a record</text>" in svg
+
+
+def test_thresholds_are_written_as_the_range_that_they_span():
+    assert [limits(of) for of in ([0.5], [0.874, 0.5, 0.718], [0.9, 1.01], [1.01, 1.01])] == [
+        *("50", "50\u201387", "90\u2013never", "never")
+    ]

@@ -1,0 +1,187 @@
+"""From which probabilities on a class is named, by how many pulses a record has.
+
+One rule for all keeps its promise of all radars together and of no single one: of short records, of which a model is
+seldom sure, one named bird in four was wrong where one in ten is promised, of long ones one in twenty
+(docs/ablation.md). So each range of pulses has thresholds of its own. What is told of a whole track, which has no such
+number, goes by those of all records.
+"""
+
+import json
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Self
+
+import numpy as np
+from bladewing.models.calibration import NEVER, acceptance_thresholds, conformal_thresholds
+from bladewing.models.operating import least_named
+from numpy.typing import ArrayLike, NDArray
+
+from .labels import CLASSES
+
+#: Records of so many pulses and more go together, up to the next; of fewer than so many records they go by all.
+PULSES_FROM, LEAST_RECORDS = (64, 256, 1024, 4096), 1000
+
+#: Nor is a class named that is not likelier than all others together: what long records show is not all that there is.
+LIKELIER = 0.5
+
+Limits = tuple[float, float, float]
+"""A probability a class, order `CLASSES`."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Thresholds of one range of pulses.
+
+    Parameters
+    ----------
+    pulses
+        The fewest of the range.
+    accept
+        Least probability at which each class is named.
+    sets
+        Coverage to the least probability at which a prediction set holds each class.
+    """
+
+    pulses: int
+    accept: Limits
+    sets: Mapping[float, Limits]
+
+    @classmethod
+    def fitted(
+        cls,
+        probabilities: NDArray[np.floating],
+        labels: NDArray[np.integer],
+        *,
+        precision: float,
+        false_alarm: float,
+        coverages: Sequence[float],
+    ) -> Self:
+        """The thresholds that keep their promises of these records, whatever their pulses.
+
+        Parameters
+        ----------
+        probabilities
+            Calibrated, of records that the model did not train on, shape (n, 3).
+        labels
+            Shape (n,), whole numbers 0 to 2.
+        precision
+            Share of the named records of each class that are right, at least.
+        false_alarm
+            Largest share of birds and clutter named UAV. A false drone is what users complain of: "uav" keeps to both,
+            however many UAVs it costs.
+        coverages
+            Of the prediction sets.
+        """
+        least = acceptance_thresholds(probabilities, labels, precision)
+        uav, bird, clutter = np.maximum(least, LIKELIER).tolist()
+        others = probabilities[labels != 0, 0]
+        if len(others):
+            uav = max(uav, least_named(others, false_alarm))
+        held = {coverage: conformal_thresholds(probabilities, labels, coverage).tolist() for coverage in coverages}
+        return cls(1, (uav, bird, clutter), {coverage: (a, b, c) for coverage, (a, b, c) in held.items()})
+
+    def naming_uav_from(self, threshold: float) -> Self:
+        """The same with another threshold on "uav"."""
+        return replace(self, accept=(threshold, *self.accept[1:]))
+
+
+@dataclass(frozen=True)
+class Rules:
+    """The rules of a model, in rising number of pulses; one at least.
+
+    Parameters
+    ----------
+    each
+        The first holds for fewer pulses as well.
+    """
+
+    each: tuple[Rule, ...]
+
+    @classmethod
+    def fitted(
+        cls,
+        probabilities: NDArray[np.floating],
+        labels: NDArray[np.integer],
+        pulses: NDArray[np.integer],
+        of_all: Rule,
+        *,
+        precision: float,
+        false_alarm: float,
+    ) -> Self:
+        """One rule a range of `PULSES_FROM`, that of all records where it holds fewer than `LEAST_RECORDS`.
+
+        Parameters
+        ----------
+        probabilities, labels, precision, false_alarm
+            As `Rule.fitted` takes them.
+        pulses
+            Of each record, shape (n,).
+        of_all
+            The rule of all records; the coverages are its.
+        """
+        ranges = np.searchsorted(PULSES_FROM[1:], pulses, side="right")
+        each = []
+        for number, fewest in enumerate(PULSES_FROM):
+            own, rule = ranges == number, of_all
+            if np.count_nonzero(own) >= LEAST_RECORDS:
+                known = probabilities[own], labels[own]
+                rule = Rule.fitted(*known, precision=precision, false_alarm=false_alarm, coverages=tuple(of_all.sets))
+            each.append(replace(rule, pulses=fewest))
+        return cls(tuple(each))
+
+    def of(self, pulses: int) -> Rule:
+        """The rule of a record of so many pulses."""
+        return self.each[max(bisect_right(self.each, pulses, key=lambda rule: rule.pulses) - 1, 0)]
+
+    def _places(self, pulses: ArrayLike) -> NDArray[np.intp]:
+        return np.searchsorted([rule.pulses for rule in self.each[1:]], pulses, side="right")
+
+    def accept(self, pulses: ArrayLike) -> NDArray[np.float64]:
+        """Least probability at which each class is named, of records of so many pulses, shape (..., 3)."""
+        return np.array([rule.accept for rule in self.each])[self._places(pulses)]
+
+    def sets(self, pulses: ArrayLike, coverage: float) -> NDArray[np.float64]:
+        """Least probability at which a set of this coverage holds each class, likewise."""
+        return np.array([rule.sets[coverage] for rule in self.each])[self._places(pulses)]
+
+    def naming_uav_from(self, threshold: float) -> Self:
+        """Each with another threshold on "uav"."""
+        return type(self)(tuple(rule.naming_uav_from(threshold) for rule in self.each))
+
+    def to_json(self) -> str:
+        """The rules as they stand in a model's metadata."""
+        sets = [[[coverage, *limits] for coverage, limits in rule.sets.items()] for rule in self.each]
+        each = zip(self.each, sets, strict=True)
+        return json.dumps([{"pulses": rule.pulses, "accept": rule.accept, "sets": held} for rule, held in each])
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Read what `to_json` gave.
+
+        Raises
+        ------
+        ValueError
+            It is something else.
+        """
+        try:
+            each = tuple(
+                Rule(int(row["pulses"]), _limits(row["accept"]), {float(one): _limits(of) for one, *of in row["sets"]})
+                for row in json.loads(text)
+            )
+            if not each or any(one.pulses >= other.pulses for one, other in pairwise(each)):
+                raise ValueError("there must be one rule at least, the pulses rising")
+            if any(rule.sets.keys() != each[0].sets.keys() for rule in each):
+                raise ValueError("each must hold sets of the same coverages")
+            return cls(each)
+        except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
+            raise ValueError(f"the rules by pulses are damaged: {error}") from None
+
+
+def _limits(values: Sequence[float]) -> Limits:
+    """Three numbers, each a probability or just above."""
+    uav, bird, clutter = map(float, values)
+    if not all(0 <= limit <= NEVER for limit in (uav, bird, clutter)):
+        raise ValueError(f"{list(values)} must be {len(CLASSES)} numbers of 0 to 1")
+    return uav, bird, clutter
