@@ -8,6 +8,7 @@ from .dropouts import NOTHING, mended
 from .inputs import in_blocks
 from .lines import middle_times, squared
 from .notch import parabola_offset
+from .one_channel import made_analytic
 from .samples import LEAST_PART, finite_complex, largest_part, require_radar, scaled, unit_scale
 from .spectrum import SPEED_OF_LIGHT_MPS
 
@@ -79,6 +80,7 @@ def body_acceleration(
     carrier_hz, prf_hz = require_radar(carrier_hz, prf_hz)
     pulses = samples.shape[-1]
     flat, stretches = mended(samples.reshape(-1, pulses))
+    flat = made_analytic(flat)
     value, std, smeared = np.full(len(flat), np.nan), np.full(len(flat), np.nan), np.zeros(len(flat), bool)
     wavelength_m = SPEED_OF_LIGHT_MPS / carrier_hz
     # one step smears a line over one bin of the dwell
@@ -96,7 +98,7 @@ def body_acceleration(
     first, *further = PARTS if reach > MANY_STEPS else (1,)
     tried = np.arange(-(reach // first**2), reach // first**2 + 1) * first**2
     told = largest_part(flat) >= LEAST_PART
-    told[[row for (row,), stretch in stretches.items() if stretch == NOTHING]] = False
+    told[[row for (row,) in stretches]] = False
     held = np.flatnonzero(told) if pulses >= LEAST_PULSES else np.zeros(0, np.intp)
     loud = in_blocks(scaled(flat[held], unit_scale(flat[held])))
     each = (pair for block in loud for pair in zip(block, heights_at(tried, block, first), strict=True))
@@ -130,6 +132,10 @@ def body_acceleration(
         smeared[index] = abs(value[index]) > SURE_DEVIATIONS * std[index]
         if smeared[index] and at_rest and height < beside * 10 ** (LEAST_OVER_BESIDE_AT_REST_DB / 10):
             value[index], std[index], smeared[index] = np.nan, np.nan, False
+    for (row,), stretch in stretches.items():  # what is measured of a dwell that a silence breaks
+        if stretch != NOTHING:
+            own = body_acceleration(flat[row, stretch], carrier_hz=carrier_hz, prf_hz=prf_hz)
+            value[row], std[row], smeared[row] = own
     lead = samples.shape[:-1]
     return value.reshape(lead), std.reshape(lead), smeared.reshape(lead)
 
@@ -173,6 +179,8 @@ def without_acceleration(
         raise ValueError(
             f"acceleration_mps2 has shape {acceleration.shape}: it must have that of the records of iq, {records}"
         ) from None
+    if np.count_nonzero(each):  # turned, one channel would pass for two: its other side is left out before
+        samples = np.where(each != 0, made_analytic(mended(samples)[0]), samples)
     return _steadied(samples, each, SPEED_OF_LIGHT_MPS / carrier_hz, prf_hz)
 
 

@@ -77,5 +77,7 @@ def filled_sides(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray
     if not len(rows):
         return rows, iq[:0]
     # float64, because the square of a sample may leave float32
-    amplitude = np.sqrt(spectrum.floor[rows])[:, None].astype(np.float32)
-    return rows, iq[rows] + amplitude * (empty[rows].astype(np.float32) @ side_noise(spectrum.pulses))
+    amplitude = np.sqrt(spectrum.floor[rows])[:, None]
+    most = np.finfo(np.float32).max
+    filled = iq[rows] + amplitude * (empty[rows].astype(np.float32) @ side_noise(spectrum.pulses))
+    return rows, filled.view(np.float64).clip(-most, most).astype(np.float32).view(np.complex64)

@@ -86,6 +86,21 @@ def dwells_of(
         yield Dwells(block, carrier_hz=carrier_hz, prf_hz=prf_hz)
 
 
+def _analytic(samples: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float) -> NDArray[np.complex64]:
+    """Records of one channel made analytic, and before that the ends that a filter took out filled in on both sides."""
+    made = made_analytic(samples)
+    if made is samples:  # as most are
+        return made
+    rows = np.flatnonzero((made != samples).any(axis=-1))
+    channel = made[rows].real.astype(np.complex64)
+    spectrum = doppler_spectrum(channel, carrier_hz=carrier_hz, prf_hz=prf_hz, window=HANN)
+    ended, whole = filled_ends(channel, spectrum)
+    if len(ended):
+        added = np.sqrt(np.float32(2)) * (whole - channel[ended]).real  # of one channel too, as strong
+        made[rows[ended]] = made_analytic((channel[ended].real + added).astype(np.complex64))
+    return made
+
+
 class Dwells:
     """Records of one radar with what is computed of them: each piece once, when the first input asks for it.
 
@@ -99,11 +114,11 @@ class Dwells:
 
     def __init__(self, samples: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float) -> None:
         radar = {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
-        self._given = made_analytic(samples)
+        self._given = _analytic(samples, **radar)
         spectrum = doppler_spectrum(self._given, **radar, window=HANN)
         rows, filled = filled_sides(self._given, spectrum)
         ended, whole = filled_ends(self._given, spectrum)
-        if len(ended):  # no record has an empty side as well
+        if len(ended):  # of none is a side empty as well, what one channel lacks there is filled in (`_analytic`)
             rows, filled = np.concatenate([rows, ended]), np.concatenate([filled, whole])
         self._filled = rows, filled
         if len(rows):

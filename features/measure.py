@@ -6,16 +6,17 @@ from dataclasses import fields
 from numbers import Real
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .allocator import keep_freed
+from .clicks import clicks_filled
 from .dropouts import BEYOND_FILLING_IN, NOTHING, mended
 from .measure_record import measure_record, unmeasured
 from .measurements import EACH_ROTOR, Measurements
 from .one_channel import made_analytic
 from .one_thread import one_thread
 from .rotor.rotors import MAX_ROTORS
-from .samples import beyond_radars, finite_complex, require_radar
+from .samples import beyond_radars, finite_complex, largest_part, require_radar
 from .spectrum import doppler_spectrum
 
 #: No rotor has more blades; eight is the most that fly.
@@ -78,7 +79,7 @@ def measure(
         raise ValueError(f"beta_rad is {beta_rad!r}: it must be at least 0 and below pi/2 [rad]{cure}")
     blades = None if blades is None else int(blades)
     given, stretches = mended(finite_complex(iq, least=2))
-    samples = made_analytic(given)
+    samples = _heard(given)
     shape = samples.shape[:-1]
     some = samples if samples.size else np.zeros((1, *samples.shape[-1:]), np.complex64)  # of none, fields of no length
     spectrum = doppler_spectrum(some, carrier_hz=carrier_hz, prf_hz=prf_hz)
@@ -89,7 +90,7 @@ def measure(
             record, own = some[index], spectrum.rows(index)
             stretch = stretches.get(index)
             if stretch not in (None, NOTHING):
-                record = made_analytic(given[index][stretch])
+                record = _heard(given[index][stretch])
                 own = doppler_spectrum(record, carrier_hz=carrier_hz, prf_hz=prf_hz)
             told = stretch != NOTHING
             rows.append(measure_record(record, own, blades, beta_rad) if told else unmeasured(BEYOND_FILLING_IN))
@@ -102,6 +103,12 @@ def measure(
             extra = (MAX_ROTORS,) if field.name in EACH_ROTOR else ()
             columns[field.name] = values.reshape((*shape, *extra))
     return Measurements(**columns, length_is_lower_bound=beta_rad is None)
+
+
+def _heard(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
+    """Records (..., pulses) without clicks, which lift the floor under all lines; those of one channel analytic."""
+    flat = iq.reshape(-1, iq.shape[-1])
+    return made_analytic(clicks_filled(flat, largest_part(flat)).reshape(iq.shape))
 
 
 def _is_number(value: object) -> bool:

@@ -69,7 +69,7 @@ def filled_ends(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray[
     for row in map(int, np.flatnonzero(low)):
         sides = power[row, middle - count * size : middle][::-1], power[row, middle + 1 : middle + 1 + count * size]
         end, level = _end_of_noise(np.stack(sides).reshape(2, count, size))
-        if end and not _flashes(spectrum, row, end * size):
+        if end and not _flashes(spectrum, row, end * size, real=not iq[row].imag.any()):
             away = np.abs(fft.fftfreq(spectrum.pulses)) * spectrum.bins
             filling = np.where(away > end * size, noise_transform(spectrum.pulses, _SEED), 0)
             rows.append(row)
@@ -98,9 +98,13 @@ def _noise_level(power: NDArray[np.float32]) -> float:
     return level if even else 0.0
 
 
-def _flashes(spectrum: Spectrum, row: int, end: int) -> bool:
-    """Whether the outer part of a band of so many bins to each side comes and goes as blades do."""
-    away = np.abs(np.arange(spectrum.bins) - spectrum.bins // 2)
+def _flashes(spectrum: Spectrum, row: int, end: int, *, real: bool) -> bool:
+    """Whether the outer part of a band of so many bins to each side comes and goes as blades do.
+
+    Of one channel (`real`) one side is asked: both are a real signal, whose noise has 3.
+    """
+    away = np.arange(spectrum.bins) - spectrum.bins // 2
+    away = away if real else np.abs(away)
     outer = np.where((away <= end) & (away > OUTER_SHARE * end), spectrum.transform[row], 0)
     some = slice(round((1 - MIDDLE) / 2 * spectrum.pulses), round((1 + MIDDLE) / 2 * spectrum.pulses))
     power = squared(fft.ifft(outer)[some] / spectrum.window.taper(spectrum.pulses)[some])

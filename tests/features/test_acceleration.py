@@ -185,3 +185,27 @@ def test_ground_that_sways_is_in_the_deviation_of_what_hovers_before_it():
     assert not smeared.any()
     # a mean square of 30 normal errors lies below 2.0 in all but one of 1000 cases; it was 7
     assert np.nanmean((found / std) ** 2) < 2.0
+
+
+def test_of_a_dwell_that_a_silence_breaks_the_longest_stretch_is_searched():
+    """It was sought in the whole, and not found: what `measure` then measured of the stretch was smeared."""
+    whole = accelerated(100 * tone(777.7), 12.3) + white(np.random.default_rng(3), PULSES)
+    broken = np.where(np.arange(PULSES) < PULSES * 0.35, 0, whole)
+    found = body_acceleration(np.stack([broken, whole]), **RADAR)
+    alone = body_acceleration(broken[broken != 0], **RADAR)
+    for both, one in zip(found, alone, strict=True):
+        assert both[0] == pytest.approx(one, rel=1e-6)
+    assert found[2].all()
+    assert abs(found[0][0] - 12.3) < 4 * found[1][0]
+
+
+def test_one_channel_that_accelerates_stays_one_and_has_no_band():
+    """Turned, it passed for two: a tip was told, half as fast again as it is."""
+    iq = accelerated(rotors([58.61], velocity_mps=5.0, body=20.0), 15.0) + white(np.random.default_rng(2), PULSES) / 3
+    one = iq.real + 0j
+    pull, _, smeared = body_acceleration(one, **RADAR)
+    assert smeared
+    assert abs(pull) == pytest.approx(15.0, rel=0.1)
+    found = measure(without_acceleration(one, pull, **RADAR), **RADAR)
+    assert "one channel" in str(found.band_reason)
+    assert found.chopping_hz == pytest.approx(2 * 58.61, rel=1e-3)

@@ -162,3 +162,10 @@ def test_a_line_without_noise_is_no_channel_of_two():
     for iq in (rotors([58.6]).real, np.ones(PULSES)):
         levels = model_inputs(iq.astype(np.complex64), **RADAR, names=("levels",))["levels"]
         np.testing.assert_allclose(levels, levels[..., ::-1], atol=1.0)
+
+
+def test_what_fills_a_side_stays_within_float32():
+    rows = np.stack([white(np.random.default_rng(seed), PULSES).real for seed in range(4)])
+    for top in (1e38, 3.3e38):
+        iq = (rows / np.abs(rows).max() * top).astype(np.complex64)
+        assert all(np.isfinite(values).all() for values in model_inputs(iq, **RADAR, names=ALL).values())
