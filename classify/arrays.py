@@ -137,7 +137,8 @@ def _read_npz(path: Path, variable: str | None) -> dict[str, NDArray[np.generic]
     pickled: dict[str, _PickledError] = {}
     try:
         with open_zip(path) as archive:
-            for entry in archive.infolist():
+            entries = archive.infolist()
+            for entry in [entry for entry in entries if entry.filename.endswith(".npy")] or entries:
                 member = entry.filename
                 name = member.removesuffix(".npy")
                 with archive.open(entry) as file:

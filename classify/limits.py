@@ -111,9 +111,13 @@ def unpacked(path: Path) -> bytes | None:
     ):
         if head.startswith(magic):
             out = io.BytesIO()
-            for part in _stream(make(), path.read_bytes()):
-                out.write(part)
-                require_unpacked(path, out.tell())
+            waiting = path.read_bytes()
+            while waiting.startswith(magic):  # parallel packers write several streams, one after the other
+                stream = make()
+                for part in _stream(stream, waiting):
+                    out.write(part)
+                    require_unpacked(path, out.tell())
+                waiting = stream.unused_data
             return out.getvalue()
     return None
 

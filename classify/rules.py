@@ -69,8 +69,7 @@ class Rule:
         precision
             Share of the named records of each class that are right, at least.
         false_alarm
-            Largest share of birds and clutter named UAV. A false drone is what users complain of: "uav" keeps to both,
-            however many UAVs it costs.
+            Largest share of birds and clutter named UAV: "uav" keeps to both, however many UAVs it costs.
         coverages
             Of the prediction sets.
         """
@@ -112,6 +111,8 @@ class Rules:
     ) -> Self:
         """One rule a range of `PULSES_FROM`, that of all records where it holds fewer than `LEAST_RECORDS`.
 
+        Nowhere is "uav" named from less on than of all records: a false drone is the worst of answers.
+
         Parameters
         ----------
         probabilities, labels, precision, false_alarm
@@ -128,6 +129,7 @@ class Rules:
             if np.count_nonzero(own) >= LEAST_RECORDS:
                 known = probabilities[own], labels[own]
                 rule = Rule.fitted(*known, precision=precision, false_alarm=false_alarm, coverages=tuple(of_all.sets))
+                rule = rule.naming_uav_from(max(rule.accept[0], of_all.accept[0]))
             each.append(replace(rule, pulses=fewest))
         return cls(tuple(each))
 

@@ -217,6 +217,8 @@ def _check_structure(metadata: Any, path: Path) -> None:
             if "core:sample_count" in entry:
                 _count(entry, "core:sample_count", f"{path}: {section}[{index}]")
     general = metadata["global"]
+    if isinstance(digest := general.get("core:sha512"), str):  # of either case in SigMF, of lower case in its library
+        general["core:sha512"] = digest.lower()
     _check_captures(metadata["captures"], path)
     _check_times(metadata["captures"], general.get("core:sample_rate"), path)
     datatype = general.get("core:datatype")

@@ -17,10 +17,10 @@ from .spectrum import Spectrum
 LEAST_BLOCKS, MOST_BLOCKS, ENOUGH_BINS, LEAST_BINS = 24, 32, 16, 8
 
 #: Beyond the band the power is less by this factor than in so many blocks within, from the next but so many inwards.
-DROP, WITHIN, NEXT = 200.0, 3, 3
+DROP, WITHIN, NEXT = 200.0, 3, 5
 
 #: There it is noise: no block is so many times another, and the median of its bins is its mean as noise's is, to this.
-FLAT, LIKE_NOISE = 4.0, 0.7
+FLAT, LIKE_NOISE = 6.0, 0.7
 
 #: And further in it is nowhere less than this share.
 LEAST_SHARE = 0.25

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 import scipy.fft
+from bladewing.features.fast import windows
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
@@ -45,12 +46,18 @@ def stft(iq: NDArray[np.complex64], *, window: int, overlap: float) -> NDArray[n
 def frames(iq: NDArray[np.complex64], *, window: int, overlap: float) -> NDArray[np.complex64]:
     """Frames of a record as a view, shape (frames, window)."""
     hop = max(1, round(window * (1.0 - overlap)))
-    return np.lib.stride_tricks.sliding_window_view(iq, window)[::hop]
+    return windows(iq, ((len(iq) - window) // hop + 1, window), (hop, 1))
+
+
+@lru_cache(maxsize=8)
+def _taper(window: int) -> NDArray[np.float32]:
+    """Hann's window, made once: it is no part of what a transform costs."""
+    return np.hanning(window).astype(np.float32)
 
 
 def transformed(some: NDArray[np.complex64]) -> NDArray[np.complex64]:
     """Spectra of frames (frames, window), shape (frames, 512)."""
-    return scipy.fft.fft(some * np.hanning(some.shape[-1]).astype(np.float32), n=STFT_BINS, axis=-1)
+    return scipy.fft.fft(some * _taper(some.shape[-1]), n=STFT_BINS, axis=-1)
 
 
 def time_fft_against_stft(

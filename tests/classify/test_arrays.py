@@ -2,6 +2,7 @@ import io
 import os
 import pickle
 import re
+import zipfile
 
 import numpy as np
 import pytest
@@ -30,6 +31,14 @@ def npz(**arrays):
     return buffer.getvalue()
 
 
+def with_a_note(packed):
+    """An .npz beside whose arrays lies what is none."""
+    buffer = io.BytesIO(packed)
+    with zipfile.ZipFile(buffer, "a") as archive:
+        archive.writestr("readme.txt", "measured on a Monday")
+    return buffer.getvalue()
+
+
 def mat(compress=False, **arrays):
     buffer = io.BytesIO()
     scipy.io.savemat(buffer, arrays, do_compression=compress)
@@ -52,6 +61,7 @@ def put(tmp_path):
         (".npy", npy(IQ)),
         (".npz", npz(iq=IQ)),
         (".npz", npz(iq=IQ, time_s=REAL, note=np.array("x"))),
+        (".npz", with_a_note(npz(iq=IQ))),
         (".npz", npz(iq=IQ, notes=np.array([{"by": "me"}], dtype=object))),
         (".mat", mat(iq=IQ)),
         (".mat", mat(iq=IQ, compress=True)),

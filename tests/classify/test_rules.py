@@ -68,6 +68,7 @@ def test_what_is_promised_holds_of_each_range_of_pulses_where_one_rule_misses_it
                 assert false < FALSE_ALARM + 4 * np.sqrt(FALSE_ALARM / 4000)
                 assert np.abs(np.array(held) - 0.9).max() < 4 * np.sqrt(0.09 / 2000 + 0.09 / 6666)
             assert min(rule.accept) >= LIKELIER
+            assert rule.accept[0] >= of_all.accept[0]
     assert missed >= 2
 
 

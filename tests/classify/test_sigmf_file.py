@@ -1,4 +1,8 @@
+import bz2
+import gzip
+import hashlib
 import json
+import lzma
 import re
 import tarfile
 import zipfile
@@ -218,6 +222,30 @@ def packed(meta: Path) -> Path:
         for path in (meta, meta.with_suffix(".sigmf-data")):
             file.add(path, f"rec/{path.name}")
     return archive
+
+
+@pytest.mark.parametrize(("suffix", "pack"), [(".gz", gzip.compress), (".xz", lzma.compress), (".bz2", bz2.compress)])
+def test_an_archive_of_several_streams_is_read_whole(sigmf_pair, suffix, pack):
+    """As packers that use several processors write them."""
+    meta = sigmf_pair()
+    whole = packed(meta).read_bytes()
+    # the library reads .bz2 by what is inside, whatever the name says
+    archive = meta.with_name(f"streams.sigmf{'' if suffix == '.bz2' else suffix}")
+    archive.write_bytes(b"".join(pack(whole[at : at + 10_000]) for at in range(0, len(whole), 10_000)))
+    np.testing.assert_array_equal(load_recording(archive).iq, load_recording(meta).iq)
+
+
+def test_the_hash_may_be_of_either_case(sigmf_pair):
+    meta = sigmf_pair()
+    text = meta.read_text()
+    digest = hashlib.sha512(meta.with_suffix(".sigmf-data").read_bytes()).hexdigest()
+    for told in (digest, digest.upper(), digest[::-1]):
+        meta.write_text(text.replace('"core:version"', f'"core:sha512": "{told}", "core:version"'))
+        if told == digest[::-1]:
+            with pytest.raises(BadInput, match="altered or damaged"):
+                load_recording(meta)
+        else:
+            assert load_recording(meta).iq.size == 4000
 
 
 def test_an_undeclared_namespace_in_an_archive_is_no_ones_trouble(sigmf_pair):
