@@ -58,6 +58,7 @@ PURPOSES = {"train": 0, "validate": 1, "calibrate": 2, "test": 3, "bench": 4, "r
 
 #: Columns of `Records.truth`: name -> unit. Where a column has no meaning for a record it holds NaN. Velocities are
 #: those at the first pulse, a vehicle's that in the middle of the dwell; tips move that fast, whatever the aspect.
+#: Levels are those before a receiver fades, which in a short dwell may raise or lower all of it by some decibels.
 TRUTH_UNITS = {
     "snr_db": "dB",
     "velocity_mps": "m/s",

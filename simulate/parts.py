@@ -41,6 +41,7 @@ BOUNDS = {
     "ground_width_mps": (1e-6, 0.6),
     "gait_hz": (0.05, 20),
     "texture_hz": (1e-6, 1000),
+    "texture_shape": (0.05, 1e12),  # of a texture still rarer, float32 holds no power at most places
     "high_pass_hz": (1e-6, 1e9),
     "canceller_pulses": (2, 3),
     "adc_bits": (1, 24),

@@ -18,7 +18,8 @@ def full_fidelity(part: UavPart, radar: Radar) -> Fidelity:
     """Every effect, and as many scatterers a blade as float64 can tell from a continuous one."""
     longest = max((r.blade_length_m - r.root_m for r in part.rotors if not r.points), default=0.0)
     phase = 2 * TWO_PI * longest / radar.wavelength_m
-    return Fidelity(frozenset(UAV_EFFECTS), int(phase / 4 + 6 * np.cbrt(phase)) + 30)
+    # from a quarter of the phase on they tell a blade, and from e / 8 of it on the bound says so (`sag_error`)
+    return Fidelity(frozenset(UAV_EFFECTS), int(np.e / 8 * phase + 6 * np.cbrt(phase)) + 30)
 
 
 def rotor_angle_rad(rotor: RotorPart, times_s: NDArray[np.float64], wanders: bool) -> NDArray[np.float64]:
