@@ -14,14 +14,14 @@ import numpy as np
 from bladewing.classify import Classifier
 from bladewing.classify.fusion import ODDS
 from bladewing.classify.inference import Prediction
-from bladewing.classify.labels import CLASSES, decide, decide_by_sets
+from bladewing.classify.labels import CLASSES, decide_by_sets
 from bladewing.classify.ladder import COST_KEY, by_place, shipped_account
 from bladewing.classify.model_file import COVERAGES
 from bladewing.classify.predict import answer
 from bladewing.classify.recording import Recording, load_recording
+from bladewing.classify.rules import Rule, Rules
 from bladewing.classify.training_account import figures
 from bladewing.features.wingbeat import wingbeat
-from bladewing.models.calibration import conformal_thresholds
 from bladewing.simulate import Radar, draw_records
 from bladewing.simulate.dataset import KIND_CLASS, KINDS, draw_radar, draw_target, powered
 from bladewing.simulate.laws import LAWS, WIDTH, Draws
@@ -58,7 +58,8 @@ def scored(
     parts = []
     for radar, (iq, truth) in zip(radars, drawn(radars, count, kind, purpose), strict=True):
         given = classifier.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
-        parts.append({"p": given.probabilities, "over_noise": over(given), "answer": given.labels, **truth})
+        own = {"p": given.probabilities, "over_noise": over(given), "answer": given.labels}
+        parts.append({**own, "pulses": np.full(len(iq), radar.pulses), **truth})
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
@@ -172,17 +173,18 @@ def rules(classifier: Classifier, count: int) -> None:
     """What each way to say "unknown" makes of measured recordings and of scenes of a simulator that is not ours."""
     scenes = max(count // 600, 1)
     truth: list[str] = []
-    given: dict[str, list[np.ndarray]] = {}
+    given: dict[str, list[tuple[np.ndarray, int]]] = {}
     for (kind, radar, _, _), iq, _ in received_scenes(list(SCENES), scenes, 1, ("total",)):
         p = classifier.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz).probabilities
-        given.setdefault("scenes", []).append(p)
+        given.setdefault("scenes", []).append((p, iq.shape[-1]))
         truth += [SCENES[kind][0]] * len(iq)
     for path in sorted(RECORDINGS.glob("*.sigmf-meta")):
         recording = load_recording(path)
         if classifier.envelope.reason(recording.carrier_hz, recording.prf_hz, round(DWELL_S * recording.prf_hz)):
             continue
         p = answer(recording, classifier, dwell_s=DWELL_S).dwells.probabilities
-        given.setdefault("drone" if path.name.startswith("drone") else "others", []).append(p)
+        pulses = recording.dwells(DWELL_S).shape[-1]
+        given.setdefault("drone" if path.name.startswith("drone") else "others", []).append((p, pulses))
     true = np.array(truth)
     print(f"\nscenes of an independent simulator ({len(true)}), measured recordings of a drone and of others")
     print(f"{'':28s} |         scenes             UAVs           others | drone     | others")
@@ -190,7 +192,7 @@ def rules(classifier: Classifier, count: int) -> None:
     name = classifier.metadata["name"]
     for options in RULES:
         decide_by = Classifier.load(name, **options).decide
-        said = {place: decide_by(np.concatenate(parts))[0] for place, parts in given.items()}
+        said = {place: np.concatenate([decide_by(*part)[0] for part in parts]) for place, parts in given.items()}
         own, unknown = said["scenes"], said["scenes"] == "unknown"
         wrong, uavs = (own != true) & ~unknown, true == "uav"
         shares = (own == true, wrong, unknown, (own == true)[uavs], wrong[uavs], (own == "uav")[~uavs])
@@ -301,9 +303,10 @@ def coverage(classifier: Classifier, count: int) -> None:
     for purpose in ("calibrate", "bench"):
         radars = [draw_radar(7, purpose, group) for group in range(count // 24)]
         given = scored(classifier, radars, count, purpose=purpose)
-        parts.append((given["p"], np.array([CLASSES.index(name) for name in given["label"]])))
-    (known, known_truth), (p, truth) = parts
-    print(f"\nprediction sets on {len(p)} records of the whole envelope, fitted on {len(known)} others")
+        labels = np.array([CLASSES.index(name) for name in given["label"]])
+        parts.append((given["p"].astype(np.float64), labels, given["pulses"]))
+    known, (p, truth, pulses) = parts
+    print(f"\nprediction sets on {len(p)} records of the whole envelope, fitted on {len(known[0])} others")
     print("rule            covered: uav   bird clutter |  named   right | UAVs named  others named uav")
 
     def row(name: str, labels: np.ndarray, covered: list[float]) -> None:
@@ -313,10 +316,12 @@ def coverage(classifier: Classifier, count: int) -> None:
         shares = " ".join(f"{value:7.3f}" for value in covered)
         print(f"{name:18s} {shares} | {named.mean():6.3f} {right:7.3f} | {true:10.3f} {false:16.4f}")
 
-    row("model's thresholds", decide(p, classifier.accept)[0], [np.nan] * 3)
+    row("model's thresholds", classifier.decide(p, pulses)[0], [np.nan] * 3)
+    promised = {"precision": 0.9, "false_alarm": 0.01}
+    rules = Rules.fitted(*known, Rule.fitted(*known[:2], coverages=COVERAGES, **promised), **promised)
     for wanted in COVERAGES:
-        limits = conformal_thresholds(known, known_truth, wanted)
-        held = [float(np.mean(p[truth == index, index] >= limits[index])) for index in range(len(CLASSES))]
+        limits = rules.sets(pulses, wanted)
+        held = [float(np.mean((p >= limits)[truth == index, index])) for index in range(len(CLASSES))]
         row(f"coverage {wanted:g}", decide_by_sets(p, limits, wanted)[0], held)
 
 
@@ -333,7 +338,7 @@ def cascade(classifier: Classifier, count: int) -> None:
     for uav, others in SURE_LIMITS:
         asked = first["p"].max(axis=1) < np.array([uav, others, others])[first["p"].argmax(axis=1)]
         p = np.where(asked[:, None], second["p"], first["p"])
-        given = figures(p, truth, np.asarray(classifier.accept), 0.01)
+        given = figures(p, truth, classifier.rules.accept(first["pulses"]), 0.01)
         # at best the second pays nothing for what the first has made, and neither pays to part the records
         shared, anew = (cheap + asked.mean() * cost for cost in (dear - SHARED_FFTS, dear))
         print(
