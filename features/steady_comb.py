@@ -31,18 +31,15 @@ SAME = 0.08
 
 @dataclass(frozen=True)
 class SteadyComb:
-    """The comb that stays in each recording of a batch; NaN and 0 where there is none.
+    """The comb that stays in each recording of a batch; NaN where there is none.
 
     Parameters
     ----------
     chopping_hz : ndarray of float64, shape (...)
-        Its chopping frequency, the median of the dwells that show it [Hz].
-    seen : ndarray of int, shape (...)
-        Number of dwells that show it, of `DWELLS` or as many as there are.
+        Its chopping frequency, the median of the first dwells that show it [Hz].
     """
 
     chopping_hz: NDArray[np.float64]
-    seen: NDArray[np.intp]
 
 
 def steady_comb(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float) -> SteadyComb:
@@ -69,22 +66,23 @@ def steady_comb(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: f
         return SteadyComb(*by_recording(iq, _one, carrier_hz, prf_hz))
 
 
-def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[float, int]:
+def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[float]:
     """The fields of `SteadyComb` of one recording."""
     pulses = round(min(DWELL_S * prf_hz, PULSES[1]))
     count = min(len(iq) // max(pulses, 1), DWELLS)
     if pulses < PULSES[0] or count < LEAST or not iq.any():
-        return np.nan, 0
+        return (np.nan,)
     iq = normed(iq)
-    starts = np.rint(np.linspace(0, len(iq) - pulses, count)).astype(np.intp)
-    found = [_rotor_hz(iq[start : start + pulses], carrier_hz, prf_hz) for start in starts]
-    choppings = np.array([chopping_hz for chopping_hz in found if chopping_hz is not None])
-    same = np.abs(np.log(choppings[:, None] / choppings)) < SAME
-    seen = same.sum(axis=1)
-    if seen.max(initial=0) < LEAST:
-        return np.nan, 0
-    most = int(seen.argmax())
-    return float(np.median(choppings[same[most]])), int(seen[most])
+    choppings = np.zeros(0)
+    for start in np.rint(np.linspace(0, len(iq) - pulses, count)).astype(np.intp):
+        chopping_hz = _rotor_hz(iq[start : start + pulses], carrier_hz, prf_hz)
+        if chopping_hz is None:
+            continue
+        choppings = np.append(choppings, chopping_hz)
+        same = np.abs(np.log(choppings[:, None] / choppings)) < SAME
+        if same.sum(axis=1).max() >= LEAST:  # no further dwell changes that, and each takes time
+            return (float(np.median(choppings[same[same.sum(axis=1).argmax()]])),)
+    return (np.nan,)
 
 
 def _rotor_hz(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> float | None:
