@@ -249,8 +249,8 @@ class Classifier:
             Of all records or of each, shape (records,); None where they have no such number, as a track.
         """
         limits: Limits | NDArray[np.float64]
-        if pulses is None or isinstance(pulses, int):
-            rule = self._of_all if pulses is None else self.rules.of(pulses)
+        if pulses is None or isinstance(pulses, int | np.integer):
+            rule = self._of_all if pulses is None else self.rules.of(int(pulses))
             limits = rule.accept if self.coverage is None else rule.sets[self.coverage]
         else:
             limits = self.rules.accept(pulses) if self.coverage is None else self.rules.sets(pulses, self.coverage)

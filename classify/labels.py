@@ -79,7 +79,9 @@ def decide_by_sets(
 
 def _of_each(limits: Sequence[float] | NDArray[np.floating], records: int) -> Sequence[Sequence[float]]:
     """Limits of each record, of those of all or of each."""
-    return limits.tolist() if isinstance(limits, np.ndarray) else [limits] * records
+    if isinstance(limits, np.ndarray):
+        return np.broadcast_to(limits, (records, len(CLASSES))).tolist()
+    return [limits] * records
 
 
 def _below(name: str, value: float, limit: float) -> str:

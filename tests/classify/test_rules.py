@@ -102,6 +102,7 @@ def test_records_go_by_their_pulses_and_tracks_by_all(make_model):
     p = np.stack([short.probabilities, long.probabilities])
     assert clf.decide(p)[0].tolist() == ["uav", "uav"]
     assert clf.decide(p, np.array([255, 256]))[0].tolist() == ["unknown", "uav"]
+    assert clf.decide(p, np.int64(256))[0].tolist() == ["uav", "uav"]
     sets = Classifier(make_model(bias=np.log([0.8, 0.15, 0.05]), **ONE), coverage=0.8)
     labels = [str(sets.predict(noise(n), carrier_hz=10e9, prf_hz=20e3).labels) for n in (255, 256)]
     assert labels == ["unknown", "uav"]
