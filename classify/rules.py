@@ -62,12 +62,8 @@ class Rule:
 
         Parameters
         ----------
-        probabilities
-            Calibrated, of records that the model did not train on, shape (n, 3).
-        labels
-            Shape (n,), whole numbers 0 to 2.
-        precision
-            Share of the named records of each class that are right, at least.
+        probabilities, labels, precision
+            As `acceptance_thresholds` takes them.
         false_alarm
             Largest share of birds and clutter named UAV: "uav" keeps to both, however many UAVs it costs.
         coverages
@@ -135,7 +131,7 @@ class Rules:
 
     def of(self, pulses: int) -> Rule:
         """The rule of a record of so many pulses."""
-        return self.each[max(bisect_right(self.each, pulses, key=lambda rule: rule.pulses) - 1, 0)]
+        return self.each[bisect_right(self.each, pulses, lo=1, key=lambda rule: rule.pulses) - 1]
 
     def _places(self, pulses: ArrayLike) -> NDArray[np.intp]:
         return np.searchsorted([rule.pulses for rule in self.each[1:]], pulses, side="right")
@@ -147,6 +143,10 @@ class Rules:
     def sets(self, pulses: ArrayLike, coverage: float) -> NDArray[np.float64]:
         """Least probability at which a set of this coverage holds each class, likewise."""
         return np.array([rule.sets[coverage] for rule in self.each])[self._places(pulses)]
+
+    def rows(self) -> list[list[float]]:
+        """Fewest pulses and the thresholds of each range, as accounts hold them."""
+        return [[rule.pulses, *rule.accept] for rule in self.each]
 
     def naming_uav_from(self, threshold: float) -> Self:
         """Each with another threshold on "uav"."""

@@ -231,7 +231,8 @@ def train_one(
     )
     calibration = fit_vector_scaling(scores_of(sets.calibrate), sets.calibrate.labels)
     calibrated = calibration.probabilities(scores_of(sets.calibrate))
-    known, (precision, false_alarm) = (calibrated, sets.calibrate.labels), (settings.precision, settings.false_alarm)
+    known = calibrated, sets.calibrate.labels
+    precision, false_alarm = settings.precision, settings.false_alarm
     of_all = Rule.fitted(*known, precision=precision, false_alarm=false_alarm, coverages=COVERAGES)
     of_pulses = sets.calibrate.truth["pulses"]
     rules = Rules.fitted(*known, of_pulses, of_all, precision=precision, false_alarm=false_alarm)
@@ -249,7 +250,7 @@ def train_one(
         | {"coverage": [round(share, 4) for share in covered(probabilities, labels, limits)]},
         "calibration": {"scale": float(calibration.scale), "bias": [float(b) for b in calibration.bias]},
         "accept": list(of_all.accept),
-        "accept_by_pulses": [[rule.pulses, *rule.accept] for rule in rules.each],
+        "accept_by_pulses": rules.rows(),
         "export_difference": difference,
         "seconds": round(time.perf_counter() - started, 1),
         **detail,  # a network's own seconds replace these: it may have begun before an interruption

@@ -20,7 +20,8 @@ def covered(
 ) -> list[float]:
     """Share of the records whose prediction set holds their class, by thresholds of shape (coverages, records, 3)."""
     each = np.arange(len(labels))
-    return [float(np.mean(probabilities[each, labels] >= of[each, labels])) for of in limits]
+    truth = probabilities[each, labels]
+    return [float(np.mean(truth >= of[each, labels])) for of in limits]
 
 
 def figures(

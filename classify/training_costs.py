@@ -71,7 +71,7 @@ def add_costs(
         | {"expected_calibration_error": round(expected_calibration_error(probabilities, test.labels), 4)},
         COST_KEY: round(costs_ffts({CASCADE: cascade})[CASCADE], 1),
         "accept": list(cascade.accept),
-        "accept_by_pulses": [[rule.pulses, *rule.accept] for rule in cascade.rules.each],
+        "accept_by_pulses": cascade.rules.rows(),
     }
 
 

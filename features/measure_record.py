@@ -190,9 +190,11 @@ def _turning(family: Family) -> dict[str, Any]:
     spread, order, stds = max(rotors.spread, rotors.unseen), comb.last // comb.per_turn, rotors.stds
     if not rotors.resolved:  # the mean lies anywhere within what the unresolved rates span
         std = float(np.hypot(std, spread * prf_hz / np.sqrt(12)))
+    pulled = HIDDEN_BINS / (max(order, 1) * data.pulses)
     if not rotors.resolved or data.one_channel:  # what lies between the lines, as those of the other side do, pulls
-        pulled = HIDDEN_BINS / (max(order, 1) * data.pulses)
-        stds, std = np.hypot(stds, pulled), float(np.hypot(std, pulled * prf_hz * data.one_channel))
+        stds = np.hypot(stds, pulled)
+    if data.one_channel:
+        std = float(np.hypot(std, pulled * prf_hz))
     drifts, drift_stds = family.drifts * (rotors.rates if count > 1 else comb.chopping) * prf_hz**2
     each = (rotors.rates * prf_hz, stds * prf_hz, drifts, drift_stds)
     padded = (np.pad(values, (0, MAX_ROTORS - count), constant_values=np.nan) for values in each)

@@ -80,8 +80,9 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[f
             continue
         choppings = np.append(choppings, chopping_hz)
         same = np.abs(np.log(choppings[:, None] / choppings)) < SAME
-        if same.sum(axis=1).max() >= LEAST:  # no further dwell changes that, and each takes time
-            return (float(np.median(choppings[same[same.sum(axis=1).argmax()]])),)
+        shown = same.sum(axis=1)
+        if shown.max() >= LEAST:  # no further dwell changes that, and each takes time
+            return (float(np.median(choppings[same[shown.argmax()]])),)
     return (np.nan,)
 
 

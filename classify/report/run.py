@@ -34,12 +34,12 @@ from ..parts import REPORT_PARTS, Parts
 from ..progress import Progress
 from ..stability.run import worst_of_each
 from ..training_config import TrainingConfig
-from . import cost, evaluate, fft_against_stft, scores, storage, trade
+from . import cost, evaluate, scores, storage, trade
 from .card import model_card
 from .choices import FEATURES, classifier_of
 from .examples import OVERLAP, WINDOW, draw_examples, show_stfts
 from .families import left_out
-from .fft_against_stft import stft
+from .fft_against_stft import stft, time_fft_against_stft, time_law
 from .front import Given, measure_front
 from .machine import describe_machine
 from .page import SCHEMA_VERSION, draw_page
@@ -115,8 +115,8 @@ def measured_report(
     def transforms() -> dict[str, Any]:
         effort: dict[str, Any] = {"seed": config.seed, "seconds": config.stft_s, "least_rounds": config.repeats}
         with progress.phase("Timing FFT against STFT", 1.0) as done:
-            against = fft_against_stft.time_fft_against_stft(**effort, on_share=lambda share: done(0.8 * share))
-            law = fft_against_stft.time_law(against, **effort, on_share=lambda share: done(0.8 + 0.2 * share))
+            against = time_fft_against_stft(**effort, on_share=lambda share: done(0.8 * share))
+            law = time_law(against, **effort, on_share=lambda share: done(0.8 + 0.2 * share))
         return {"against": against, "law": law}
 
     def tables() -> dict[str, Any]:
@@ -211,7 +211,7 @@ def _describe(name: str, files: tuple[bytes, ...], classifier: Classifier) -> di
         "inputs": list(classifier.inputs),
         "input_bytes": sum(4 * int(np.prod(INPUT_SHAPES[one])) for one in classifier.inputs),
         "accept": list(classifier.accept),
-        "accept_by_pulses": [[rule.pulses, *rule.accept] for rule in classifier.rules.each],
+        "accept_by_pulses": classifier.rules.rows(),
         "envelope": json.loads(classifier.envelope.to_json()),
     }
 
