@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .axis import UNSEEN_DB, expected_peak
-from .fast import as_ordered, means, power_of, to_db
+from .fast import as_ordered, at_most, means, power_of, to_db
 from .notch import Mask, weights
 from .schema import CADENCE_BINS
 from .spectrum import Spectrum, per_floor
@@ -149,7 +149,7 @@ def cadence_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     """
     plan = cadence_plan(spectrum.pulses, spectrum.prf_hz, spectrum.window)
     power = power_over_time(spectrum, mask)
-    np.minimum(power, np.float32(CLIP), out=power)
+    at_most(power, CLIP, out=power)
     power -= means(power)[..., None]
     power *= plan.hann
     lines = power_of(fft.rfft(power, overwrite_x=True))

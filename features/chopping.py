@@ -36,6 +36,9 @@ _LEAST = np.float32(1e-30)  # divides in the stead of 0
 _BLOCK = 32
 _BEFORE = np.triu(np.ones((_BLOCK, _BLOCK), np.float32), 1)
 
+#: Blocks of one product: larger ones are shared by threads, which on a busy machine wait for one another for 30 ms.
+_MOST_BLOCKS = 128
+
 #: A peak and those beside it; fractions of a peak's period that may be the period; multiples at which a comb repeats.
 NEIGHBOURS, DIVISORS, MULTIPLES = (np.array(numbers)[:, None] for numbers in ((-1, 0, 1), (2, 3, 4), (2, 3)))
 
@@ -144,12 +147,15 @@ def _sums_before(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
     Within blocks by a product with a triangle of ones: half the time of a running sum, and no long chain of roundings.
     """
-    count = values.shape[-1]
-    padded = np.zeros((*values.shape[:-1], count // _BLOCK + 1, _BLOCK), np.float32)
-    padded.reshape(*values.shape[:-1], padded.shape[-2] * _BLOCK)[..., :count] = values
-    out = padded @ _BEFORE
+    lead, count = values.shape[:-1], values.shape[-1]
+    blocks = count // _BLOCK + 1
+    products = -(-blocks // _MOST_BLOCKS)
+    each = -(-blocks // products)
+    padded = np.zeros((*lead, products * each, _BLOCK), np.float32)
+    padded.reshape(*lead, products * each * _BLOCK)[..., :count] = values
+    out = (padded.reshape(*lead, products, each, _BLOCK) @ _BEFORE).reshape(padded.shape)
     out[..., 1:, :] += np.add.accumulate(sums(padded[..., :-1, :]), axis=-1)[..., None]
-    return out.reshape(*values.shape[:-1], padded.shape[-2] * _BLOCK)
+    return out.reshape(*lead, products * each * _BLOCK)
 
 
 @lru_cache(maxsize=64)

@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from .dropouts import keep_within
-from .fast import power_of
+from .fast import means, power_of
 from .lines import squared
-from .samples import energies, scaled, unit_scale
+from .samples import energies, safe_scale, scaled
 
 #: A click: one sample so many times over the noise, and over both beside it; fewer in a record than a rotor's flashes.
 #: A flash is as long as the rotor's band is narrow: its samples beside are as strong.
@@ -95,10 +95,12 @@ def clicks_filled(iq: NDArray[np.complex64], largest: NDArray[np.float32]) -> ND
     if not np.count_nonzero(maybe):
         return out
     rows = np.flatnonzero(maybe)
-    scale = unit_scale(iq[rows])
-    records = scaled(iq[rows], scale)
+    records = iq[rows]
+    scale = safe_scale(records)
+    records = scaled(records, scale)
     power = power_of(records)
-    row, pulse = np.nonzero(power > OVER_MEAN * power.mean(axis=1, keepdims=True))
+    loud = power > np.float32(OVER_MEAN) * means(power)[:, None]
+    row, pulse = np.divmod(np.flatnonzero(loud), pulses)  # in a tenth of the time of places along two axes
     beside = np.maximum(power[row, pulse - 1], power[row, (pulse + 1) % pulses])
     for index in np.unique(row[power[row, pulse] > CLICK_OVER_BESIDE * beside]):
         if (found := clicks(records[index])).any():
@@ -125,5 +127,6 @@ def _at_random(places: NDArray[np.intp], pulses: int) -> bool:
     """True where clicks are few and no distance comes so often among them as a rotor's period would."""
     if len(places) > CLICKED_SHARE * pulses:
         return False
-    apart = np.bincount((places[:, None] - places)[np.triu_indices(len(places), 1)[::-1]], minlength=3)
-    return bool((apart[:-2] + apart[1:-1] + apart[2:]).max() < PERIOD_SHARE * len(places))
+    apart = np.bincount(np.abs(places[:, None] - places).ravel(), minlength=3)  # each distance twice
+    apart[0] = 0
+    return bool((apart[:-2] + apart[1:-1] + apart[2:]).max() < 2 * PERIOD_SHARE * len(places))

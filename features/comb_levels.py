@@ -16,7 +16,7 @@ from scipy import fft
 from .axis import UNSEEN_DB
 from .chopping import CHOPPING_RANGE_HZ, MIN_SPACING_BINS
 from .evidence import line_log_ratio
-from .fast import as_ordered, power_of, sums, to_db
+from .fast import as_ordered, at_most, power_of, sums, to_db
 from .notch import Mask, weights
 from .schema import COMB_BINS
 from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum, bins_alike, per_floor
@@ -26,7 +26,7 @@ from .window import BROAD_HANN, NEIGHBOUR_SHARE
 REACH_MPS = 80.0
 
 #: Power over the floor from which on more says nothing more: the evidence is capped long before.
-MOST_POWER = np.float32(20.0)
+MOST_POWER = 20.0
 
 #: SNR of the weak lines that are looked for, a bin.
 WEAK_SNR = 0.7
@@ -94,7 +94,7 @@ def comb_edges_hz() -> NDArray[np.float64]:
 
 def line_nats(relative_power: NDArray[np.floating]) -> NDArray[np.floating]:
     """Evidence of a weak line in each bin [nats]."""
-    return line_log_ratio(np.minimum(relative_power, MOST_POWER), WEAK_SNR)
+    return line_log_ratio(at_most(relative_power, MOST_POWER), WEAK_SNR)
 
 
 @lru_cache(maxsize=1)

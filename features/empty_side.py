@@ -79,5 +79,6 @@ def filled_sides(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray
     # float64, because the square of a sample may leave float32
     amplitude = np.sqrt(spectrum.floor[rows])[:, None]
     most = np.finfo(np.float32).max
-    filled = iq[rows] + amplitude * (empty[rows].astype(np.float32) @ side_noise(spectrum.pulses))
+    # of noise one side is empty at most: no product of matrices, for which a busy machine's threads wait
+    filled = iq[rows] + amplitude * side_noise(spectrum.pulses)[empty[rows, 1].astype(np.intp)]
     return rows, filled.view(np.float64).clip(-most, most).astype(np.float32).view(np.complex64)

@@ -6,6 +6,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from .fast import at_most
+
 #: Line powers over noise that a comb may have, and the share of its lines that may be missing.
 LINE_SNRS = (1.2, 6.0, 40.0)
 MISSING_SHARE = 0.15
@@ -78,4 +80,4 @@ def line_log_ratio(power: NDArray[np.floating], snr: float | NDArray[np.floating
     out *= (1 - MISSING_SHARE) / (1 + snr)
     out += out.dtype.type(MISSING_SHARE)
     np.log(out, out=out)
-    return np.minimum(out, out.dtype.type(LINE_CAP), out=out)
+    return at_most(out, LINE_CAP, out=out)

@@ -28,6 +28,11 @@ def at_least(values: NDArray[np.float32], low: float, out: NDArray[np.float32] |
     return values.clip(np.float32(low), _NO_LIMIT, out=out)
 
 
+def at_most(values: NDArray[np.floating], high: float, out: NDArray[np.floating] | None = None) -> NDArray[np.floating]:
+    """Values held at `high` from above, in the same way."""
+    return values.clip(-_NO_LIMIT, np.float32(high), out=out)
+
+
 @lru_cache(maxsize=64)
 def ones(count: int) -> NDArray[np.float32]:
     """So many ones, not to be written to."""

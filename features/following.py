@@ -12,6 +12,7 @@ from .bodies import LINE_DB
 from .dropouts import NOTHING, mended
 from .lines import from_whole
 from .notch import body_line
+from .one_thread import one_thread
 from .samples import finite_complex, require_radar, scaled, unit_scale
 from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum
 from .window import KAISER
@@ -43,7 +44,7 @@ def by_recording(
     carrier_hz: float,
     prf_hz: float,
 ) -> list[NDArray]:
-    """What is found in each recording of a batch (..., pulses), one after the other: an array (...) a field.
+    """What is found in each recording of a batch (..., pulses), one after the other, on one thread: an array a field.
 
     Pulses that were lost are filled in; one that lost too many for that is taken for silence.
 
@@ -57,7 +58,8 @@ def by_recording(
     lead, pulses = samples.shape[:-1], samples.shape[-1:]
     silence = np.zeros(pulses, np.complex64)
     each = [silence if stretches.get(index) == NOTHING else samples[index] for index in np.ndindex(lead)] or [silence]
-    rows = [one(recording, carrier_hz, prf_hz) for recording in each]
+    with one_thread:
+        rows = [one(recording, carrier_hz, prf_hz) for recording in each]
     return [np.array(column)[: math.prod(lead)].reshape(lead) for column in zip(*rows, strict=True)]
 
 

@@ -101,7 +101,8 @@ def beyond_radars(carrier_hz: float, prf_hz: float) -> str:
 def largest_part(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
     """Largest real or imaginary part of each record, by magnitude, shape (...)."""
     parts = np.ascontiguousarray(iq).view(np.float32)
-    return np.maximum.reduce(np.abs(parts), axis=-1)
+    # two passes that write nothing take half the time of one over magnitudes
+    return np.maximum(np.maximum.reduce(parts, axis=-1), -np.minimum.reduce(parts, axis=-1))
 
 
 def unit_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from .body_velocity import folded
 from .dropouts import unbroken
 from .following import by_recording, normed
-from .one_thread import one_thread
 from .rotor.comb import OVER_BODY, find_comb
 from .rotor.even_pulses import even_pulses
 from .rotor.periodogram import prepare
@@ -62,8 +61,7 @@ def steady_comb(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: f
     ValueError
         If the samples are not complex or not finite, or the frequencies are not positive.
     """
-    with one_thread:
-        return SteadyComb(*by_recording(iq, _one, carrier_hz, prf_hz))
+    return SteadyComb(*by_recording(iq, _one, carrier_hz, prf_hz))
 
 
 def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[float]:
