@@ -210,7 +210,7 @@ def measure(
         raise typer.Exit(2)
 
 
-@app.command(short_help="Train all models on synthetic records.")
+@app.command(short_help="Train models on synthetic records.")
 def train(
     out: Annotated[Path, _path_option("DIR", "Where the models and train.json go.")] = Path("out"),
     config: Config = None,
@@ -225,7 +225,7 @@ def train(
         _path_option("DIR", "Read the records from what `bladewing dataset` wrote, instead of drawing."),
     ] = None,
 ) -> None:
-    """Train all models on synthetic records and write them as ONNX; interrupted, the same command goes on."""
+    """Train models on synthetic records and write them as ONNX; interrupted, the same command goes on."""
     from .parts import TRAIN_PARTS
     from .train import run_training
 

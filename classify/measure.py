@@ -81,8 +81,15 @@ KNOWN_MPS, ENDS = 1.0, 0.05
 #: Combs in no larger a share of the dwells may be chance: of noise alone one dwell in some 300 shows one.
 CHANCE = 0.1
 
-#: Reasons of a dwell in which a rotor could not have been seen.
-BLIND = ("PRF too low", "dwell too short", BEYOND_FILLING_IN)
+#: Reasons of a dwell in which a rotor could not have been seen, or is seen and cannot be told.
+BLIND = (
+    "PRF too low",
+    "dwell too short",
+    "no signal",
+    "no digits left",
+    "no comb: lines are told apart",
+    BEYOND_FILLING_IN,
+)
 
 #: A recording whose spectrum has one side alone in more than this share of its dwells is of one channel.
 ONE_SIDED = 0.5
@@ -377,7 +384,7 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
         `MIN_PULSES`, or a frequency is no radar's or stands in the other's place.
     """
     if len(recording.iq) < 2:
-        raise BadInput(f"{recording.name}: 1 pulse: a measurement needs at least 2")
+        raise BadInput(f"{recording.name}: 1 pulse: a measurement needs at least 2, rotors some hundred: record more")
     require_hertz(recording.name, recording.carrier_hz, recording.prf_hz)
     iq = recording.dwells(settings.dwell_s, least=2)
     if iq.shape[1] > MOST_PULSES:

@@ -92,8 +92,8 @@ class _Frame:
                 yield f'<text x="{at:.1f}" y="{label_y:.1f}" text-anchor="middle">{said}</text>'
 
     def levels(self) -> Iterator[str]:
-        """A line every 20 dB from the noise up."""
-        for db in np.arange(0, self.top_db + 1, 20):
+        """A line every 20 dB from the noise up, or every 10 where so few would be drawn that none tells the scale."""
+        for db in np.arange(0, self.top_db + 1, 20 if self.top_db >= 40 else 10):
             yield f'<path d="M{_LEFT} {self.y(db):.1f}H{_WIDTH - _RIGHT}" stroke="#ccc" stroke-width="0.5"/>'
             yield f'<text x="{_LEFT - 6}" y="{self.y(db) + 4:.1f}" text-anchor="end">{db:.0f}</text>'
 

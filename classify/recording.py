@@ -255,7 +255,8 @@ def find_recording(path: str | os.PathLike[str]) -> Path:
         if given.is_dir():
             raise _folder(given)
         if not given.exists():
-            raise BadInput(f"{path}: no such file, and no {given.name}.sigmf-meta beside it")
+            named = given.suffix.lower() in ARRAY_SUFFIXES
+            raise BadInput(f"{path}: no such file" + ("" if named else f", and no {given.name}.sigmf-meta beside it"))
         require_size(given)
     except OSError as error:
         raise unreadable(path, error) from None

@@ -80,11 +80,12 @@ def print_account(account: dict[str, Any], out: Path) -> None:
         "false     birds and clutter that are named UAV\n"
         "named     records not answered 'unknown'; right: how many of these are right\n"
         "ECE       expected calibration error of the probabilities\n"
+        "kB, s     size of the file; seconds that training it took\n"
         "FFTs      time of a record, samples to answer, over that of its bare FFT"
     )
     if cascade:
         first, second = cascade[STAGES_KEY]
-        useless = " (so many that the second alone is as fast)" if cascade["asked"] > MOST_ASKED else ""
+        useless = " (so many that the second alone is no slower)" if cascade["asked"] > MOST_ASKED else ""
         printed.print(
             f"cascade   {first} first, then {second}\n"
             f"          about the {cascade['asked']:.0%} that it is not sure of{useless}"

@@ -24,14 +24,15 @@ for column, (kind, seed) in enumerate(SHOWN):
     velocity = spectrum.velocity_mps
     top, bottom = axes[:, column]
     extent = (0, 1e3 * RADAR.dwell_s, velocity[-1], velocity[0])
-    top.imshow(image[::-1], aspect="auto", origin="lower", extent=extent, vmin=0, vmax=SPAN_DB, cmap="cividis")
+    shown = top.imshow(image[::-1], aspect="auto", origin="lower", extent=extent, vmin=0, vmax=SPAN_DB, cmap="cividis")
     top.set_title(
         f"{records.labels[0]}: {kind.replace('_', ' ')}, SNR {records.truth['snr_db'][0]:.0f} dB", fontsize=11
     )
     top.set_xlabel("time [ms]")
     bottom.plot(velocity, spectrum.level_db, linewidth=0.7, color="#0072B2")
-    bottom.set(xlabel="radial velocity [m/s]", ylim=(-12, 75), xlim=(velocity[-1], velocity[0]))
+    bottom.set(xlabel="radial velocity [m/s]", ylim=(-12, 80), xlim=(velocity[-1], velocity[0]))
     bottom.grid(alpha=0.3)
+figure.colorbar(shown, ax=axes[0, -1], label="dB over noise", ticks=(0, 15, 30, 45))
 axes[0, 0].set_ylabel("radial velocity [m/s]")
 axes[1, 0].set_ylabel("dB over noise")
 figure.savefig(Path(__file__).with_name("classes.png"), dpi=110)

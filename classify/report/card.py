@@ -88,8 +88,8 @@ def expectations(report: Mapping[str, Any]) -> str:
         f"Frankly, what fails first (shipped `{name}`; figures from `docs/report.json`: "
         f"{count(report['records']['total'])} synthetic test records of {count(report['records']['radars'])} radars "
         f"over the whole envelope, many of which hold nothing to see: SNR of nine in ten {number(low)} to "
-        f"{number(high)} dB, dwells from {number(shortest)} ms, blades seen along their axis; in brackets 95 % "
-        "intervals as of independent records: those of one radar are alike, so read them as 1.5 to 2 times as wide):",
+        f"{number(high)} dB, dwells from {number(shortest)} ms, rotors seen up to 80° off their plane; in brackets "
+        "95 % intervals as of independent records: those of one radar are alike, so read them as 1.5 times as wide):",
         "",
         f"- balanced accuracy over the three classes {_rate(found['balanced_accuracy'])}"
         + (f" ({others})" if others else "")
@@ -171,7 +171,8 @@ def _training(report: Mapping[str, Any]) -> str:
     )
     drawn = (
         "Only synthetic records, drawn from the laws in `simulate/laws.py` over the whole envelope, through imperfect "
-        f"receivers. No measured record was trained on. Kinds: {kinds}."
+        f"receivers. No measured record was trained on. Kinds: {kinds}. A mover is a body that moves and shows nothing "
+        "else, as a far vehicle, a boat or a balloon."
     )
     if given is None:
         return f"{drawn} There is no account of how these models were trained."

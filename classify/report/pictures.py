@@ -213,7 +213,7 @@ def quantised(picture: NDArray[np.floating], bits: int) -> NDArray[np.floating]:
 
 
 def _stft_line(window: int, overlap: float) -> tuple[str, Picture]:
-    words = f"STFT, window {window}, overlap {overlap:.0%}".replace("%", " %")
+    words = f"STFT, window {window}, overlap {overlap:.0%}".replace("%", "\N{NO-BREAK SPACE}%")
     make = partial(stft_picture, window=window, overlap=overlap)
     return f"stft-{window}-{100 * overlap:.0f}", Picture(words, (1, IMAGE_BINS, IMAGE_FRAMES), make)
 

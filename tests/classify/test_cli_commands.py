@@ -156,7 +156,7 @@ def test_an_account_of_a_training_is_not_wrapped_in_a_pipe(capsys):
     account["cascade"]["asked"] = 0.95
     print_account(account, Path("out"))
     lines = capsys.readouterr().out.splitlines()
-    assert "          about the 95% that it is not sure of (so many that the second alone is as fast)" in lines
+    assert "          about the 95% that it is not sure of (so many that the second alone is no slower)" in lines
     assert not any(line.endswith(" ") for line in lines)
 
 

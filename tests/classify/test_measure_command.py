@@ -628,3 +628,11 @@ def test_silences_within_the_dwells_are_no_comb_whatever_the_channels(tmp_path, 
     *dwells, closing = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [dwell["chopping_hz"] for dwell in dwells] == [None] * 5
     assert closing["recording"]["with_comb"] == 0
+
+
+def test_in_silence_no_rotor_is_denied(tmp_path, capsys):
+    np.save(tmp_path / "silence.npy", np.zeros(2000, np.complex64))
+    assert main(["measure", str(tmp_path / "silence.npy"), *RADAR]) == 0
+    said = capsys.readouterr().out
+    assert "whether there is a rotor cannot be told" in said
+    assert "no rotor in" not in said
