@@ -7,6 +7,7 @@ of the ONNX standard, so any runtime can serve it.
 
 import hashlib
 import json
+import operator
 import os
 from pathlib import Path
 
@@ -91,6 +92,10 @@ def export_raw_iq(
     content, source = read_model(name)
     classifier = Classifier(content, source=source, max_false_alarm=max_false_alarm)
     carrier_hz, prf_hz = positive(carrier_hz, "carrier_hz"), positive(prf_hz, "prf_hz")
+    try:
+        pulses = operator.index(pulses)
+    except TypeError:
+        raise BadInput(f"pulses is {pulses!r}: it must be a whole number") from None
     outside = classifier.envelope.reason(carrier_hz, prf_hz, pulses)
     if outside is not None:
         raise BadInput(f"cannot be exported: {outside}")

@@ -265,11 +265,12 @@ class Classifier:
         Parameters
         ----------
         iq
-            Shape (..., pulses), complex: one range cell, one sample a pulse. Leading axes are a batch, and every
-            record is answered as if it were alone. The gain does not matter. Pulses that were lost, which are exactly
-            0, are filled in by what those beside them tell of them, and so are single ones that interference hit, far
-            over all others; of a record that more lost ones in a row break than that is done for, the longest stretch
-            is judged. One channel, I without Q, is made analytic.
+            Shape (..., pulses), complex: one range cell, one sample a pulse. Leading axes are a batch, and every record
+            is answered as if it were alone. The gain does not matter. Pulses that were lost, which are exactly 0, are
+            filled in by what those beside them tell of them, and so are single ones that interference hit, far over all
+            others; of a record that more lost ones in a row break than that is done for, the longest stretch is judged.
+            Those that a receiver marks by another value, or holds, a `Recording` alone finds. One channel, I without Q,
+            is made analytic.
         carrier_hz
             Carrier [Hz].
         prf_hz

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -219,8 +220,10 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
         joined = iq[: count // length * length].reshape(count // length, length * wanted)
         looks = classifier.predict(joined, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
         longer[length] = looks.probabilities, looks.labels
+    judged = (dwells.labels != UNKNOWN) | (np.ptp(dwells.probabilities, axis=1) > 0)
+    alone = np.count_nonzero(judged) == 1  # such a dwell's answer is the track's, by the dwell's thresholds
     shown: dict[str, float] = {}
-    if any(dwells.labels != UNKNOWN) or np.ptp(dwells.probabilities) > 0:  # else nothing could be judged
+    if judged.any():
         shown = long_look(recording.iq[: round(LONG_S * recording.prf_hz)], recording.carrier_hz, recording.prf_hz)
         if recording.clipped:  # it makes combs of its own
             shown.pop("comb", None)
@@ -229,7 +232,7 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
         dwells.labels,
         longer=longer,
         shown=shown,
-        rule=classifier.decide,
+        rule=partial(classifier.decide, pulses=wanted) if alone else classifier.decide,
         dwell_s=min(wanted / recording.prf_hz, Envelope.dwell_max_s),  # of whole pulses it may be a trifle longer
     )
     stop_s = start_s + wanted / recording.prf_hz

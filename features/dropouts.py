@@ -58,10 +58,37 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
         False everywhere where nothing speaks of lost ones: no zeros, no more than a converter of coarse steps gives of
         noise, or nothing else. Zeros of longer silences are no lost pulses.
     """
-    none = np.zeros(len(iq), bool)
     zero = _zeros(iq)
     if not zero.any():
+        return zero
+    lost = _among_steps(iq, zero)
+    return lost if lost.any() else _regular(zero)
+
+
+def _regular(zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Zeros as far apart as most are, from end to end: no chance, among those of a converter of coarse steps too.
+
+    A rotor's flashes come so, and what is lost so passes for them.
+    """
+    places, none = np.flatnonzero(zero), np.zeros(len(zero), bool)
+    period = int(np.bincount(np.diff(places), minlength=2).argmax())
+    if period < 2:
         return none
+    first = int(np.bincount(places % period).argmax())
+    members = len(zero[first::period])
+    share = (len(places) - members + 1) / (len(zero) - members + 1)
+    if not zero[first::period].all() or len(zero) ** 2 * share**members > CHANCE:
+        return none
+    lost = none.copy()
+    lost[first::period] = True
+    _, runs = _runs(zero)
+    lost[zero] &= np.repeat(runs, runs) <= MOST_IN_A_ROW
+    return lost
+
+
+def _among_steps(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Zeros that are more than the steps of a converter give."""
+    none = np.zeros(len(iq), bool)
     size = _sizes(iq)
     held, steps = _sorted_steps(size[~zero])
     if _hardly_steps(held, steps):

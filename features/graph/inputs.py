@@ -6,7 +6,7 @@ import numpy as np
 
 from ..axis import pooling
 from ..change import PARTS, frame_starts, part_length
-from ..dropouts import AS_NEAR, LEAST_DISTINCT, LEAST_LOST
+from ..dropouts import AS_NEAR, LEAST_DISTINCT, LEAST_LOST, MOST_IN_A_ROW
 from ..notch import LEAST_RESIDUAL
 from ..samples import LEAST_PART
 from ..schema import AXIS_BINS, FEATURES, INPUT_SHAPES
@@ -155,7 +155,10 @@ def _none_lost(graph: Graph, size: Value, pulses: int) -> Value:
     # beside a strong line at rest samples are nearly alike as well: none is as large as the next step
     is_step = (size.max() >= least * AS_NEAR) | (size.max() <= least * (1 + _OF_A_STEP))
     hardly_steps = (size.max() <= least * LEAST_DISTINCT) & (there <= steps * LEAST_DISTINCT)
-    return (zeros < float(LEAST_LOST)) | (is_step & ((zeros < steps) | hardly_steps))
+    upto = is_there.cumsum().pad(1, 0)
+    in_a_row = min(MOST_IN_A_ROW, pulses - 1) + 1
+    unbroken = (upto.slice(in_a_row, pulses + 1) - upto.slice(0, pulses + 1 - in_a_row)).min() > 0.0
+    return (zeros < float(LEAST_LOST)) | (is_step & ((unbroken & (zeros < steps)) | hardly_steps))
 
 
 def _two_channels(of_pulses: Value) -> Value:
@@ -164,10 +167,11 @@ def _two_channels(of_pulses: Value) -> Value:
     I and Q of the pulses have shape (records, pulses, 2).
     """
     real, imaginary = of_pulses.slice(0, 1), of_pulses.slice(1, 2)
-    apart = (real.apply("Abs") - imaginary.apply("Abs")).apply("Abs")
+    apart = of_pulses.graph.concat(real - imaginary, real + imaginary).apply("Abs").max(axis=-2, keep=False)
     highest, lowest = of_pulses.max(axis=-2, keep=False), -((-of_pulses).max(axis=-2, keep=False))
-    spans = of_pulses.graph.concat(highest - lowest, apart.max(axis=-2, keep=False))
-    return spans.min() > 0.0
+    spans = highest - lowest
+    still = spans.max() <= 0.0  # what is the same in every pulse is of no channel
+    return still | (of_pulses.graph.concat(spans, apart).min() > 0.0)
 
 
 def _feature_vector(

@@ -241,6 +241,33 @@ def test_lost_pulses_are_unknown_and_what_a_converter_rounds_to_zero_is_none(sma
             assert (np.abs(probabilities - 1 / 3).max(axis=1) > 0.01)[judged].mean() > least
 
 
+def test_a_silence_among_a_converters_zeros_is_unknown(tmp_path):
+    radar = {"carrier_hz": 9.85e9, "prf_hz": 25e3, "pulses": 2000}
+    rng = np.random.default_rng(4)
+    rounded = np.round(5 * rng.standard_normal((20, 2000, 2))).astype(np.float32).view(np.complex64)[..., 0]
+    export_raw_iq(tmp_path / "coarse.onnx", **radar, model="spectrum-cnn-fast")
+    session = opened(tmp_path / "coarse.onnx")
+    assert (np.abs(run(session, rounded)[0] - 1 / 3).max(axis=1) > 0.01).all()
+    rounded[:, 70:103] = 0
+    assert all(longest_silence(record)[1] for record in rounded)
+    probabilities, label = run(session, rounded)
+    np.testing.assert_array_equal(label, 3)
+    np.testing.assert_allclose(probabilities, 1 / 3, rtol=1e-6)
+
+
+def test_two_channels_of_one_bit_and_what_stands_still_are_judged_as_in_python(tmp_path):
+    radar = {"carrier_hz": 6e9, "prf_hz": 3.5e3}
+    iq = records(8, **radar, pulses=142)
+    given = np.concatenate([np.sign(iq.real) + 1j * np.sign(iq.imag), np.full((1, 142), 5545 + 13862j)])
+    given = given.astype(np.complex64)
+    export_raw_iq(tmp_path / "few.onnx", **radar, pulses=142, model="spectrum-cnn-fast")
+    probabilities, _ = run(opened(tmp_path / "few.onnx"), given)
+    expected = Classifier.load("spectrum-cnn-fast").predict(given, **radar).probabilities
+    assert (np.abs(expected - 1 / 3).max(axis=1) > 0.01).all()
+    np.testing.assert_allclose(probabilities[:8], expected[:8], atol=TOLERANCE)
+    np.testing.assert_allclose(probabilities[8], expected[8], atol=0.1)  # beside the line all is rounding
+
+
 def test_the_file_says_what_it_is_for_and_shows_any_change(small):
     out, radar, _ = small
     content = out.read_bytes()
@@ -293,6 +320,15 @@ def test_a_model_of_an_stft_is_refused(make_model, tmp_path):
     of_stft.write_bytes(make_model(input_name="joint_features", width=INPUT_SHAPES["joint_features"][0]))
     with pytest.raises(BadInput, match=r"joint\.onnx reads 'joint_features', of an STFT"):
         export_raw_iq(tmp_path / "raw.onnx", carrier_hz=10e9, prf_hz=20e3, pulses=200, model=of_stft)
+
+
+@pytest.mark.parametrize("pulses", [200.0, "200", None])
+def test_pulses_are_a_whole_number_of_any_type(tmp_path, pulses):
+    radar = {"carrier_hz": 10e9, "prf_hz": 20e3, "model": "spectrum-cnn-fast"}
+    with pytest.raises(BadInput, match=r"^pulses is ('?200(\.0)?'?|None): it must be a whole number$"):
+        export_raw_iq(tmp_path / "none.onnx", **radar, pulses=pulses)
+    export_raw_iq(tmp_path / "some.onnx", **radar, pulses=np.int32(200))
+    assert [path.name for path in tmp_path.iterdir()] == ["some.onnx"]
 
 
 def test_a_folder_that_is_missing_is_bad_input(tmp_path, capsys):

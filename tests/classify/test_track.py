@@ -304,7 +304,7 @@ def test_what_the_whole_track_shows_multiplies_odds_at_the_end_alone(shown, name
 class Asked:
     """A classifier that is never sure, and what it was asked."""
 
-    decide = staticmethod(lambda p: decide(p, ACCEPT))
+    decide = staticmethod(lambda p, pulses=None: decide(p, ACCEPT))
 
     def __init__(self, envelope):
         self.envelope, self.looks = envelope, []
@@ -514,3 +514,18 @@ def test_labels_in_the_place_of_probabilities_are_told_as_such(given):
 def test_labels_of_other_dwells_are_refused():
     with pytest.raises(BadInput, match=r"^labels \(2,\) must have shape \(1,\), one for each dwell$"):
         fused([[0.8, 0.1, 0.1]], ["uav", "uav"])
+
+
+def test_a_recording_of_one_dwell_is_named_by_the_thresholds_of_its_pulses():
+    classifier, radar = Classifier.load(), {"carrier_hz": 9.85e9, "prf_hz": 25e3}
+    pulses = 160
+    iq = draw_records(Radar(**radar, pulses=pulses), 60, seed=1).iq
+    alone = classifier.predict(iq, **radar)
+    sure, _ = classifier.decide(alone.probabilities)
+    assert (sure != alone.labels).any()  # as a track of many dwells some would be named
+    for record, label, reason in zip(iq, alone.labels, alone.reasons, strict=True):
+        track = answer(Recording("short", record, **radar), classifier).track
+        assert (track.label, track.reason) == (label, reason)
+    silent = np.concatenate([iq[sure != alone.labels][0], np.zeros(pulses)]).astype(np.complex64)
+    given = answer(Recording("half", silent, **radar), classifier, dwell_s=pulses / radar["prf_hz"])
+    assert (given.track.label, given.track.used) == (given.dwells.labels[0], 1)

@@ -43,6 +43,19 @@ def test_zeros_among_samples_without_steps_are_lost_pulses(lost: int, line: floa
     assert lost_pulses(iq * np.complex64(1e-30j)).sum() == lost  # of any gain and phase
 
 
+@pytest.mark.parametrize("period", [7, 10, 50])
+@pytest.mark.parametrize("steps", [0.7, 1.5, 2.0])
+def test_zeros_at_regular_distances_are_lost_among_those_that_a_converter_gives(steps: float, period: int) -> None:
+    given = noise(np.random.default_rng(1)) * np.float32(steps * np.sqrt(2)) + 3 * np.exp(0.1j * PULSES[:4000])
+    iq = (np.round(given.real) + 1j * np.round(given.imag)).astype(np.complex64)
+    assert not lost_pulses(iq).any()
+    iq[3::period] = 0
+    assert lost_pulses(iq)[3::period].all()
+    assert mended(iq)[0][3::period].all()
+    iq[1000:1100] = 0
+    assert not lost_pulses(iq)[1000:1100].any()  # a silence stays one
+
+
 @pytest.mark.parametrize("steps", [0.5, 1.0, 2.0, 3.0, 5.0])
 @pytest.mark.parametrize("channels", [1, 2])
 def test_zeros_that_a_converter_gives_of_weak_noise_are_none(steps: float, channels: int) -> None:
