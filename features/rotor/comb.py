@@ -198,10 +198,25 @@ def _lines_a_turn(orders: NDArray[np.intp], power: NDArray[np.float64], blades: 
         return strong_multiple(orders, power, range(numbers.start, min(numbers.stop, most + 1)))
 
     number = strong(blade_numbers(blades))
+    if number > 1 and blades is not None:
+        return _fewest_alike(orders, power, number)
     if number > 1 or blades is None or blades == 1:
         return number
     other = strong(blade_numbers(None))
     return other if blades % other == 0 or not _weak_lines_show(orders, power, other) else 1
+
+
+def _fewest_alike(orders: NDArray[np.intp], power: NDArray[np.float64], number: int) -> int:
+    """Every how many-th line is strong, where those of so many are: that, or a part of it at which all are as strong.
+
+    The search may take every second line of six unlike blades for all there are: every third of these is strong.
+    """
+    for part in range(number // 2, 1, -1):
+        own = orders % part == 0
+        strong = own & (orders % number == 0)
+        if number % part == 0 and _contrast(power[strong].mean(), power[own & ~strong].mean()) < UNEQUAL_FACTOR:
+            number = part
+    return number
 
 
 def powers_over_noise(data: Periodogram, fit: CombFit, rest: NDArray[np.complex128]) -> NDArray[np.float64]:

@@ -226,7 +226,7 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
     power *= _stands_out(data, places, power)
     highest_db = 10 * float(np.log10(power.max(initial=1.0)))
     others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
-    moving = 0.0
+    moving, told = 0.0, []
     centres = data.strong.centres
     # a line beside rest is a slow body's own, and hides no other
     hides = abs(centres[0]) * data.pulses < AT_REST_BINS and not any(_moves(data, line) for line in centres)
@@ -255,6 +255,8 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
         off = (orders - round(orders)) * found.spacing * data.pulses / (1 + 0.2 * from_middle)
         if abs(off) < 1.5 and level_db > LINE_DB:
             out.append((place, nats - 16 * off**2))
+            if _moves(data, centre) and out[-1][1] > TELLS:
+                told.append(round(orders))
     even: dict[int, float] = {}
     if not found.is_folded:  # on both sides of any line there are those of the other end
         if max(nats for _, nats in out) < TELLS:
@@ -266,6 +268,8 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
             )
             unlikely, most_even = _even_orders(data, shifted, 10 ** ((highest_db - ENDS_DB) / 10))
             even |= {about + order: most_even - nats for order, nats in unlikely.items() if nats < most_even}
+        # lines of several rotors of nearly one rate are as even about another order by chance
+        even |= {order: max(even.get(order, 0.0), max(even.values(), default=0.0) - TELLS) for order in told}
         evenest = sorted(even, key=even.__getitem__)[-EVENEST:]
         out += [(found.centre + found.spacing * order, 0.0) for order in evenest]
     most: dict[float, float] = {}

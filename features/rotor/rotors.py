@@ -129,7 +129,7 @@ def _is_twice(rest: Periodogram, centre: float, rate: float, fits: Sequence[Comb
     return half > max(HALF_SHARE * own, HALF_POWER)
 
 
-def _is_between(rest: Periodogram, centre: float, rate: float, fits: Sequence[CombFit]) -> bool:
+def _is_between(rest: Periodogram, centre: float, rate: float, fits: Sequence[CombFit], reach: int) -> bool:
     """True where a comb's lines are some of those that a known rotor's unlike blades have at its rotation rate.
 
     These stand at every multiple of that rate, a rotor's own only at its own multiples. Rotors like the known one, not
@@ -140,7 +140,8 @@ def _is_between(rest: Periodogram, centre: float, rate: float, fits: Sequence[Co
             times = round(rate / known * parts)
             if np.gcd(times, parts) > 1 or abs(rate * parts / (times * known) - 1) > RATE_SPREAD:
                 continue
-            order = np.arange(-HALF_ORDERS * parts, HALF_ORDERS * parts + 1)
+            last = min(HALF_ORDERS, reach) * parts
+            order = np.arange(-last, last + 1)
             order = order[order % parts != 0]
             is_own = order % times == 0
             own, other = (_low_power(rest, centre + rate / times * order[some], fits) for some in (is_own, ~is_own))
@@ -321,7 +322,7 @@ class Separation:
         """Take a rate in, if it is a rotor's."""
         if one.is_apart and _is_twice(self.rest, self.centre, one.rate, self.fits):
             one = replace(one, rate=one.rate / 2, reach=2 * one.reach)
-        if one.is_apart and _is_between(self.rest, self.centre, one.rate, self.fits):
+        if one.is_apart and _is_between(self.rest, self.centre, one.rate, self.fits, self.reach):
             return _NO_ROTOR
         rate, reach = one.rate, one.reach
         same = [abs(rate - known) < self.resolution for known in self.rates]

@@ -49,6 +49,17 @@ def test_normalised_errors_have_unit_variance():
     assert 0.5 < np.mean(np.square(errors)) < 1.75
 
 
+@pytest.mark.parametrize("blades", [6, 8])
+def test_the_number_of_unlike_blades_that_is_given_makes_no_multiple_of_their_rate(blades):
+    # every second of their lines was taken for all, and of these every so many-th: 5 of 10 chopped up to twice as fast
+    rng = np.random.default_rng(2)
+    for seed in range(10):
+        rate_hz, amplitudes = rng.uniform(80, 120), [rng.uniform(1.3, 2.0)] + [1.0] * (blades - 1)
+        iq = drone([rate_hz], snr_db=10, seed=seed, amplitudes=amplitudes, body=10.0)
+        found = measure(iq, **RADAR, blades=blades)
+        assert found.chopping_hz == pytest.approx(blades * rate_hz, rel=0.002)
+
+
 @pytest.mark.parametrize("fall_db", [0.0, 15.0])
 def test_the_level_that_edges_are_read_against_is_even_where_the_noise_is(fall_db):
     rng, turns = np.random.default_rng(3), np.arange(0.05, 0.45, 0.01)

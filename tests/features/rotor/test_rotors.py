@@ -9,6 +9,7 @@ from bladewing.features.rotor.periodogram import prepare
 from bladewing.simulate import Scene, rotor_echo
 
 from ...benchmarks import records
+from .. import signals
 from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, white
 
 
@@ -126,3 +127,15 @@ def test_the_smallest_drones_chop_beyond_the_cepstrum(chopping_hz, blades):
         assert np.isnan(found.rotation_hz)
         told = found.alternatives(())
         assert {"blades": blades} in [{"blades": round(choice["blades"])} for choice in told]
+
+
+@pytest.mark.parametrize("blades", [4, 5])
+def test_a_stronger_blade_is_no_second_rotor_where_few_orders_show(blades):
+    # asked was out to six orders: past the three that there are noise hid the lines between, and 4 of 12 were two
+    rng = np.random.default_rng(blades)
+    for _ in range(12):
+        rate_hz, amplitudes = rng.uniform(80, 120), [rng.uniform(1.3, 1.9)] + [1.0] * (blades - 1)
+        length_m = 3 * blades * signals.WAVELENGTH_M / (4 * np.pi)
+        echo = signals.rotors([rate_hz], length_m=length_m, amplitudes=amplitudes, velocity_mps=5.0)
+        found = measure(5 * echo + signals.white(rng, signals.PULSES), **signals.RADAR)
+        assert not (found.rotors_resolved and found.rotor_count > 1)
