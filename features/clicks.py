@@ -13,6 +13,9 @@ from .samples import energies, safe_scale, scaled
 #: A flash is as long as the rotor's band is narrow: its samples beside are as strong.
 CLICK_POWER, CLICK_OVER_BESIDE, MOST_CLICKS = 25.0, 4.0, 5
 
+#: Noise that swells and falls stands as high over its mean where it is loud: what lies so many pulses around tells.
+_AROUND = np.arange(-64, 65)
+
 #: Or as many as this share of the pulses, where no distance from click to click, a pulse more or less, is that of more
 #: than so large a share of them: interference at random times.
 CLICKED_SHARE, PERIOD_SHARE = 1 / 64, 0.4
@@ -46,10 +49,13 @@ def clicks(samples: NDArray[np.complexfloating]) -> NDArray[np.bool_]:
     noise = float(_of_rank(power, 0.5)) / np.log(2)
     beside = np.maximum(np.roll(power, 1), np.roll(power, -1))
     beside[[0, -1]] = np.inf  # the record may have cut a flash there
-    found = (power > CLICK_POWER * noise) & (power > CLICK_OVER_BESIDE * beside) & (noise > 0)
-    places = np.flatnonzero(found)
-    none = np.zeros(len(samples), bool)
+    places = np.flatnonzero((power > CLICK_POWER * noise) & (power > CLICK_OVER_BESIDE * beside) & (noise > 0))
+    found, none = np.zeros((2, len(samples)), bool)
     if not len(places) or (len(places) > MOST_CLICKS and not _at_random(places, len(samples))):
+        return none
+    around = power[np.clip(places[:, None] + _AROUND, 0, len(power) - 1)]
+    found[places] = power[places] > CLICK_POWER / np.log(2) * _of_rank(around, 0.5)
+    if not found.any():
         return none
     both = np.stack([samples, np.where(found, 0.0, samples)])
     before, after = _of_rank(squared(fft.fft(both)), 0.25)

@@ -36,6 +36,15 @@ def test_a_pulse_that_interference_hit_is_filled_in(times: float, gain: complex)
     np.testing.assert_array_equal(filled_in(given[1:2])[0], out[1])  # each as if it were alone
 
 
+def test_noise_that_swells_and_falls_stays_as_it_is() -> None:
+    """Where it is loud single samples stand high over all the record: of 100 such records 35 were changed."""
+    swells = (1 + np.cos(2 * np.pi * 3 * np.arange(2000) / 2000)).astype(np.float32)
+    given = np.stack([noise(seed) * swells for seed in range(100)])
+    assert (filled_in(given) != given).any(axis=1).sum() <= 5
+    given[0, 650] = 60  # where it is loudest, and so loud is no noise
+    assert abs(filled_in(given[:1])[0, 650]) < 6
+
+
 @pytest.mark.parametrize("turn", [1.0, 1j, 1 + 1j, 1 - 1j])
 def test_one_channel_that_a_pulse_hit_stays_one(turn: complex) -> None:
     """What was filled in left rounding in the other, and both sides of the spectrum were believed."""
