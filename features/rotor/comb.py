@@ -212,9 +212,9 @@ def _fewest_alike(orders: NDArray[np.intp], power: NDArray[np.float64], number: 
     The search may take every second line of six unlike blades for all there are: every third of these is strong.
     """
     for part in range(number // 2, 1, -1):
-        own = orders % part == 0
-        strong = own & (orders % number == 0)
-        if number % part == 0 and _contrast(power[strong].mean(), power[own & ~strong].mean()) < UNEQUAL_FACTOR:
+        strong = orders % number == 0
+        between = power[(orders % part == 0) & ~strong]
+        if number % part == 0 and len(between) and _contrast(power[strong].mean(), between.mean()) < UNEQUAL_FACTOR:
             number = part
     return number
 
