@@ -29,6 +29,9 @@ RIDGE = 1e-10
 NOTHING = slice(0, 0)
 BEYOND_FILLING_IN = "lost pulses: so many are exactly 0 that they cannot be filled in"
 
+#: Of what is unexplained in pulses that are filled in, the same for all records of so many pulses.
+_SEED = 22
+
 #: Two truths beside each other, as one number.
 _TWO_TRUE = np.array([True, True]).view(np.uint16)
 
@@ -271,9 +274,10 @@ def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.com
     """Fill in lost pulses from those before and after them.
 
     By the law by which each pulse of a block follows from those beside it (an autoregressive one, fitted forwards and
-    backwards), those that are missing are what leaves the least of it unexplained: exact for a few lines, and of noise
-    next to nothing, so that they draw no line of their own. Nor is I or Q beyond what it is elsewhere (`keep_within`):
-    a converter that clipped does so there too, and a channel that is the same in every pulse stays so.
+    backwards), those that are missing are what leaves the least of it unexplained, exact for a few lines, and beside
+    that as much of it as is unexplained elsewhere: without it noise would come and go as pulses are lost. Nor is I or Q
+    beyond what it is elsewhere (`keep_within`): a converter that clipped does so there too, and a channel that is the
+    same in every pulse stays so.
 
     Parameters
     ----------
@@ -292,14 +296,14 @@ def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.com
     Janssen, Veldhuis and Vries, "Adaptive interpolation of discrete-time signals that can be modeled as autoregressive
     processes", IEEE Trans. ASSP 34 (1986).
     """
-    out = iq.copy()
+    out, noise = iq.copy(), np.random.default_rng((_SEED, len(iq)))
     with one_thread:
         for block in np.array_split(np.arange(len(iq)), max(len(iq) // BLOCK, 1)):
             own = lost[block]
             if own.any():
                 start = max(block[0] - 2 * MOST_ORDERS, 0)
                 part = slice(start, block[-1] + 1 + 2 * MOST_ORDERS)
-                out[block[own]] = _filled_block(iq[part].astype(np.complex128), lost[part])[block[own] - start]
+                out[block[own]] = _filled_block(iq[part].astype(np.complex128), lost[part], noise)[block[own] - start]
     keep_within(out, lost)
     return out
 
@@ -322,9 +326,11 @@ def keep_within(iq: NDArray[np.complex64], filled_in: NDArray[np.bool_]) -> None
             iq.imag[filled_in] = sign * iq.real[filled_in]
 
 
-def _filled_block(iq: NDArray[np.complex128], lost: NDArray[np.bool_]) -> NDArray[np.complex128]:
+def _filled_block(
+    iq: NDArray[np.complex128], lost: NDArray[np.bool_], noise: np.random.Generator
+) -> NDArray[np.complex128]:
     """`filled` of a block that one law holds for."""
-    from scipy.linalg import solveh_banded  # here, because whole recordings need no such import
+    from scipy.linalg import cholesky_banded, solve_banded, solveh_banded  # here: whole recordings need none of them
 
     orders = min(MOST_ORDERS, len(iq) // 2)
     while orders > 1:
@@ -355,15 +361,28 @@ def _filled_block(iq: NDArray[np.complex128], lost: NDArray[np.bool_]) -> NDArra
     for start, excess in ends:
         pull[start + steps] -= excess @ known[start + steps]
     # of pulses further apart than the law reaches none, and the lower triangle by its diagonals
-    bands = np.zeros((min(orders + 1, len(places)), len(places)), np.complex128)
+    inner = np.zeros((min(orders + 1, len(places)), len(places)), np.complex128)
+    for below, diagonal in enumerate(inner):
+        step = places[below:] - places[: len(places) - below]
+        diagonal[: len(step)] = np.where(step <= orders, apart[np.minimum(step, orders)], 0)
+    bands = inner.copy()
     for below in range(len(bands)):
         one, other = places[below:], places[: len(places) - below]
-        step = one - other
-        bands[below, : len(step)] = np.where(step <= orders, apart[np.minimum(step, orders)], 0)
         for start, excess in ends:
             both_there = np.flatnonzero((other >= start) & (one < start + orders))
             bands[below, both_there] -= excess[one[both_there] - start, other[both_there] - start]
+    for each in (inner, bands):
+        each[0] *= 1 + RIDGE  # or rounding might undo what holds them
     out = iq.copy()
-    bands[0] *= 1 + RIDGE  # or rounding might undo what holds them
     out[places] = -solveh_banded(bands, pull[places], lower=True)
+    # what is unexplained of those that are missing, given all others: white noise through the inverse of the root's
+    # conjugate transpose, whose diagonals are those of an upper triangle; at the ends as if others were beyond
+    root = cholesky_banded(inner, lower=True)
+    white = noise.standard_normal((2, len(places)))
+    white = white[0] + 1j * white[1] if iq.real.any() and iq.imag.any() else np.sqrt(2) * white[0]
+    upper = np.zeros_like(root)
+    for above, diagonal in enumerate(root):
+        upper[-1 - above, above:] = diagonal[: len(places) - above].conj()
+    unexplained = np.mean(np.abs(both @ law) ** 2) / 2
+    out[places] += np.sqrt(unexplained) * solve_banded((0, len(root) - 1), upper, white)
     return out

@@ -210,8 +210,9 @@ def test_lost_pulses_are_filled_in_by_what_they_held(pattern: str, lines: dict[f
     given = np.where(lost, 0, whole)
     found = filled(given, lost_pulses(given))
     np.testing.assert_array_equal(found[~lost], whole[~lost])
-    # of lines of up to 60 dB less is wrong than there is noise, and none of the noise is made up
-    assert np.mean(np.abs(found - clear)[lost] ** 2) < 0.5
+    # of lines of up to 60 dB less is wrong than there is noise, of which there is as much as elsewhere: where pulses
+    # lost one in five came back without, a steady line was a UAV in 18 of 40 records
+    assert 0.6 < np.mean(np.abs(found - clear)[lost] ** 2) < 1.5
 
 
 def test_too_many_lost_pulses_are_left_as_they_were() -> None:
