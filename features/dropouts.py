@@ -330,7 +330,7 @@ def _filled_block(
     iq: NDArray[np.complex128], lost: NDArray[np.bool_], noise: np.random.Generator
 ) -> NDArray[np.complex128]:
     """`filled` of a block that one law holds for."""
-    from scipy.linalg import cholesky_banded, solve_banded, solveh_banded  # here: whole recordings need none of them
+    from scipy.linalg import solveh_banded  # here, because whole recordings need no such import
 
     orders = min(MOST_ORDERS, len(iq) // 2)
     while orders > 1:
@@ -375,14 +375,19 @@ def _filled_block(
         each[0] *= 1 + RIDGE  # or rounding might undo what holds them
     out = iq.copy()
     out[places] = -solveh_banded(bands, pull[places], lower=True)
-    # what is unexplained of those that are missing, given all others: white noise through the inverse of the root's
-    # conjugate transpose, whose diagonals are those of an upper triangle; at the ends as if others were beyond
-    root = cholesky_banded(inner, lower=True)
+    # what is unexplained of those that are missing, given all others; at the ends as if there were others beyond
     white = noise.standard_normal((2, len(places)))
     white = white[0] + 1j * white[1] if iq.real.any() and iq.imag.any() else np.sqrt(2) * white[0]
-    upper = np.zeros_like(root)
-    for above, diagonal in enumerate(root):
-        upper[-1 - above, above:] = diagonal[: len(places) - above].conj()
-    unexplained = np.mean(np.abs(both @ law) ** 2) / 2
-    out[places] += np.sqrt(unexplained) * solve_banded((0, len(root) - 1), upper, white)
+    out[places] += np.sqrt(np.mean(np.abs(both @ law) ** 2) / 2) * _of_precision(inner, white)
     return out
+
+
+def _of_precision(bands: NDArray[np.complex128], white: NDArray[np.inexact]) -> NDArray[np.complex128]:
+    """White noise made noise whose covariance is the inverse of a matrix, given by its lower diagonals."""
+    from scipy.linalg import cholesky_banded, solve_banded  # here, as above
+
+    root = cholesky_banded(bands, lower=True)
+    upper = np.zeros_like(root)  # its conjugate transpose, by its diagonals from the uppermost down
+    for above, diagonal in enumerate(root):
+        upper[-1 - above, above:] = diagonal[: len(white) - above].conj()
+    return np.asarray(solve_banded((0, len(root) - 1), upper, white), np.complex128)

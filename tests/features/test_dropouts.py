@@ -10,6 +10,7 @@ from bladewing.features.dropouts import (
     BEYOND_FILLING_IN,
     LEAST_DISTINCT,
     MOST_IN_A_ROW,
+    _of_precision,
     filled,
     longest_silence,
     lost_pulses,
@@ -341,3 +342,15 @@ def test_of_what_lost_too_many_no_course_is_told_either() -> None:
     called: list[int] = []
     measure(given.reshape(4, -1), **radar, on_record=called.append)
     assert called == [1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("beside", [1, 7])
+def test_what_no_law_explains_has_the_covariance_that_it_is_to_have(beside: int) -> None:
+    rng = np.random.default_rng(beside)
+    root = np.tril(np.triu(rng.normal(size=(12, 12)) + 1j * rng.normal(size=(12, 12)), -beside)) + 4 * np.eye(12)
+    matrix = root @ root.conj().T
+    bands = np.zeros((beside + 1, 12), complex)
+    for below in range(beside + 1):
+        bands[below, : 12 - below] = np.diagonal(matrix, -below)
+    through = np.stack([_of_precision(bands, one) for one in np.eye(12)], axis=1)
+    np.testing.assert_allclose(through @ through.conj().T, np.linalg.inv(matrix), atol=1e-12)
