@@ -2,8 +2,8 @@
 
 One rule for all keeps its promise of all radars together and of no single one: of short records, of which a model is
 seldom sure, one named bird in five was wrong where one in ten is promised, of long ones one in twenty
-(docs/ablation.md). So each range of pulses has thresholds of its own. What is told of a track of several dwells, which
-has no such number, goes by those of all records.
+(docs/ablation.md). So each range of pulses has thresholds of its own. What is told of a track of several dwells goes by
+those of all records, or of as many pulses as its dwells have together where these are few (`predict.answer`).
 """
 
 import json

@@ -516,6 +516,19 @@ def test_labels_of_other_dwells_are_refused():
         fused([[0.8, 0.1, 0.1]], ["uav", "uav"])
 
 
+def test_a_track_of_few_pulses_is_named_by_the_thresholds_of_as_many():
+    """By those of all lengths 82 to 89 in 100 of its birds and 81 to 88 of its clutter were right, not nine in ten."""
+    classifier, radar = Classifier.load(), {"carrier_hz": 9.85e9, "prf_hz": 25e3}
+    for dwells, pulses in ((3, 600), (3, 1500)):
+        iq = draw_records(Radar(**radar, pulses=pulses), 60, seed=1).iq
+        each = pulses // dwells / radar["prf_hz"]
+        tracks = [answer(Recording("short", one, **radar), classifier, dwell_s=each).track for one in iq]
+        said = np.stack([track.probabilities for track in tracks])
+        by_pulses, by_all = (classifier.decide(said, given)[0] for given in (pulses, None))
+        assert (by_pulses != by_all).any()
+        np.testing.assert_array_equal([t.label for t in tracks], by_pulses if pulses == 600 else by_all)
+
+
 def test_a_recording_of_one_dwell_is_named_by_the_thresholds_of_its_pulses():
     classifier, radar = Classifier.load(), {"carrier_hz": 9.85e9, "prf_hz": 25e3}
     pulses = 160
