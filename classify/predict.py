@@ -19,7 +19,7 @@ from .labels import CLASSES, UNKNOWN
 from .limits import DWELL_S
 from .recording import Recording
 from .terminal import counted, print_table, print_words
-from .track import Track, fuse
+from .track import Track, carry_evidence, fuse
 
 if TYPE_CHECKING:
     from bladewing.models.operating import OperatingPoint
@@ -225,8 +225,7 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
         joined = iq[: count // length * length].reshape(count // length, length * wanted)
         looks = classifier.predict(joined, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
         longer[length] = looks.probabilities, looks.labels
-    judged = (dwells.labels != UNKNOWN) | (np.ptp(dwells.probabilities, axis=1) > 0)
-    seen = int(np.count_nonzero(judged))
+    seen = int(np.count_nonzero(carry_evidence(dwells.probabilities, dwells.labels)))
     few = seen == 1 or seen * wanted < FEW_PULSES
     shown: dict[str, float] = {}
     if seen:

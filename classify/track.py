@@ -187,7 +187,13 @@ def _heard(
     if not (right := (p >= 0).all(axis=1) & (np.abs(p.sum(axis=1) - 1) < _OFF)).all():
         wrong = int(np.argmin(right))
         raise ValueError(f"probabilities of look {wrong} are {p[wrong]}: they must be 0 or more and sum to 1")
-    return p, (answers != UNKNOWN) | np.any(np.abs(p - p.mean(axis=1, keepdims=True)) >= 1e-6, axis=1)
+    return p, carry_evidence(p, answers)
+
+
+def carry_evidence(probabilities: NDArray[np.floating], labels: NDArray[np.str_]) -> NDArray[np.bool_]:
+    """Which looks carry evidence, shape (looks,): none that is "unknown" with 1/3 each."""
+    away = np.abs(probabilities - probabilities.mean(axis=1, keepdims=True))
+    return np.asarray((labels != UNKNOWN) | np.any(away >= 1e-6, axis=1), np.bool_)
 
 
 def _running_mean(p: NDArray[np.float64], heard: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:

@@ -151,11 +151,13 @@ def _sums_before(values: NDArray[np.float32]) -> NDArray[np.float32]:
     blocks = count // _BLOCK + 1
     products = -(-blocks // _MOST_BLOCKS)
     each = -(-blocks // products)
-    padded = np.zeros((*lead, products * each, _BLOCK), np.float32)
-    padded.reshape(*lead, products * each * _BLOCK)[..., :count] = values
-    out = (padded.reshape(*lead, products, each, _BLOCK) @ _BEFORE).reshape(padded.shape)
-    out[..., 1:, :] += np.add.accumulate(sums(padded[..., :-1, :]), axis=-1)[..., None]
-    return out.reshape(*lead, products * each * _BLOCK)
+    padded = np.zeros((*lead, products * each * _BLOCK), np.float32)
+    padded[..., :count] = values
+    within = padded.reshape(*lead, products, each, _BLOCK) @ _BEFORE
+    whole = sums(padded.reshape(*lead, products * each, _BLOCK)[..., :-1, :])
+    out = within.reshape(*lead, products * each, _BLOCK)
+    out[..., 1:, :] += np.add.accumulate(whole, axis=-1)[..., None]
+    return out.reshape(padded.shape)
 
 
 @lru_cache(maxsize=64)

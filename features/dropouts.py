@@ -84,9 +84,7 @@ def _regular(zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
         return none
     lost = none.copy()
     lost[first::period] = True
-    _, runs = _runs(zero)
-    lost[zero] &= np.repeat(runs, runs) <= MOST_IN_A_ROW
-    return lost
+    return lost & _in_short_runs(zero)
 
 
 def _among_steps(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -104,9 +102,7 @@ def _among_steps(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> NDArray[
     if step:
         size, nearly = np.abs(iq), np.float32(NEAR_TURNED * step)
         near = int(np.count_nonzero((size <= nearly) & ~zero))
-    _, runs = _runs(zero)
-    lost = none.copy()
-    lost[zero] = np.repeat(runs, runs) <= MOST_IN_A_ROW
+    lost = _in_short_runs(zero)
     zeros = int(lost.sum())
     if zeros <= NEAR_SHARE * near:
         return none
@@ -213,6 +209,14 @@ def _runs(zero: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Where each run of zeros begins, and its pulses, of a record's."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], zero, [False]])))
     return edges[::2], np.diff(edges)[::2]
+
+
+def _in_short_runs(zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Zeros that are not so many in a row as silence is, of a record's."""
+    _, lengths = _runs(zero)
+    out = zero.copy()
+    out[zero] = np.repeat(lengths, lengths) <= MOST_IN_A_ROW
+    return out
 
 
 def _silences(iq: NDArray[np.complex64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -61,7 +61,7 @@ def line_evidence(power: NDArray[np.floating], block: int) -> NDArray[np.float32
     power = power.astype(np.float32)
     strongest = maximum_filter1d(power, block, mode="wrap")
     held = power / (1 + np.float32(NEIGHBOUR_SHARE) * np.maximum(strongest - 10, 0))
-    held = np.minimum(held, np.float32(60))
+    held = at_most(held, 60)
     return np.asarray(line_log_ratio(held, np.array(LINE_SNRS, np.float32)[:, None]), np.float32)
 
 

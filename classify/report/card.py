@@ -84,12 +84,16 @@ def expectations(report: Mapping[str, Any]) -> str:
     accepted, at_pfa = found["acceptance"], found["uav_at_pfa"]
     low, high = report["records"]["snr_db"] or (float("nan"), float("nan"))
     shortest = 1e3 * report["records"]["dwell_s"][0]
+    wider = ""
+    if found["design_effect"] is not None:
+        times = number(found["design_effect"] ** 0.5)
+        wider = f": those of one radar are alike, so read them as {times} times as wide"
     lines = [
         f"Frankly, what fails first (shipped `{name}`; figures from `docs/report.json`: "
         f"{count(report['records']['total'])} synthetic test records of {count(report['records']['radars'])} radars "
         f"over the whole envelope, many of which hold nothing to see: SNR of nine in ten {number(low)} to "
         f"{number(high)} dB, dwells from {number(shortest)} ms, rotors seen up to 80° off their plane; in brackets "
-        "95 % intervals as of independent records: those of one radar are alike, so read them as 1.5 times as wide):",
+        f"95 % intervals as of independent records{wider}):",
         "",
         f"- balanced accuracy over the three classes {_rate(found['balanced_accuracy'])}"
         + (f" ({others})" if others else "")
