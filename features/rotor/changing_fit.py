@@ -179,7 +179,7 @@ def fit_changing(
     pulses, turning = data.pulses, _Turning(data, starts, centre, degrees)
     if min(np.bincount(turning.comb[turning.used], minlength=turning.count)) < 3:
         return None
-    smooth = over_orders(turning.comb, turning.order)
+    smooth = over_orders(turning.comb, turning.order, turning.used)
     basis = band_basis(pulses, data.strong.bands)
     least = LEAST_LEVEL if turning.count == 1 else 1.0
     level = level_about
@@ -190,7 +190,7 @@ def fit_changing(
         seen = lines.means(data.samples[None])[:, 0]
         together = lines_at_one_place(frequency, pulses)
         snr = np.minimum(snr, np.maximum((smooth(squared(seen) * pulses / noise) - 1) / together, 1e-3))
-        factored = _factored(lines.products(basis), ridges(snr, together))
+        factored = _factored(lines.products(basis), ridges(snr, together, turning.used))
         if factored is None:
             return None
         factor, held_back = factored

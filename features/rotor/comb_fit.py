@@ -76,15 +76,18 @@ class CombFit:
 
 
 def over_orders(
-    comb: NDArray[np.intp], order: NDArray[np.intp]
+    comb: NDArray[np.intp], order: NDArray[np.intp], used: NDArray[np.bool_]
 ) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """Means over neighbouring orders of the same comb; combs one after the other, orders rising."""
+    """Means over neighbouring orders of the same comb that are used; combs one after the other, orders rising."""
     place = order + comb * (2 * np.abs(order).max() + 4 * SMOOTHED_ORDERS)
-    first = np.searchsorted(place, place - SMOOTHED_ORDERS)
-    last = np.searchsorted(place, place + SMOOTHED_ORDERS, side="right")
+    known = place[used]
+    first = np.searchsorted(known, place - SMOOTHED_ORDERS)
+    last = np.searchsorted(known, place + SMOOTHED_ORDERS, side="right")
+    alone = first == last  # then the next one to either side
+    first, last = np.maximum(first - alone, 0), np.minimum(last + alone, len(known))
 
     def smooth(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        sums = np.concatenate([[0.0], np.cumsum(values)])
+        sums = np.concatenate([[0.0], np.cumsum(values[used])])
         return np.asarray((sums[last] - sums[first]) / (last - first), np.float64)
 
     return smooth
@@ -105,7 +108,7 @@ def lines_at_one_place(frequency: NDArray[np.float64], pulses: int) -> NDArray[n
     return np.asarray(last - first, np.intp)
 
 
-def ridges(snr: NDArray[np.float64], together: NDArray[np.intp]) -> NDArray[np.float64]:
+def ridges(snr: NDArray[np.float64], together: NDArray[np.intp], used: NDArray[np.bool_]) -> NDArray[np.float64]:
     """What holds amplitudes back, added to the lines' products with themselves.
 
     Parameters
@@ -115,8 +118,10 @@ def ridges(snr: NDArray[np.float64], together: NDArray[np.intp]) -> NDArray[np.f
     together : ndarray, shape (lines,)
         From `lines_at_one_place`. Those that lie in one another are held back however strong they are: let go, they
         come out as large ones that cancel.
+    used : ndarray of bool, shape (lines,)
+        The others too are: of one half in a band taken out so little is left that anything would explain it.
     """
-    let_go = np.where(together > 1, 1.0, 1 + (snr / CLEAR_SNR) ** 2)
+    let_go = np.where(used & (together == 1), 1 + (snr / CLEAR_SNR) ** 2, 1.0)
     return np.asarray(1 / (snr * let_go) + LEAST_RIDGE, np.float64)
 
 
@@ -207,7 +212,7 @@ def fit_combs(
     design = np.zeros((len(order), 1 + count))
     design[:, 0] = 1.0
     design[np.arange(len(order)), 1 + comb] = order
-    smooth = over_orders(comb, order)
+    smooth = over_orders(comb, order, used)
     limit = np.concatenate([[0.5], 0.5 / np.array([max(1, np.abs(own).max()) for own in orders])]) / pulses
     frequency = values[0] + values[1 + comb] * order
     # several combs' lines take so much of the noise out with them that what they leave says little of it
@@ -225,7 +230,7 @@ def fit_combs(
         most = smooth(np.abs(seen) ** 2 * pulses / level) - 1
         together = lines_at_one_place(frequency, pulses)
         snr = np.minimum(snr, np.maximum(most / together, 1e-3))
-        held_back = ridges(snr, together)
+        held_back = ridges(snr, together, used)
         factor, failed = _factored(products.plain, held_back)
         if failed:  # what is tabulated of the notch is a little off where nearly all was taken out
             factor, _ = _factored(products.plain, held_back + NOTCH_RIDGE)

@@ -267,16 +267,29 @@ def local_level(power: NDArray[np.floating], keep: NDArray[np.bool_], block: int
     return _level_at_bins(power, keep, block)(np.arange(len(power)))
 
 
+@lru_cache(maxsize=16)
+def _blocks(size: int, block: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Bins of the blocks of a spectrum in FFT order, shape (blocks, bins), and their middles, rising.
+
+    Those of the one side are the mirror images of the other's, that a record's conjugate has its level mirrored.
+    """
+    half = (size - 1) // 2
+    count = max(2, size // (2 * block))
+    length = half // count
+    # the few bins that whole blocks leave over are skipped, evenly
+    upper = 1 + ((np.arange(count) * half) // count)[:, None] + np.arange(length)
+    inside = np.concatenate([upper, size - upper[::-1]])
+    inside.setflags(write=False)
+    return inside, inside.mean(axis=1)
+
+
 def _level_at_bins(
     power: NDArray[np.floating], keep: NDArray[np.bool_], block: int, *, evened: bool = False
 ) -> Callable[[NDArray], NDArray[np.float64]]:
     """`local_level` as a function of the bin, from 0 to below their number; evened as in `Periodogram.level_of`."""
     size = len(power)
-    count = max(4, size // block)
-    length = size // count
-    # the few bins that whole blocks leave over are skipped, evenly
-    starts = (np.arange(count) * size) // count
-    inside = starts[:, None] + np.arange(length)
+    inside, middles = _blocks(size, block)
+    count, length = inside.shape
     kept = keep[inside]
     held = np.where(kept, power[inside], np.inf)
     number = kept.sum(axis=1)
@@ -289,7 +302,7 @@ def _level_at_bins(
     if evened:  # by the share of their scatter that is chance
         away = logs - logs.mean()
         logs = logs - BLOCK_BIAS - BLOCK_SCATTER / max(float(away.var()), BLOCK_SCATTER) * away
-    middles = (starts + length / 2)[known]
+    middles = middles[known]
     # the blocks at the ends once more around the circle: `interp` would turn every bin by its period
     middles = np.concatenate([middles[-1:] - size, middles, middles[:1] + size])
     logs = np.concatenate([logs[-1:], logs, logs[:1]])

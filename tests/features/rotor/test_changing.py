@@ -287,11 +287,12 @@ def test_strong_lines_that_lie_in_one_another_are_not_large_ones_that_cancel():
 
 
 def test_lines_that_lie_in_one_another_are_held_back_however_strong():
-    snr, together = np.array([1.0, 1e4, 1e4]), np.array([1, 1, 2])
-    alone, strong, shared = ridges(snr, together)
+    snr, together = np.array([1.0, 1e4, 1e4, 1e4]), np.array([1, 1, 2, 1])
+    alone, strong, shared, taken_out = ridges(snr, together, np.array([True, True, True, False]))
     assert alone == pytest.approx(1.0, rel=0.01)
     assert strong < 2e-6
     assert shared == pytest.approx(1e-4, rel=0.02)
+    assert taken_out == pytest.approx(1e-4, rel=0.02)
 
 
 def test_steady_rotors_near_the_noise_are_seldom_sought_among_changes(monkeypatch):
