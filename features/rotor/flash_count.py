@@ -59,10 +59,13 @@ def flashes_in_period(fit: CombFit, numbers: Iterable[int], tip: float) -> tuple
     snr = float(fit.snr.mean())
     for shape in shapes if least >= LEAST_OF_TIPS else shapes[:1]:
         for number in numbers:
-            found = [_evenly(np.abs(fit.orders[side]), fit.amplitudes[side], shape[side], number) for side in sides]
-            share, even = np.min(found, axis=0) * (1 + 1 / snr, 1)
+            share, even = np.inf, np.inf
+            for side in sides:
+                if share > most and even > UNSURE_EVEN:
+                    held, evenly = _evenly(np.abs(fit.orders[side]), fit.amplitudes[side], shape[side], number)
+                    share, even = min(share, held * (1 + 1 / snr)), min(even, evenly)
             if share > most and even > UNSURE_EVEN:
-                best, most, is_sure = number, share, bool(share > LEAST_SHARE and even > LEAST_EVEN)
+                best, most, is_sure = number, share, share > LEAST_SHARE and even > LEAST_EVEN
     return best, is_sure
 
 

@@ -64,7 +64,7 @@ def log_likelihood(
     start: NDArray[np.float64],
     bend_std: float,
     shares: NDArray[np.float64],
-    leak: float,
+    leaks: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Log likelihood of line powers in noise, the family's level and bends the likeliest.
 
@@ -84,29 +84,30 @@ def log_likelihood(
         How far each may go.
     shares : ndarray, shape (shares,)
         How unlike the model the powers may be, beyond their `scatter`: variance over the mean's square.
-    leak : float
-        Power that does not count.
+    leaks : ndarray, shape (leaks,)
+        Powers that do not count, each tried with each of the shares.
 
     Returns
     -------
-    nats : ndarray, shape (shares, families)
+    nats : ndarray, shape (leaks, shares, families)
         But for a constant.
     bends : ndarray, shape (len(BENDS),)
         The likeliest of all.
     """
-    unit = 1 / float((lines.power + leak).max())  # no square of a power leaves single precision
-    power, noise, bins, leak = lines.power * unit, lines.noise * unit, lines.bins, leak * unit
+    unit = 1 / float(lines.power.max() + leaks.max())  # no square of a power leaves single precision
+    power, noise, bins = lines.power * unit, lines.noise * unit, lines.bins
+    leak, share = np.repeat(leaks * unit, len(shares)), np.tile(shares, len(leaks))
     bends = np.stack([away**exponent for exponent in (0.0, *BENDS)], axis=1)
-    each = (len(power), len(shares), shape.shape[1])
+    each = (len(power), len(leak), shape.shape[1])
     # exponentials take a fifth of the time in single precision, and what these are off by is none here
     single = [
         values.astype(np.float32)
         for values in (
             (power - noise)[:, None, None],
             shape[:, None],
-            (shares[:, None] + lines.scatter).T[:, :, None],
+            (share[:, None] + lines.scatter).T[:, :, None],
             (2 * noise / bins)[:, None, None],
-            ((noise + leak) ** 2 / bins)[:, None, None],
+            ((noise[:, None] + leak) ** 2 / bins[:, None])[..., None],
         )
     ]
     excess, family, by_line, beat, own = single
@@ -120,11 +121,11 @@ def log_likelihood(
     held = (bend_std**-2 * (np.arange(len(bent)) > 0))[:, None]
     line = np.exp((bends @ bent).astype(np.float32)).reshape(each)
     line *= family
-    mean = line + (noise + leak)[:, None, None].astype(np.float32)
+    mean = line + (noise[:, None] + leak)[..., None].astype(np.float32)
     number = mean**2
     number /= _variance(line, by_line, beat, own)
     # of numbers this large what the ratio leaves of 1 counts: its logarithm in double precision
-    ratio = (power + leak)[:, None, None] / mean
+    ratio = (power[:, None] + leak)[..., None] / mean
     nats = np.log(ratio)
     nats -= ratio
     nats += 1
@@ -133,7 +134,7 @@ def log_likelihood(
     nats += np.float32(0.5) * np.log(number)
     nats -= np.float32(1 / 12) / number
     total = nats.sum(axis=0) - 0.5 * ((held * bent**2).sum(axis=0) + left).reshape(each[1:])
-    return np.asarray(total, np.float64), bent[1:, int(total.argmax())]
+    return total.reshape(len(leaks), len(shares), -1), bent[1:, int(total.argmax())]
 
 
 def _stepped(

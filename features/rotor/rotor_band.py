@@ -165,11 +165,8 @@ def fit_edge(
         shape = np.ascontiguousarray(np.stack(each)[..., near.order - 1].reshape(-1, len(near.order)).T)
         away = np.clip(1 - near.order / edge, 0, 1)
         # the first search asks the leak of the least sharp edge alone: it only says about which lines to look
-        said = [
-            log_likelihood(near, shape, away, bent, bend_std, shares[tried.shares], one * loud)
-            for one in (tried.leaks if search else tried.leaks[:1])
-        ]
-        nats, bent = np.stack([one for one, _ in said]), max(said, key=lambda one: float(one[0].max()))[1]
+        asked = loud * np.array(tried.leaks if search else tried.leaks[:1])
+        nats, bent = log_likelihood(near, shape, away, bent, bend_std, shares[tried.shares], asked)
         by_axis = (*nats.shape[:2], len(tried.blades), len(tried.profiles), len(edges))
         weight = np.moveaxis(nats.reshape(by_axis), (0, 1), (4, 3)) + tried.log_prior(share_prior, edges)
         weight = np.exp(weight - weight.max())
