@@ -1,7 +1,7 @@
 """The measurements of one record, by the names of `Measurements`."""
 
 from collections.abc import Iterable
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -110,6 +110,8 @@ def measure_record(
     else:
         middle = family.rotors.fits[0] if len(family.rotors.rates) > 1 else family.comb.fit
         steady, open_std = family.rotors.resolved, family.comb.body_std
+        if family.meeting_std is not None:
+            steady, middle = True, replace(middle, centre_std=max(middle.centre_std, family.meeting_std))
         # of rotors not told apart lines lie all around the circle: any of them may be the middle
         if not (family.is_told_apart or family.comb.body_has_line) and (family.fills_span or middle.is_folded):
             open_std = np.inf
@@ -289,7 +291,8 @@ def _blade(family: Family, found: dict[str, Any], blades: int | None) -> dict[st
     """Rotation rate and blade length, where the number of blades is given or seen."""
     comb, rates = family.comb, family.rotors.rates
     # unequal blades tell their number; between the lines of several rotors the weak ones may be something else
-    known = blades if blades is not None or len(rates) > 1 or not comb.blades_sure else comb.blades
+    told = comb.blades_sure and len(rates) == 1 and family.is_told_apart
+    known = comb.blades if blades is None and told else blades
     if known is None or (known > 1 and family.may_be_turn):
         return {}
     tip, tip_std = found["tip_speed_mps"], found["tip_speed_mps_std"]
@@ -298,7 +301,7 @@ def _blade(family: Family, found: dict[str, Any], blades: int | None) -> dict[st
         "rotation_hz": found["chopping_hz"] / known,
         "rotation_hz_std": found["chopping_hz_std"] / known,
         "blade_length_m": length,
-        "blade_length_m_std": length * float(np.hypot(tip_std / tip, comb.chopping_std / comb.chopping)),
+        "blade_length_m_std": length * float(np.hypot(tip_std / tip, found["chopping_hz_std"] / found["chopping_hz"])),
     }
 
 

@@ -15,7 +15,9 @@ from .comb_search import (
     LEAST_FRACTION_HZ,
     MIN_SPACING_BINS,
     SEARCHED_RATIO,
+    Candidate,
     best_candidate,
+    even_scores,
     factors_about,
     fastest_chopping,
     heights,
@@ -362,7 +364,22 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
         reason = f"no comb: evidence {start.score:.1f} nats, {threshold(data):.0f} are needed"
         return None, span_too_slow(data) or reason
     start = of_flashes(data, of_one_rotor(data, beside_line(data, start)))
-    start, open_orders, has_line = centred(data, start)
+    return _counted(data, *centred(data, start), blades)
+
+
+def counted_from(data: Periodogram, comb: Comb, place: float, blades: int | None) -> tuple[Comb | None, str]:
+    """A comb that was found counted from another of its lines, which is surely the body's [cycles a sample]."""
+    steps = comb.fit.spacing * factors_about(data.pulses, FINE_STEPS, 2 * FINE_STEPS)
+    scores, reaches = even_scores(data.contrast, steps, np.full(len(steps), place))
+    best = int(scores.argmax())
+    reach = int(reaches[best])
+    return _counted(data, Candidate(float(steps[best]), place, -reach, reach, float(scores[best])), 0.0, False, blades)
+
+
+def _counted(
+    data: Periodogram, start: Candidate, open_orders: float, has_line: bool, blades: int | None
+) -> tuple[Comb | None, str]:
+    """A comb fitted and judged, once it is known which of its lines is the body's: what `find_comb` gives."""
     fitted = fit_combs(data, start.centre, [start.spacing], [(start.low, start.high)])
     if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
         return None, span_too_slow(data) or f"no comb: fewer than {LEAST_LINES} lines"

@@ -130,6 +130,8 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, bool
     if found.is_folded:
         _, (reach,) = even_scores(evidence, np.array([best.spacing]), np.array([best.centre]), furthest)
         best = replace(best, centre=best.centre - round(best.centre), low=-int(reach), high=int(reach))
+        if not best.is_folded:  # counted from its own end it only seemed to go all around the span
+            return centred(data, best)
     return best, float(np.sqrt((likely * away**2).sum() / likely.sum())), has_line
 
 
@@ -149,9 +151,9 @@ def _one_sided(data: Periodogram, found: Candidate, best: Candidate, bonuses: di
     """What speaks for strong lines that all of a comb's lines lie on one side of, by order [nats over the best].
 
     Nothing does where the best order tells the body by how even all is about it, where too little shows to say that, or
-    where a filter took it out.
+    where a filter took it out, or it hides in a background.
     """
-    if found.is_folded or data.one_channel:
+    if found.is_folded or data.one_channel or abs(best.centre) < data.rest_half:
         return {}
     strong = [place for place, level_db in data.strong.lines if level_db > LINE_DB and place in bonuses]
     rivals, span = {}, best.high - best.low
@@ -285,19 +287,30 @@ def _mirrored(data: Periodogram, found: Candidate) -> dict[int, float]:
     none. All orders are compared at once: what a spectrum has in common with its mirror image is its own convolution.
     """
     shows = np.log(np.maximum(data.power * data.seen / SHOWS, 1))
-    size, spectrum = len(shows), fft.rfft(shows)
+    size = len(shows)
+    spectrum, squares, seen = fft.rfft(np.stack([shows, shows**2, data.seen]))
     order = np.arange(found.low, found.high + 1)
     places = found.centre + found.spacing * order
-    sums = np.rint(2 * places * size).astype(np.intp)[:, None] + np.arange(-BESIDE, BESIDE + 1)
-    alike = fft.irfft(spectrum**2, size)[sums % size].max(axis=1)
+    sums = np.rint(2 * places * size).astype(np.intp)[:, None] + np.arange(-BESIDE - 1, BESIDE + 2)
+    # what has no image that could be seen, as a strong line's is taken out, says nothing
+    unlike = _lowest(fft.irfft(squares * seen - spectrum**2, size)[sums % size])
     pairs = max(np.count_nonzero(shows) / PAIR_BINS, 1)
-    unlikely = pairs / 2 * np.log(2 * ((shows**2).sum() - alike) / pairs + LEAST_UNEVEN)
+    unlikely = pairs / 2 * np.log(2 * np.maximum(unlike, 0) / pairs + LEAST_UNEVEN)
     # about the place across the circle all is as even, but less of it is near
     across = round(0.5 / found.spacing)
     both = (order - across >= found.low) | (order + across <= found.high)
     middle = np.exp(2j * np.pi * np.flatnonzero(shows) / size).sum()
     unlikely += EVEN * (both & ((middle * np.exp(-2j * np.pi * places)).real < 0))
     return dict(zip(order.tolist(), (unlikely.min() - unlikely).tolist(), strict=True))
+
+
+def _lowest(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The lowest value of each row within, between its columns too: where the parabola through three of them is."""
+    row = np.arange(len(values))
+    lowest = 1 + values[:, 1:-1].argmin(axis=1)
+    before, own, after = (values[row, lowest + beside] for beside in (-1, 0, 1))
+    curve, is_lowest = before - 2 * own + after, (own < before) & (own < after)
+    return np.asarray(own - np.where(is_lowest, (before - after) ** 2 / (8 * np.where(is_lowest, curve, 1)), 0))
 
 
 def _even_orders(data: Periodogram, found: Candidate, least: float) -> tuple[dict[int, float], float]:

@@ -165,6 +165,7 @@ def fit_combs(
     steps: int = STEPS,
     *,
     level_about: Level | None = None,
+    own_centres: bool = False,
 ) -> tuple[list[CombFit], NDArray[np.complex128]] | None:
     """Refine combs about one centre, jointly, by Gauss-Newton steps on the frequencies of their lines.
 
@@ -187,6 +188,8 @@ def fit_combs(
         Steps at most, >= 1.
     level_about : callable, optional
         Local level without what is known of the combs already: the first step takes the level about the lines from it.
+    own_centres : bool
+        Each comb has a centre of its own, all start at the one given.
 
     Returns
     -------
@@ -204,17 +207,23 @@ def fit_combs(
         which.append(np.full(len(own), number))
     count = len(orders)
     comb, order = np.concatenate(which), np.concatenate(orders)
-    values = np.array([centre, *spacings])
-    used = data.usable(centre + values[1 + comb] * order)
+    centres = count if own_centres else 1
+    values = np.array([*[centre] * centres, *spacings])
+    own_centre = comb if own_centres else np.zeros(len(comb), np.intp)
+
+    def frequencies() -> NDArray[np.float64]:
+        return np.asarray(values[own_centre] + values[centres + comb] * order, np.float64)
+
+    frequency = frequencies()
+    used = data.usable(frequency)
     if min(np.bincount(comb, used, count)) < 3:
         return None
-    # change of each line's frequency with the centre and the spacings
-    design = np.zeros((len(order), 1 + count))
-    design[:, 0] = 1.0
-    design[np.arange(len(order)), 1 + comb] = order
+    # change of each line's frequency with the centres and the spacings
+    design = np.zeros((len(order), centres + count))
+    design[np.arange(len(order)), own_centre] = 1.0
+    design[np.arange(len(order)), centres + comb] = order
     smooth = over_orders(comb, order, used)
-    limit = np.concatenate([[0.5], 0.5 / np.array([max(1, np.abs(own).max()) for own in orders])]) / pulses
-    frequency = values[0] + values[1 + comb] * order
+    limit = np.array([0.5] * centres + [0.5 / max(1, np.abs(own).max()) for own in orders]) / pulses
     # several combs' lines take so much of the noise out with them that what they leave says little of it
     least = LEAST_LEVEL if count == 1 else 1.0
     snr = np.full(len(order), np.inf)
@@ -244,7 +253,7 @@ def fit_combs(
         step = np.linalg.solve(fisher, design.T @ pull)
         step = np.clip(step, -limit, limit)
         values = values + step
-        frequency = values[0] + values[1 + comb] * order
+        frequency = frequencies()
         if number == steps - 1 or (number and np.all(step**2 * np.diag(fisher) < ENOUGH**2)):
             break
         # what the lines leak lifts the level between them: as they are fitted, it is taken from what they leave
@@ -252,13 +261,13 @@ def fit_combs(
     std = np.sqrt(np.maximum(np.diag(np.linalg.inv(fisher)), 0) * data.ends_noise)
     out = []
     for number in range(count):
-        own = (comb == number) & used
+        own, middle = (comb == number) & used, number if own_centres else 0
         out.append(
             CombFit(
-                float(values[1 + number]),
-                float(values[0]),
-                float(std[1 + number]),
-                float(std[0]),
+                float(values[centres + number]),
+                float(values[middle]),
+                float(std[centres + number]),
+                float(std[middle]),
                 order[own],
                 amplitudes[own],
                 snr[own],

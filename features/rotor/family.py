@@ -10,7 +10,7 @@ from ..lines import squared
 from ..spectrum import Spectrum
 from .changing import ChangingSeparation, may_be_sought
 from .changing_fit import ChangingFit, Start, fit_changing
-from .comb import LEAST_REACH_MPS, OVER_BODY, Comb, blade_numbers, find_comb, is_short, span_too_slow
+from .comb import LEAST_REACH_MPS, OVER_BODY, Comb, blade_numbers, counted_from, find_comb, is_short, span_too_slow
 from .comb_fit import CombFit
 from .drift import Straightened, ahead_left, straightened
 from .family_edge import edge_around, edge_of_lines, span_of
@@ -18,6 +18,7 @@ from .flash_count import flashes_in_period
 from .flash_rate import may_be_fraction
 from .gain import Evened
 from .helicopter import Gear, find_gear
+from .meeting import meeting_of
 from .past_edge import told_no_further
 from .periodogram import Level, Periodogram, prepared_again
 from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
@@ -56,6 +57,9 @@ FAR_OFF = 0.003
 #: Lines that reach so far from a body, in shares of its own speed, are a wheel's: spokes end a little within the rim.
 WHEEL = (0.8, OVER_BODY)
 
+#: A comb of several rotors is counted anew so often, at most.
+RECOUNTS = 2
+
 #: A rate that may be twice to five times what it seems is told to so many times itself.
 UNTOLD_SPREAD = 4.0
 
@@ -86,6 +90,9 @@ class Family:
         standard deviations, shape (rotors, degrees) [samples]; None where they are not told apart.
     may_be_turn : bool
         True where the chopping frequency may be the rotation rate of unlike blades.
+    meeting_std : float or None
+        Where the combs of several rotors surely meet, standard deviation of that place, which is the body's [cycles a
+        sample].
     """
 
     data: Periodogram
@@ -98,6 +105,7 @@ class Family:
     gear_reason: str
     ahead: tuple[NDArray[np.float64], NDArray[np.float64]] | None
     may_be_turn: bool = False
+    meeting_std: float | None = None
 
     @property
     def is_told_apart(self) -> bool:
@@ -358,9 +366,17 @@ def _known_as(fit: CombFit, changing: ChangingFit) -> CombFit:
 
 
 def _as_it_is(
-    data: Periodogram, found: tuple[Comb | None, str], blades: int | None, even: Straightened | None = None
+    data: Periodogram,
+    found: tuple[Comb | None, str],
+    blades: int | None,
+    even: Straightened | None = None,
+    *,
+    recounts: int = RECOUNTS,
 ) -> tuple[Family | None, str]:
-    """`find_family` of rotors that turn evenly, or were made to, with the comb found, or why there is none."""
+    """`find_family` of rotors that turn evenly, or were made to, with the comb found, or why there is none.
+
+    Where several rotors' combs meet about another of its lines, it is counted from that.
+    """
     comb, why = found
     if comb is None:
         return None, why
@@ -371,6 +387,14 @@ def _as_it_is(
     fills_span = bool(np.isinf(edge))
     furthest = min(edge, span_of(data, [comb.fit]))
     gear, rotors, reason = find_gear(data, comb, furthest, blades)
+    meeting = None
+    if len(rotors.fits) > 1 and not data.one_channel:
+        meeting = meeting_of(data, rotors.fits, data.level_of(rotors.rest), resolved=rotors.resolved)
+        if meeting is not None and meeting.is_sure and meeting.order != 0 and recounts > 0:
+            counted = counted_from(data, comb, meeting.place, blades)
+            anew = _as_it_is(data, counted, blades, even, recounts=recounts - 1)
+            if anew[0] is not None:
+                return anew
     if gear is None and len(rotors.rates) == 1:  # of several the lines lie anywhere
         without, alike = without_weak_lines(data, comb, blades)
         again = find_gear(without, alike, furthest, blades) if without is not data else None
@@ -380,7 +404,12 @@ def _as_it_is(
         data, comb = gear.alone, gear.first
         edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades, gear.second.spacing)
     if len(rotors.rates) > 1 or not (gear or rotors.resolved):
-        return Family(data, comb, edge, std, fills_span, gear, rotors, reason, None), ""
+        known_at = None
+        if meeting is not None and gear is None:
+            known_at = meeting.std if meeting.is_sure and meeting.order == 0 else None
+            elsewhere = float(abs(meeting.place - rotors.fits[0].centre)) if meeting.order else 0.0
+            comb = replace(comb, body_std=0.0 if known_at else float(np.hypot(comb.body_std, elsewhere)))
+        return Family(data, comb, edge, std, fills_span, gear, rotors, reason, None, meeting_std=known_at), ""
     if even is None:
         ahead = ahead_left(data, [comb.fit], comb.rest)
         return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead), ""

@@ -90,7 +90,7 @@ class Periodogram:
     one_channel: bool
     ends_noise: float = 1.0
 
-    @property
+    @cached_property
     def blocked(self) -> tuple[tuple[float, float], ...]:
         """Centre and half width [cycles a sample] of what was taken out, with a margin."""
         return _blocked(self.strong.bands, self.pulses)

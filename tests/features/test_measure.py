@@ -669,7 +669,9 @@ def test_a_body_just_past_the_notch_at_rest_is_found_where_it_is():
 
 def test_unresolved_rotors_carry_their_spread():
     shown = {"snr_db": 10, "velocity_mps": 5.0, "body": 10.0}
-    found = measure(np.stack([drone(np.array([3440.0, 3447.0]) / 60, seed=seed, **shown) for seed in range(9)]), **RADAR)
+    found = measure(
+        np.stack([drone(np.array([3440.0, 3447.0]) / 60, seed=seed, **shown) for seed in range(9)]), **RADAR
+    )
     assert not found.rotors_resolved[found.rotor_count != 2].any()
     assert 4 < 30 * np.median(found.rotor_spread_hz) < 14  # [rpm]
     assert np.all((30 * found.rotor_spread_hz > 4) & (30 * found.rotor_spread_hz < 25))

@@ -84,11 +84,14 @@ def test_a_short_dwell_does_not_tell_a_moving_rotor_from_hum_and_so_does_not_ref
         assert found.chopping_hz == pytest.approx(chopping_hz, rel=0.01)
 
 
-@pytest.mark.parametrize(("times", "count", "seed"), [(0.5, 1, 3), (0.5, 2, 7), (0.8, 4, 3)])
-def test_an_edge_that_is_lost_in_the_noise_is_none(times, count, seed):
+@pytest.mark.parametrize(("times", "count", "least"), [(0.5, 1, 1), (0.5, 2, 0), (0.8, 4, 0)])
+def test_an_edge_that_is_lost_in_the_noise_is_none(times, count, least):
     """Tips of 35 +- 31, 45 +- 43 and 7 +- 16 m/s were told of such of 75 to 106."""
-    iq, radar, _, _ = folded(seed, times, count=count, spread=0.03, snr_db=-12.0)
-    found = measure(iq, **radar)
-    assert np.isfinite(found.chopping_hz)
-    assert np.isnan([found.tip_speed_mps, found.bandwidth_hz]).all()
-    assert "lost in the noise" in str(found.band_reason)
+    lost = 0
+    for seed in range(14):
+        iq, radar, _, _ = folded(seed, times, count=count, spread=0.03, snr_db=-12.0)
+        found = measure(iq, **radar)
+        assert np.isnan(found.tip_speed_mps) or found.tip_speed_mps_std < 0.3 * found.tip_speed_mps
+        assert np.isnan(found.tip_speed_mps) == np.isnan(found.bandwidth_hz) == bool(found.band_reason or found.reason)
+        lost += "lost in the noise" in str(found.band_reason)
+    assert lost >= least

@@ -21,7 +21,7 @@ def test_powers_are_averaged_over_the_orders_used_of_one_comb():
     comb, order = np.repeat([0, 1], 9), np.tile(np.arange(-4, 5), 2)
     used = np.abs(order) > 0
     used[order == 4] = False
-    values = np.where(used, 10.0 ** comb, 1e6)
+    values = np.where(used, 10.0**comb, 1e6)
     smooth = over_orders(comb, order, used)(values)
     np.testing.assert_allclose(smooth, 10.0**comb)
     rising = over_orders(comb, order, used)(np.where(used, order, 1e6).astype(float))

@@ -44,7 +44,7 @@ def racer(seed):
     return iq.astype(np.complex64), 2 * rates_hz
 
 
-@pytest.mark.parametrize("seed", [12, 54])
+@pytest.mark.parametrize("seed", [15, 54])
 def test_lines_of_unlike_rotors_make_no_finer_comb(seed):
     # a comb of a fraction, no whole one, of their rates meets the lines of several by chance
     iq, rates_hz = racer(seed)

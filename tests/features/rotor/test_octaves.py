@@ -114,19 +114,22 @@ def test_no_multiple_of_a_comb_is_told_beyond_what_is_sought(five_tips):
 
 def test_blades_that_are_given_leave_no_fraction_of_their_comb(five_tips):
     """Found at half the spacing, it was told so where five blades were given, and right where they were not."""
-    iq, radar = five_tips(13, 24, 38)
-    found = measure(iq, **radar, blades=5, beta_rad=np.radians(73))
-    np.testing.assert_allclose(found.chopping_hz, 749.5, rtol=1e-3)
-    np.testing.assert_allclose(found.rotation_hz, 149.9, rtol=1e-3)
-    np.testing.assert_allclose(found.blade_length_m, 0.1271, rtol=0.03)
+    iq, radar = five_tips(*range(40))
+    beta_rad = np.radians(73)
+    found, open_ = measure(iq, **radar, blades=5, beta_rad=beta_rad), measure(iq, **radar, beta_rad=beta_rad)
+    right, open_right = (np.abs(each.chopping_hz / 749.5 - 1) < 1e-3 for each in (found, open_))
+    assert right.sum() >= max(open_right.sum() - 1, 28)
+    np.testing.assert_allclose(found.rotation_hz[right], 149.9, rtol=1e-3)
+    assert np.mean(np.abs(found.blade_length_m[right] / 0.1271 - 1) < 0.03) > 0.9
 
 
 def test_weak_lines_that_are_not_there_are_no_unlike_blades(five_tips):
     """Of a comb found at half its spacing every second line is noise: two unlike blades were once told, for sure."""
-    iq, radar = five_tips(13, 24, 38)
+    iq, radar = five_tips(*range(40))
     found = measure(iq, **radar, beta_rad=np.radians(73))
-    np.testing.assert_allclose(found.chopping_hz, 749.5, rtol=1e-3)
-    assert np.isnan(found.rotation_hz).all()
+    right = np.abs(found.chopping_hz / 749.5 - 1) < 1e-3
+    assert right.sum() >= 28
+    assert np.isfinite(found.rotation_hz[right]).sum() <= 1
 
 
 def test_strong_lines_that_do_not_divide_the_blades_are_no_comb_where_the_others_are_there():

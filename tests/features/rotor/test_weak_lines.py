@@ -117,8 +117,8 @@ def test_of_several_rotors_they_are_no_further_one():
     """Of one in ten such records a rate at 3/4 of theirs was told, as one that is resolved."""
     radar = {"carrier_hz": 2.4e9, "prf_hz": PRF_HZ}
     time_s = np.arange(PULSES) / PRF_HZ
-    told = 0
-    for seed in range(10):
+    told = wrong = 0
+    for seed in range(20):
         rng = np.random.default_rng(seed)
         rates_hz = rng.uniform(45, 90) * rng.uniform(0.99, 1.01, 4)
         echo = sum(
@@ -131,8 +131,11 @@ def test_of_several_rotors_they_are_no_further_one():
         found = measure(iq.astype(np.complex64), **radar)
         given_hz = found.rotor_rates_hz[np.isfinite(found.rotor_rates_hz)]
         told += len(given_hz) > 1
-        assert (np.abs(given_hz / (4 * rates_hz.mean()) - 1) < 0.03).all()
-    assert told >= 5
+        right = bool((np.abs(given_hz / (4 * rates_hz.mean()) - 1) < 0.03).all())
+        assert right or not found.rotors_resolved
+        wrong += not right
+    assert told >= 10
+    assert wrong <= 3
 
 
 @pytest.mark.parametrize("part", [3 / 4, 5 / 4])
