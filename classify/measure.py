@@ -21,6 +21,7 @@ from bladewing.features.wingbeat import LEAST_S, Wingbeat, wingbeat
 
 from .envelope import Envelope, dwell_length, in_kilohertz, require_hertz
 from .errors import BadInput
+from .measure_body import KNOWN_MPS, over_dwells
 from .measure_dwells import measure_dwells
 from .progress import Progress
 from .recording import Recording
@@ -72,11 +73,8 @@ WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std", "acceleration_mps2", "acceleration
 #: Pulses of a dwell at most, as of one that is named: to measure so many takes a quarter of a minute.
 MOST_PULSES = Envelope.pulses_max
 
-#: No dwell knows the body better.
-LEAST_STD_MPS = 1e-6
-
-#: How fast a body is from dwell to dwell: by those that know it so well [m/s], but for so large a share at either end.
-KNOWN_MPS, ENDS = 1.0, 0.05
+#: How fast a body is from dwell to dwell: by those that know it well, but for so large a share at either end.
+ENDS = 0.05
 
 #: Combs in no larger a share of the dwells may be chance: of noise alone one dwell in some 300 shows one.
 CHANCE = 0.1
@@ -246,22 +244,14 @@ class Measured:
     def body(self, dwells: np.ndarray) -> dict[str, float | None]:
         """The body's velocity over some of the dwells and its deviation; nothing where none of them tells it.
 
-        The median of their values, each weighed by its own variance: where several lines may be the body's a dwell says
-        little. Where they differ by more than their deviations the mean's grows by as much (Birge 1932).
+        See `over_dwells`.
         """
         value, std = self._course(dwells)
         known = np.isfinite(value) & np.isfinite(std)
         if not known.any():
             return dict.fromkeys(BODY)
-        order = np.argsort(value[known])
-        value, weight = value[known][order], 1 / np.maximum(std[known][order], LEAST_STD_MPS) ** 2
-        # between the two on either side of the half, as a median of equal weights
-        upto = np.cumsum(weight) / weight.sum()
-        pair = np.searchsorted(upto, [0.5 - 1e-9, 0.5 + 1e-9])
-        middle = float(value[np.minimum(pair, len(value) - 1)].mean())
-        unlike = float((weight * (value - middle) ** 2).sum()) / max(len(value) - 1, 1)
-        middle -= self._span_mps * round(middle / self._span_mps)
-        return dict(zip(BODY, (middle, float(np.sqrt(max(unlike, 1.0) / weight.sum()))), strict=True))
+        middle, middle_std = over_dwells(value[known], std[known])
+        return dict(zip(BODY, (middle - self._span_mps * round(middle / self._span_mps), middle_std), strict=True))
 
     def body_range(self, dwells: np.ndarray) -> list[float] | None:
         """Between what nine tenths of the body's velocities in single dwells lie; None where none knows it well.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from bladewing.features.measurements import BODY
 from bladewing.features.rotor.comb import OVER_BODY
+from bladewing.features.rotor.comb_search import spacing_limits
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 
 from .errors import one_line
@@ -97,13 +98,15 @@ def _sentence(found: "Measured") -> str:
 
 
 def _none(found: "Measured") -> str:
-    """Where no rotor is, and where none could have been seen."""
+    """Where no rotor is, which would have been seen, and where none could have been."""
     dwells = len(found.iq)
+    slowest_hz = spacing_limits(found.iq.shape[-1], found.recording.prf_hz)[0] * found.recording.prf_hz
+    rotor = f"no rotor that chops at {slowest_hz:.0f} Hz or more in"
     if not found.looked_at:
         return "whether there is a rotor cannot be told"
     if found.looked_at < dwells:
-        return f"no rotor in {found.looked_at} of {counted(dwells)}, whether in the others cannot be told"
-    return f"no rotor in {counted(dwells)}"
+        return f"{rotor} {found.looked_at} of {counted(dwells)}, whether in the others cannot be told"
+    return f"{rotor} {counted(dwells)}"
 
 
 def _body(found: "Measured", all_together: Mapping[str, Any]) -> str:
