@@ -14,13 +14,11 @@ from .catalogue import AIRFRAMES, BIRDS, Entry
 from .discretes import MAX_BLADE_POINTS, MAX_BODY_POINTS, MAX_TYRE_POINTS, MAX_WHEELS
 from .insects import MAX_INSECTS
 from .laws import LAWS
+from .radar import no_carrier
 from .receiver import FAULT_CHANCE, MAX_STEPS
 
 #: Size of any number, at most: beyond every scene, and its samples are finite still.
 MOST = 1e12
-
-#: A carrier below this was given in another unit [Hz].
-LEAST_CARRIER_HZ = 1e6
 
 #: Scatterers of a blade that is a row of them, at most.
 MOST_POINTS = 1000
@@ -113,8 +111,8 @@ class RadarPart(Part):
     @field_validator("carrier_hz")
     @classmethod
     def _of_a_radar(cls, value: float) -> float:
-        if value < LEAST_CARRIER_HZ:
-            raise ValueError(f"{value:g} Hz is no radar's: it must be {LEAST_CARRIER_HZ:g} Hz or more: 10 GHz is 10e9")
+        if why := no_carrier(value):
+            raise ValueError(why)
         return value
 
 

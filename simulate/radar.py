@@ -11,6 +11,17 @@ from numpy.typing import NDArray
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 
 
+#: A carrier below this was given in another unit [Hz].
+LEAST_CARRIER_HZ = 1e6
+
+
+def no_carrier(carrier_hz: float) -> str:
+    """Why a frequency is no radar's carrier; empty where it may be one's."""
+    if carrier_hz >= LEAST_CARRIER_HZ:
+        return ""
+    return f"{carrier_hz:g} Hz is no radar's: it must be {LEAST_CARRIER_HZ:g} Hz or more: 10 GHz is 10e9"
+
+
 def whole(value: object, name: str, least: int = 0) -> int:
     """Check a whole number, as a count or a seed is.
 
@@ -31,7 +42,7 @@ class Radar:
     Parameters
     ----------
     carrier_hz : float
-        Carrier frequency [Hz], > 0.
+        Carrier frequency [Hz], 1e6 or more.
     prf_hz : float
         Pulse repetition frequency [Hz], > 0.
     pulses : int
@@ -57,6 +68,8 @@ class Radar:
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} is {value!r}: it must be a finite number above 0 [Hz]")
             object.__setattr__(self, name, float(value))
+        if why := no_carrier(self.carrier_hz):
+            raise ValueError(f"carrier_hz: {why}")
         object.__setattr__(self, "pulses", whole(self.pulses, "pulses", 1))
 
     @property

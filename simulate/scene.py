@@ -140,13 +140,14 @@ def _line(problem: dict[str, Any]) -> str:
         return f"unknown field {field}: the fields are {', '.join(model.model_fields)}"
     if problem["type"] == "missing":
         return f"{field} is missing: it is required"
+    table = ".".join(part for part in problem["loc"] if isinstance(part, str))  # as its header is written
     rule = _RULES.get(problem["type"], problem["msg"].removeprefix("Input ").removeprefix("Value error, "))
     if problem["type"] == "value_error":
         return f"{field}: {rule}" if field else rule
     if problem["type"] == "tuple_type" and isinstance(problem["input"], dict):
-        return f"{field} is one table: there may be several: write [[{field}]] above each"
+        return f"{field} is one table: there may be several: write [[{table}]] above each"
     if problem["type"] == "model_type":
-        return f"{field} is {problem['input']!r}: it must be a table: write [{field}] above its fields"
+        return f"{field} is {problem['input']!r}: it must be a table: write [{table}] above its fields"
     return f"{field} is {problem['input']!r}: it {rule}"
 
 

@@ -17,6 +17,7 @@ def test_paper_radar_has_the_dwell_and_the_span_of_table_i():
     [
         ("carrier_hz", 0.0),
         ("carrier_hz", np.nan),
+        ("carrier_hz", 9.85),
         ("prf_hz", -1.0),
         ("prf_hz", np.inf),
         ("pulses", 0),

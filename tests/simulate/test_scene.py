@@ -54,6 +54,10 @@ def power_spectrum(iq: np.ndarray) -> np.ndarray:
         (scene(uav=[uav(rotors=[{**ROTOR, "blade_amplitudes": [1.0]}])]), r"one a blade, blades = 2"),
         (scene(uav=[uav(beta_deg=91.0)]), r"uav\[0\]\.beta_deg is 91\.0: it should be less than or equal to 90"),
         (scene(uav=uav()), r"uav is one table: there may be several: write \[\[uav\]\] above each"),
+        (
+            scene(uav=[{"name": "own", "body": {"level_db": 20.0}}]),
+            r"uav\[0\]\.body is one table: there may be several: write \[\[uav\.body\]\] above each",
+        ),
         ({**scene(), "radar": 3}, r"radar is 3: it must be a table: write \[radar\] above its fields"),
         (scene(uav=[uav(velocity=3.0)]), r"unknown field uav\[0\]\.velocity: the fields are .*velocity_mps"),
         (scene(uav=[uav(rotors=[{**ROTOR, "rpm": 3.0}])]), r"unknown field .*rpm: the fields are blade_length_m"),
