@@ -18,7 +18,7 @@ from .flash_count import flashes_in_period
 from .flash_rate import may_be_fraction
 from .gain import Evened
 from .helicopter import Gear, find_gear
-from .meeting import meeting_of
+from .meeting import Meeting, meeting_of
 from .past_edge import told_no_further
 from .periodogram import Level, Periodogram, prepared_again
 from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
@@ -56,6 +56,11 @@ FAR_OFF = 0.003
 
 #: Lines that reach so far from a body, in shares of its own speed, are a wheel's: spokes end a little within the rim.
 WHEEL = (0.8, OVER_BODY)
+
+#: Of rotors that one comb holds, and no line that tells the body, that is so many orders off, rms: 8 of 60 were.
+#: Two that beat are about as even about another order, by 0.3 nats^2 and more; a lone one's lines by 0.01, of so many
+#: orders of such an snr to each side.
+BEATING_ORDERS, EVEN_NATS, EVEN_PAIRS, EVEN_SNR = 0.5, 0.1, 4, 10.0
 
 #: A comb of several rotors is counted anew so often, at most.
 RECOUNTS = 2
@@ -390,10 +395,10 @@ def _as_it_is(
     meeting = None
     if len(rotors.fits) > 1 and not data.one_channel:
         meeting = meeting_of(data, rotors.fits, data.level_of(rotors.rest), resolved=rotors.resolved)
-        if meeting is not None and meeting.is_sure and meeting.order != 0 and recounts > 0:
+        if meeting is not None and meeting.order != 0 and meeting.is_near and recounts > 0:
             counted = counted_from(data, comb, meeting.place, blades)
             anew = _as_it_is(data, counted, blades, even, recounts=recounts - 1)
-            if anew[0] is not None:
+            if anew[0] is not None and _power(anew[0].rotors.rest) < _power(rotors.rest):
                 return anew
     if gear is None and len(rotors.rates) == 1:  # of several the lines lie anywhere
         without, alike = without_weak_lines(data, comb, blades)
@@ -404,11 +409,7 @@ def _as_it_is(
         data, comb = gear.alone, gear.first
         edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades, gear.second.spacing)
     if len(rotors.rates) > 1 or not (gear or rotors.resolved):
-        known_at = None
-        if meeting is not None and gear is None:
-            known_at = meeting.std if meeting.is_sure and meeting.order == 0 else None
-            elsewhere = float(abs(meeting.place - rotors.fits[0].centre)) if meeting.order else 0.0
-            comb = replace(comb, body_std=0.0 if known_at else float(np.hypot(comb.body_std, elsewhere)))
+        comb, known_at = (comb, None) if gear is not None else _with_body(comb, rotors, meeting)
         return Family(data, comb, edge, std, fills_span, gear, rotors, reason, None, meeting_std=known_at), ""
     if even is None:
         ahead = ahead_left(data, [comb.fit], comb.rest)
@@ -421,6 +422,33 @@ def _as_it_is(
     rotors = replace(rotors, rates=np.array([comb.chopping]), stds=np.array([comb.chopping_std]), fits=[comb.fit])
     ahead = changing.ahead[None], changing.ahead_std[None]
     return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead), ""
+
+
+def _with_body(comb: Comb, rotors: Rotors, meeting: Meeting | None) -> tuple[Comb, float | None]:
+    """A comb that may be several rotors' with what is known of the body: where they meet, and how sure that is."""
+    if meeting is None:
+        beats = len(rotors.rates) == 1 and not (comb.body_has_line or _is_even(comb.fit))
+        return replace(comb, body_std=max(comb.body_std, BEATING_ORDERS * comb.chopping)) if beats else comb, None
+    if meeting.is_sure and meeting.order == 0:
+        return replace(comb, body_std=0.0), meeting.std
+    elsewhere = abs(meeting.place - rotors.fits[0].centre) if meeting.order else 0.0
+    return replace(comb, body_std=float(np.linalg.norm([comb.body_std, elsewhere, meeting.open_std]))), None
+
+
+def _is_even(fit: CombFit) -> bool:
+    """Whether a comb's lines are as strong on both sides of its centre, as a lone rotor's are."""
+    power, snr = (dict(zip(fit.orders.tolist(), values, strict=True)) for values in (squared(fit.amplitudes), fit.snr))
+    pairs = [order for order in power if order > 0 and min(snr[order], snr.get(-order, 0.0)) > EVEN_SNR]
+    if len(pairs) < EVEN_PAIRS:
+        return False
+    unlike = np.square([np.log(power[order] / power[-order]) for order in pairs])
+    by_noise = [2 / snr[order] + 2 / snr[-order] for order in pairs]
+    return bool(np.mean(unlike) < EVEN_NATS + np.mean(by_noise))
+
+
+def _power(rest: NDArray[np.complex128]) -> float:
+    """What combs leave of a record."""
+    return float(squared(rest).sum())
 
 
 def _geared(gear: Gear, even: Straightened, level_about: Level) -> tuple[Gear, ChangingFit]:

@@ -20,9 +20,15 @@ MEETING_STEPS = 3
 #: Asked are so many orders to each side.
 MOST_ORDERS = 100
 
-#: They meet where the square of what their places are apart, over its variance, is so much less than elsewhere, and at
-#: most that or this share of what it is elsewhere.
-SURE, SHARE = 30.0, 0.2
+#: Beside what their places say, so much speaks for the order that they were counted from; orders less likely than the
+#: likeliest by more than the second are none [nats].
+COUNTED, OPEN_NATS = 3.0, 3.0
+
+#: They surely meet about one order where no other is nearer to it than this [nats].
+SURE = 15.0
+
+#: A joint fit about a place off theirs by more than this is drawn to combs that are none [bins].
+NEAR_BINS = 0.35
 
 #: A comb that is several rotors not told apart has each of its lines drawn off its place by so much [bins], rms.
 MERGED_BINS = 0.2
@@ -35,17 +41,23 @@ class Meeting:
     Parameters
     ----------
     order : int
-        Of theirs, counted from their common centre.
+        The likeliest, counted from their common centre.
     place, std : float
-        And standard deviation, by how near they come to one another too [cycles a sample].
+        That of it, and standard deviation, by how near they come to one another too [cycles a sample].
+    open_std : float
+        What other orders add to that, where they are about as likely [cycles a sample].
     is_sure : bool
-        Whether they do about no other order.
+        Whether none is by far.
+    is_near : bool
+        Whether it is told from combs that the joint fit was not far from.
     """
 
     order: int
     place: float
     std: float
+    open_std: float
     is_sure: bool
+    is_near: bool
 
 
 def meeting_of(data: Periodogram, fits: Sequence[CombFit], level_about: Level, *, resolved: bool) -> Meeting | None:
@@ -65,7 +77,7 @@ def meeting_of(data: Periodogram, fits: Sequence[CombFit], level_about: Level, *
     Returns
     -------
     Meeting or None
-        None where nothing says that it is elsewhere than at their common centre, nor that it is there.
+        None where they cannot be fitted each about a centre of its own.
     """
     ends = [(int(fit.orders.min()) + MARGIN_ORDERS, int(fit.orders.max()) - MARGIN_ORDERS) for fit in fits]
     reaches = [(min(low, 0), max(high, 0)) for low, high in ends]
@@ -75,14 +87,18 @@ def meeting_of(data: Periodogram, fits: Sequence[CombFit], level_about: Level, *
         return None
     merged = np.array([0.0 if resolved else MERGED_BINS / np.sqrt(len(fit.orders)) for fit in apart[0]])
     most = min(MOST_ORDERS, max(max(-low, high) for low, high in reaches))
-    plain = _by_order(apart[0], most, np.zeros(len(fits)))
     unlike, place, std = _by_order(apart[0], most, merged / data.pulses)
-    best = int(unlike.argmin())
-    is_sure = _beats(unlike[best], np.delete(unlike, best).min(initial=np.inf))
-    likeliest = best if is_sure else int(plain[0].argmin())
-    if not is_sure and not _beats(plain[0][likeliest], plain[0][most]):
-        return None
-    return Meeting(likeliest - most, float(place[likeliest]), float(std[likeliest]), is_sure)
+    # combs that meet nowhere as near as they should say so much less
+    nats = -unlike / 2 / max(float(unlike.min()) / (len(fits) - 1), 1.0)
+    nats[most] += COUNTED
+    best = int(nats.argmax())
+    likely = np.exp(nats - nats[best])
+    is_sure = bool(np.delete(likely, best).max(initial=0.0) < np.exp(-SURE))
+    likely[likely < np.exp(-OPEN_NATS)] = 0.0
+    open_orders = float(np.sqrt((likely * (np.arange(len(likely)) - best) ** 2).sum() / likely.sum()))
+    open_std = open_orders * float(np.mean(spacings))
+    is_near = float(np.ptp([fit.centre for fit in apart[0]])) * data.pulses < NEAR_BINS
+    return Meeting(best - most, float(place[best]), float(std[best]), open_std, is_sure, is_near)
 
 
 def _by_order(
@@ -100,8 +116,3 @@ def _by_order(
     mean = (weight * place).sum(axis=1) / total
     unlike = (weight * (place - mean[:, None]) ** 2).sum(axis=1)
     return unlike, mean, np.sqrt(np.maximum(unlike / (len(fits) - 1), 1.0) / total)
-
-
-def _beats(one: float, other: float) -> bool:
-    """Whether combs that are so unlike at one order surely meet there and not where they are so unlike."""
-    return bool(other - one > SURE and one < max(SHARE * other, SURE))
