@@ -109,13 +109,13 @@ def body_velocity(
         offset = abs(folded(own - fit.centre))
         # rotors that were taken for one move its comb, and a body that turns has a line whose top is not its mean
         apart = offset if offset > APART_DEVIATIONS * np.hypot(std, fit.centre_std) else 0.0
-        if data.rest_half > abs(own) and abs(own) * data.pulses < AT_REST_BINS:
-            # a background's line tells nothing of a body that hovers before it
-            turns, std = fit.centre, float(np.hypot(fit.centre_std, 0.0 if steady else offset))
-        elif offset * data.pulses > AT_CENTRE_BINS:
+        if offset * data.pulses > AT_CENTRE_BINS:
             # no background lies beside rest: a line there is as likely a slow body's
             slow = AT_REST_BINS < abs(own) * data.pulses <= data.rest_half * data.pulses
             turns, std = fit.centre, float(np.hypot(fit.centre_std, offset * slow))
+        elif abs(own) < min(data.rest_half, AT_REST_BINS / data.pulses):
+            # a background's line tells nothing of a body that hovers before it
+            turns, std = fit.centre, float(np.hypot(fit.centre_std, 0.0 if steady else offset))
         elif steady:
             turns, std = (fit.centre, fit.centre_std) if fit.centre_std < std else (own, std)
             std = float(np.hypot(std, apart))

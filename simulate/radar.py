@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 #: Speed of light [m/s], exact. (The paper's tables used 3e8.)
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 
-
 #: A carrier below this was given in another unit [Hz].
 LEAST_CARRIER_HZ = 1e6
 

@@ -368,7 +368,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
 
 
 def counted_from(data: Periodogram, comb: Comb, place: float, blades: int | None) -> tuple[Comb | None, str]:
-    """A comb that was found counted from another of its lines, which is surely the body's [cycles a sample]."""
+    """A comb that was found counted from the place of another of its lines, the likeliest body's [cycles a sample]."""
     steps = comb.fit.spacing * factors_about(data.pulses, FINE_STEPS, 2 * FINE_STEPS)
     scores, reaches = even_scores(data.contrast, steps, np.full(len(steps), place))
     best = int(scores.argmax())

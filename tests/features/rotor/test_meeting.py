@@ -1,10 +1,12 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
+from bladewing.features.body_velocity import body_velocity
 from bladewing.features.rotor.comb import find_comb
 from bladewing.features.rotor.comb_fit import fit_combs
 from bladewing.features.rotor.meeting import meeting_of
-from bladewing.features.rotor.periodogram import prepare
+from bladewing.features.rotor.periodogram import prepare, prepared
+from bladewing.features.spectrum import doppler_spectrum
 
 from ...benchmarks import records
 
@@ -79,3 +81,15 @@ def test_two_rotors_that_beat_are_even_about_another_order_as_well_and_leave_the
         open_ += bool(found.body_velocity_mps_std > 0.3)
     assert wrong <= 3
     assert 1 <= open_ < 16
+
+
+@pytest.mark.parametrize("steady", [True, False])
+def test_a_moving_body_is_not_held_to_the_ground_s_line(steady):
+    shown = {"snr_db": 12, "body_db": -99, "velocity_mps": 12.0, "length_m": 0.1, "ground_db": 20.0}
+    iq = records.record(np.random.default_rng(13), np.array([70.0]), **shown)
+    spectrum = doppler_spectrum(iq, **RADAR)
+    data = prepared(iq, spectrum)
+    fit = find_comb(data)[0].fit
+    velocity_mps, std_mps = body_velocity(data, spectrum, fit, steady=steady)
+    assert velocity_mps == pytest.approx(12.0, abs=0.01)
+    assert std_mps == pytest.approx(fit.centre_std * data.span_mps)
