@@ -18,7 +18,7 @@ from .flash_count import flashes_in_period
 from .flash_rate import may_be_fraction
 from .gain import Evened
 from .helicopter import Gear, find_gear
-from .meeting import Meeting, meeting_of
+from .meeting import meeting_of, with_body
 from .past_edge import told_no_further
 from .periodogram import Level, Periodogram, prepared_again
 from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
@@ -56,11 +56,6 @@ FAR_OFF = 0.003
 
 #: Lines that reach so far from a body, in shares of its own speed, are a wheel's: spokes end a little within the rim.
 WHEEL = (0.8, OVER_BODY)
-
-#: Of rotors that one comb holds, and no line that tells the body, that is so many orders off, rms: 8 of 60 were.
-#: Two that beat are about as even about another order, by 0.3 nats^2 and more; a lone one's lines by 0.01, of so many
-#: orders of such an snr to each side.
-BEATING_ORDERS, EVEN_NATS, EVEN_PAIRS, EVEN_SNR = 0.5, 0.1, 4, 10.0
 
 #: A comb of several rotors is counted anew so often, at most.
 RECOUNTS = 2
@@ -409,7 +404,7 @@ def _as_it_is(
         data, comb = gear.alone, gear.first
         edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades, gear.second.spacing)
     if len(rotors.rates) > 1 or not (gear or rotors.resolved):
-        comb, known_at = (comb, None) if gear is not None else _with_body(comb, rotors, meeting)
+        comb, known_at = (comb, None) if gear is not None else with_body(comb, rotors, meeting)
         return Family(data, comb, edge, std, fills_span, gear, rotors, reason, None, meeting_std=known_at), ""
     if even is None:
         ahead = ahead_left(data, [comb.fit], comb.rest)
@@ -422,28 +417,6 @@ def _as_it_is(
     rotors = replace(rotors, rates=np.array([comb.chopping]), stds=np.array([comb.chopping_std]), fits=[comb.fit])
     ahead = changing.ahead[None], changing.ahead_std[None]
     return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead), ""
-
-
-def _with_body(comb: Comb, rotors: Rotors, meeting: Meeting | None) -> tuple[Comb, float | None]:
-    """A comb that may be several rotors' with what is known of the body: where they meet, and how sure that is."""
-    if meeting is None:
-        beats = len(rotors.rates) == 1 and not (comb.body_has_line or _is_even(comb.fit))
-        return replace(comb, body_std=max(comb.body_std, BEATING_ORDERS * comb.chopping)) if beats else comb, None
-    if meeting.is_sure and meeting.order == 0:
-        return replace(comb, body_std=0.0), meeting.std
-    elsewhere = abs(meeting.place - rotors.fits[0].centre) if meeting.order else 0.0
-    return replace(comb, body_std=float(np.linalg.norm([comb.body_std, elsewhere, meeting.open_std]))), None
-
-
-def _is_even(fit: CombFit) -> bool:
-    """Whether a comb's lines are as strong on both sides of its centre, as a lone rotor's are."""
-    power, snr = (dict(zip(fit.orders.tolist(), values, strict=True)) for values in (squared(fit.amplitudes), fit.snr))
-    pairs = [order for order in power if order > 0 and min(snr[order], snr.get(-order, 0.0)) > EVEN_SNR]
-    if len(pairs) < EVEN_PAIRS:
-        return False
-    unlike = np.square([np.log(power[order] / power[-order]) for order in pairs])
-    by_noise = [2 / snr[order] + 2 / snr[-order] for order in pairs]
-    return bool(np.mean(unlike) < EVEN_NATS + np.mean(by_noise))
 
 
 def _power(rest: NDArray[np.complex128]) -> float:
