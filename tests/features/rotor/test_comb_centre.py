@@ -7,6 +7,7 @@ from bladewing.simulate import Scene
 from bladewing.simulate.catalogue import AIRFRAMES
 
 from ...benchmarks import records
+from ...benchmarks.bodies_table import without_body
 from .. import signals
 
 RADAR = {"carrier_hz": 9.85e9, "prf_hz": 18582.0}
@@ -273,12 +274,7 @@ def test_lines_that_no_body_stands_among_are_counted_from_their_middle(seed):
 
     Their deviations were tenths of a millimetre a second; the last four of these seeds are some of the others.
     """
-    rng = np.random.default_rng(seed)
-    rate_hz = rng.uniform(30, 80)
-    tip_mps = rng.uniform(0.3, 0.62) * records.PRF_HZ / 4 * records.WAVELENGTH_M
-    velocity_mps = rng.uniform(-25, 25)
-    shown = {"snr_db": rng.uniform(5, 25), "body_db": -99, "velocity_mps": velocity_mps}
-    iq = records.record(rng, np.array([rate_hz]), length_m=tip_mps / (2 * np.pi * rate_hz), **shown)
+    iq, velocity_mps, tip_mps = without_body(seed)
     told = measure(iq, **records.RADAR)
     error_mps = abs(told.body_velocity_mps - velocity_mps)
     assert error_mps < max(0.2, 5 * told.body_velocity_mps_std)
