@@ -37,9 +37,9 @@ NEAR_BINS = 0.35
 MERGED_BINS = 0.2
 
 #: Of rotors that one comb holds, and no line that tells the body, that is so many orders off, rms: 8 of 60 were.
-#: Two that beat are about as even about another order, by 0.3 nats^2 and more; a lone one's lines by 0.01, of so many
+#: Two that beat are about as even about another order, by 0.3 nats^2 as a rule; a lone one's lines by 0.01, of so many
 #: orders of such an snr to each side.
-BEATING_ORDERS, EVEN_NATS, EVEN_PAIRS, EVEN_SNR = 0.5, 0.1, 4, 10.0
+BEATING_ORDERS, EVEN_NATS, EVEN_PAIRS, EVEN_SNR = 0.5, 0.03, 4, 10.0
 
 
 @dataclass(frozen=True)
