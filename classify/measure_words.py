@@ -100,10 +100,10 @@ def _sentence(found: "Measured") -> str:
 def _none(found: "Measured") -> str:
     """Where no rotor is, which would have been seen, and where none could have been."""
     dwells = len(found.iq)
-    slowest_hz = spacing_limits(found.iq.shape[-1], found.recording.prf_hz)[0] * found.recording.prf_hz
-    rotor = f"no rotor that chops at {slowest_hz:.0f} Hz or more in"
     if not found.looked_at:
         return "whether there is a rotor cannot be told"
+    slowest_hz = spacing_limits(found.iq.shape[-1], found.recording.prf_hz)[0] * found.recording.prf_hz
+    rotor = f"no rotor that chops at {slowest_hz:.0f} Hz or more in"
     if found.looked_at < dwells:
         return f"{rotor} {found.looked_at} of {counted(dwells)}, whether in the others cannot be told"
     return f"{rotor} {counted(dwells)}"

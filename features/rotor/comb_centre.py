@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..bodies import LINE_DB
+from ..notch import parabola_offset
 from .comb_search import FINE_STEPS, Candidate, even_scores, factors_about
 from .folding import outermost_orders
 from .one_sided import Sides
@@ -309,8 +310,8 @@ def _lowest(values: NDArray[np.float64]) -> NDArray[np.float64]:
     row = np.arange(len(values))
     lowest = 1 + values[:, 1:-1].argmin(axis=1)
     before, own, after = (values[row, lowest + beside] for beside in (-1, 0, 1))
-    curve, is_lowest = before - 2 * own + after, (own < before) & (own < after)
-    return np.asarray(own - np.where(is_lowest, (before - after) ** 2 / (8 * np.where(is_lowest, curve, 1)), 0))
+    is_lowest = (own < before) & (own < after)
+    return np.asarray(own + is_lowest * (after - before) / 4 * parabola_offset(-before, -own, -after))
 
 
 def _even_orders(data: Periodogram, found: Candidate, least: float) -> tuple[dict[int, float], float]:

@@ -404,7 +404,7 @@ def _as_it_is(
         data, comb = gear.alone, gear.first
         edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades, gear.second.spacing)
     if len(rotors.rates) > 1 or not (gear or rotors.resolved):
-        comb, known_at = (comb, None) if gear is not None else with_body(comb, rotors, meeting)
+        comb, known_at = with_body(comb, rotors, meeting)
         return Family(data, comb, edge, std, fills_span, gear, rotors, reason, None, meeting_std=known_at), ""
     if even is None:
         ahead = ahead_left(data, [comb.fit], comb.rest)
