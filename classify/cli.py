@@ -185,13 +185,14 @@ def measure(
     """Measure the rotor in each dwell, with error bars: body velocity, chopping, single rotors, band, blade."""
     from . import measure as work
     from .measure_words import print_measured
+    from .measured import Measured
     from .progress import Progress
     from .recording import Recording, of_each
 
     settings = work.Settings.checked(dwell_s=dwell, blades=blades, beta_deg=beta_deg)
     work.checked_plot(plot)
 
-    def measured(recording: Recording) -> work.Measured:
+    def measured(recording: Recording) -> Measured:
         with Progress(visible=True, passing=True) as bars:
             return work.measure_recording(recording, settings, bars)
 

@@ -1,11 +1,11 @@
-"""A trained model at work, or a cascade of two: IQ in, labels with calibrated probabilities out.
+"""A trained model at work: IQ in, labels with calibrated probabilities out.
 
 Imports numpy, scipy.fft (through the features) and onnxruntime, nothing else heavy.
 """
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import NoReturn
 
@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from .envelope import Envelope
 from .errors import BadInput
 from .labels import CLASSES, UNKNOWN, decide, decide_by_sets
-from .ladder import CASCADE, STAGES_KEY, shipped_account
+from .ladder import CASCADE
 from .model_file import (
     checked_inputs,
     checked_kinds,
@@ -45,13 +45,9 @@ _STEP_RECORDS = 256
 _STEP_SAMPLES = 1 << 21
 _STEP_INPUTS = 4096
 
-_TOLD = len(CLASSES) + 1  # columns of what is told of a record: the classes' probabilities and that of mere noise
+_COVERAGE_DIGITS = 6
 
-SURE = (0.95, 0.85, 0.85)
-"""Probability of each class (uav, bird, clutter) from which on the fast model's answer stands. On records of the whole
-envelope the cascade is then as accurate as the better model, finds as many UAVs and names as few others so, and asks it
-about three of five; with 0.9 for all it names a tenth more birds and clutter UAV, since a false drone of either counts
-(the table "cascade" of tests/benchmarks/classification_tables.py)."""
+_TOLD = len(CLASSES) + 1  # columns of what is told of a record: the classes' probabilities and that of mere noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,6 +200,8 @@ class Classifier:
         BadInput
             There is no such model, or it is not one that can be used (see `Classifier`).
         """
+        from .cascade import Cascade  # here, because it is made of classifiers
+
         max_false_alarm, coverage = _rule(max_false_alarm, coverage)
         name = chosen_name(name_or_path, budget_us)
         if name == CASCADE:
@@ -303,7 +301,7 @@ class Classifier:
         records = samples.reshape(-1, pulses)
         if outside := self.envelope.reason(carrier_hz, prf_hz, pulses):  # before anything is read of so many
             told, labels = _untold(len(records))
-            reasons = np.broadcast_to(np.array(outside), len(records))
+            reasons = np.full(len(records), outside)
         else:
             records, stretches = mended(records)
             if stretches:
@@ -421,96 +419,6 @@ class Classifier:
             yield self._session.run(self._outputs, part)
 
 
-class Cascade(Classifier):
-    """A fast model and a better one behind it, asked where the first is not sure; it answers like any classifier.
-
-    What both read is computed once. A record that the fast model is sure of costs what the fast model costs, so clear
-    returns, most of what a radar near its targets sees, are answered at a third of the better model's price.
-
-    Where the first gives a class a probability of `SURE` or more, its probabilities are the answer's; elsewhere
-    those of the second, by whose thresholds labels are given. `metadata`, `accept` and the detection of the operating
-    point are the second's; `inputs` are those of both.
-
-    Parameters
-    ----------
-    first, second
-        Sealed bladewing models and what messages call them: the fast one and the better one.
-    threads
-        CPU threads that one call may use.
-    max_false_alarm
-        Largest share of birds and clutter that may be named UAV. Each model gets half of it, so that both together keep
-        to it whatever they have in common.
-
-    Raises
-    ------
-    BadInput
-        As for `Classifier`.
-    """
-
-    def __init__(
-        self,
-        first: tuple[bytes, str],
-        second: tuple[bytes, str],
-        *,
-        threads: int = 1,
-        max_false_alarm: float | None = None,
-    ) -> None:
-        super().__init__(second[0], source=second[1], threads=threads)
-        self.first = Classifier(first[0], source=first[1], threads=threads)
-        self.inputs = tuple(dict.fromkeys((*self.first.inputs, *self._reads)))
-        if max_false_alarm is not None:
-            given, own = (model._keep_to(max_false_alarm, CASCADE, models=2) for model in (self.first, self))
-            self.operating_point = replace(own, false_alarm=own.false_alarm + given.false_alarm)
-
-    @property
-    def name(self) -> str:
-        """What the two are called together."""
-        return CASCADE
-
-    @classmethod
-    def of_shipped(cls, threads: int, *, max_false_alarm: float | None, coverage: float | None) -> "Cascade":
-        """Load the two shipped models that `train.json` names.
-
-        Raises
-        ------
-        BadInput
-            They are not shipped, or a coverage is asked for: prediction sets are those of one model.
-        """
-        if coverage is not None:
-            asked = f"a coverage of {coverage:g} and the model {CASCADE!r}"
-            raise BadInput(f"{asked}: prediction sets are those of one model: name one")
-        account = shipped_account()
-        if CASCADE not in account:
-            raise BadInput(f"the shipped train.json tells of no {CASCADE!r}: name a model, or train the models again")
-        first, second = account[CASCADE][STAGES_KEY]
-        return cls(read_model(first), read_model(second), threads=threads, max_false_alarm=max_false_alarm)
-
-    def sure(self, probabilities: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """Where the first model's answer stands: from `SURE` on, and where either would name it; shape (records,)."""
-        limits = np.maximum(SURE, np.maximum(self.first.accept, self.accept))
-        return probabilities.max(axis=1) >= limits[probabilities.argmax(axis=1)]
-
-    def _judged(self, records: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> list[NDArray[np.float32]]:
-        """What is told of a bounded number of records, in one or more pieces."""
-        out = []
-        for dwells in dwells_of(records, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs):
-            told = self.first._answer(dwells.inputs(self.first.inputs))
-            rows = np.flatnonzero(~self.sure(told[:, :-1]))
-            if len(rows):
-                asked = dwells if len(rows) == len(told) else dwells.rows(rows)
-                told[rows] = super()._answer(asked.inputs(self._reads))
-            out.append(told)
-        return out
-
-    def _answer(self, inputs: Mapping[str, NDArray[np.floating]]) -> NDArray[np.float32]:
-        """As `Classifier._answer`: `inputs` are those of both models."""
-        told = self.first._answer(inputs)
-        rows = np.flatnonzero(~self.sure(told[:, :-1]))
-        if len(rows):
-            told[rows] = super()._answer({name: inputs[name][rows] for name in self._reads})
-        return told
-
-
 def _untold(records: int) -> tuple[NDArray[np.float32], NDArray[np.str_]]:
     """What is told of records of which nothing is (see `_TOLD`), and their labels."""
     told = np.full((records, _TOLD), 1 / len(CLASSES), dtype=np.float32)
@@ -521,4 +429,5 @@ def _untold(records: int) -> tuple[NDArray[np.float32], NDArray[np.str_]]:
 def _rule(max_false_alarm: object, coverage: object) -> tuple[float | None, float | None]:
     """Check the two numbers by which "unknown" may be ruled."""
     rate = None if max_false_alarm is None else positive(max_false_alarm, "max_false_alarm")
-    return rate, None if coverage is None else positive(coverage, "coverage")
+    # as models store them: 0.9 of float32 is meant to be 0.9
+    return rate, None if coverage is None else round(positive(coverage, "coverage"), _COVERAGE_DIGITS)

@@ -11,13 +11,13 @@ from bladewing.features.rotor.comb_search import spacing_limits
 from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 
 from .errors import one_line
-from .measure import helicopter
+from .measured import is_helicopter
 from .terminal import counted, print_table, print_words
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from .measure import Measured
+    from .measured import Measured
 
 #: Bodies whose velocity differs by more from dwell to dwell have no single one [m/s].
 UNSTEADY_MPS = 1.0
@@ -157,7 +157,7 @@ def _wheel(found: "Measured") -> str:
 def _gear(found: "Measured") -> str:
     """A helicopter's main and tail comb and their ratio in words, of the dwell with the smallest error; or ""."""
     v = found.values
-    if not helicopter(v):
+    if not is_helicopter(v):
         return ""
     geared = np.isfinite(v.gear_ratio)
     n = int(np.nanargmin(v.gear_ratio_std))

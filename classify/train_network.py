@@ -12,6 +12,7 @@ from bladewing.models import LADDER, TEACHER
 from bladewing.simulate.dataset import KIND_CLASS
 from numpy.typing import NDArray
 
+from .errors import BadInput
 from .gather import Gathered, TrainingSets
 from .labels import CLASSES
 from .parts import Parts
@@ -129,6 +130,8 @@ def _trained(
     except ForeignSnapshot as error:
         assert parts
         raise parts.refusal(epochs_part, str(error)) from None
+    except FloatingPointError as error:
+        raise BadInput(f"{name}: {error}: choose a smaller one") from None
     return net, result
 
 

@@ -10,8 +10,9 @@ from bladewing.models.calibration import expected_calibration_error
 from bladewing.simulate import Radar, draw_records
 from scipy import fft
 
+from .cascade import Cascade
 from .gather import Gathered
-from .inference import Cascade, Classifier
+from .inference import Classifier
 from .ladder import CASCADE, COST_KEY, PULSES, RECORDS, STAGES_KEY, by_place
 from .timing import quote, time_in_turns
 from .training_account import figures
@@ -62,7 +63,7 @@ def add_costs(
     first, second = ((files[f"{name}.onnx"], name) for name in stages)
     cascade = Cascade(first, second)
     cheap, dear = (classifiers[name].from_inputs(test.inputs) for name in stages)
-    sure = cascade.sure(cheap)
+    sure = cascade.sure(cheap, test.truth["pulses"])
     probabilities = np.where(sure[:, None], cheap, dear)
     return {
         STAGES_KEY: stages,

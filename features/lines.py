@@ -24,6 +24,11 @@ def squared(amplitude: NDArray[np.complexfloating]) -> NDArray[np.floating]:
     return np.asarray(amplitude.real**2 + amplitude.imag**2)
 
 
+def energy(samples: NDArray[np.complexfloating]) -> float:
+    """Sum of their powers."""
+    return float(squared(samples).sum())
+
+
 def from_whole(turns: NDArray[np.floating]) -> NDArray[np.floating]:
     """How far turns are from the nearest whole ones, -0.5 to 0.5: folds frequencies [cycles a sample] into the span."""
     return np.asarray(turns - np.rint(turns))
@@ -162,7 +167,10 @@ def line_products(
         ratio = np.multiply(low_cosine, over, out=low_cosine)
         own = np.matmul(top_rows[some], top_sines, out=plain[some])
         own *= over
-        own[near] = 1.0
+        # a whole PRF apart lines are one, but for a sign where time counts from between two pulses
+        turns = np.rint(np.subtract.outer(frequency[some], frequency)[near])
+        sign = 1.0 - 2.0 * (np.abs(turns) % 2) * (pulses % 2 == 0)
+        own[near] = sign
         timed = np.matmul(top_rows[some], top_cosines, out=first[some])
         timed *= over
         timed_twice = np.multiply(own, 0.5, out=second[some])
@@ -170,7 +178,7 @@ def line_products(
         timed[near] = 0.0
         timed_twice *= (pulses**2 - 1) / 2
         timed_twice += np.multiply(ratio, timed, out=ratio)
-        timed_twice[near] = (pulses**2 - 1) / 12
+        timed_twice[near] = sign * ((pulses**2 - 1) / 12)
     return plain, first, second
 
 

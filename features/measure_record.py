@@ -14,20 +14,14 @@ from .dropouts import filled
 from .free_side import with_free_side
 from .measurements import BODY, EACH_ROTOR, Measurements
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
+from .reasons import NO_DIGITS, NO_SIGNAL
 from .rotor.even_pulses import even_pulses
-from .rotor.family import (
-    Family,
-    as_wheels,
-    by_turns,
-    find_family,
-    slower_than_rotors,
-    told_from_multiples,
-    too_few_flashes,
-)
+from .rotor.family import Family, by_turns, find_family, told_from_multiples
 from .rotor.family_edge import SPAN, edge_around, edge_of_lines, span_of, surer_edge
 from .rotor.folding import FASTEST_TIP_MPS, fastest_tip
 from .rotor.past_edge import PastEdge, past_edge_of
 from .rotor.periodogram import Periodogram, prepared
+from .rotor.refusals import as_wheels, slower_than_rotors, too_few_flashes
 from .rotor.rotors import MAX_ROTORS, hidden_shift
 from .rotor.sidebands import sideband_spacing
 from .samples import LEAST_PART, largest_part
@@ -87,11 +81,11 @@ def measure_record(
         A value for each array of `Measurements`.
     """
     if 0 < largest_part(iq) < LEAST_PART:
-        return unmeasured("no digits left in samples this small: raise the gain")
+        return unmeasured(f"{NO_DIGITS} in samples this small: raise the gain")
     spectrum = with_free_side(spectrum)
     data = prepared(iq, spectrum)
     if data is None:
-        return unmeasured("no signal")
+        return unmeasured(NO_SIGNAL)
     out = unmeasured("")
     iq, data, spectrum, family, why = _found(iq, data, spectrum, blades)
     body = body_line(spectrum)

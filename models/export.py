@@ -334,7 +334,7 @@ def _store_rounded(graph: onnx.GraphProto) -> None:
         largest = np.abs(values).max(axis=tuple(range(1, values.ndim)), keepdims=True)
         steps = np.where(largest > 0, largest / np.float32(WEIGHT_STEPS), np.float32(1))
         codes = np.rint(values / steps)
-        if np.array_equal(codes * steps, values):
+        if values.ndim > 1 and np.array_equal(codes * steps, values):  # of a vector each value would be a step
             graph.initializer.extend(
                 [
                     numpy_helper.from_array(codes.astype(np.int8), in_bytes),

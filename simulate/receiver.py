@@ -159,7 +159,7 @@ class Receiver:
         Parameters
         ----------
         signal : ndarray of complex64, shape (records, pulses)
-            What reaches the antenna, in units in which the thermal noise has unit power.
+            What reaches the antenna, in units in which the thermal noise has unit power. Changed in place.
         noise : ndarray of complex64, shape (records, pulses)
             Thermal noise of unit power.
         radar : Radar
@@ -247,7 +247,7 @@ class Receiver:
                 first = ((np.angle(other[:count]) / TWO_PI + 0.5) * pulses).astype(np.intp) % pulses
             within = np.arange(lasts)
             turns = within * (self.impulse_turns[row] + self.impulse_sweep[row] * within / (2 * lasts))
-            tone = turned((TWO_PI * turns).astype(np.float32))
+            tone = turned((TWO_PI * (turns % 1)).astype(np.float32))  # there may be millions of them
             stretch = np.float32(10 ** (self.impulse_db[row] / 20)) * phase[: len(first), None] * tone
             spoilt = first[:, None] + within
             heard = spoilt < pulses

@@ -18,7 +18,8 @@ from bladewing.models.session import quiet_session
 from bladewing.simulate import Radar, draw_records
 from numpy.typing import NDArray
 
-from ..inference import Cascade, Classifier
+from ..cascade import Cascade
+from ..inference import Classifier
 from .pictures import PICTURES, Picture, in_blocks, quantised, radar_numbers, spectrum_picture
 from .settings import ReportConfig
 

@@ -10,11 +10,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..lines import energy
 from .changing_fit import ChangingFit, Start, fit_changing, most_lines
 from .comb import Comb
-from .comb_fit import CombFit
+from .comb_fit import CombFit, fit_combs
 from .periodogram import Periodogram
-from .rotors import Separation, Sought
+from .rotors import RESOLVED_BINS, Rotors, Separation, Sought, nearer_than
 from .slow_lines import remove_bands
 from .turning import DEGREES, FIRST_DEGREES, Resampling, even_change, late_by, margin_of
 from .unresolved import LEFT_WANDERING, left_over, power_about
@@ -29,6 +30,11 @@ MOST_PERIODS = 100.0
 #: Gauss-Newton steps at most as a rotor comes in, of even changes alone, and once all are found.
 COMING_STEPS, ALL_STEPS = 3, 8
 
+#: Steady rotors are fitted in so many steps at most. What changing ones leave less than these, over the noise of a
+#: sample, is no change up to so much for each number that tells of one: by chance it is half. (Four like rotors that
+#: change by up to 0.3 % leave 33 and more at 0 dB, 44 to 180 at 10, where 20 are asked; steady ones -6 to 0.)
+STEADY_STEPS, STEADY_FALL = 30, 1.0
+
 #: Lines are looked for so many times further than those of steady rotors: smeared ones hide how far they reach.
 FURTHER = 1.5
 
@@ -36,6 +42,33 @@ FURTHER = 1.5
 def may_be_sought(data: Periodogram, nominal: float, reach: int) -> bool:
     """True where changing rotors about a rate [cycles a sample] and of that reach are not too much to seek and fit."""
     return 4 * reach <= most_lines(data.pulses) and nominal * data.pulses < MOST_PERIODS
+
+
+def as_steady(data: Periodogram, apart: Rotors) -> Rotors | None:
+    """Rotors told apart as changing ones, fitted as steady ones; None where they do change.
+
+    Steady rotors that were not all found, or not fitted to the end, leave as much as if they changed. Where lines take
+    up most of the record, changes that are none then bend the rates by many deviations.
+
+    Parameters
+    ----------
+    data : Periodogram
+        The record.
+    apart : Rotors
+        From `separate_rotors` with `ChangingSeparation`.
+    """
+    fits, starts = apart.fits, [fit.spacing for fit in apart.fits]
+    level = data.level_of(apart.rest)
+    steady = fit_combs(data, fits[0].centre, starts, [fit.reach for fit in fits], STEADY_STEPS, level_about=level)
+    numbers = len(fits) * len(DEGREES)
+    if steady is None or energy(steady[1]) - energy(apart.rest) > STEADY_FALL * numbers:
+        return None
+    known, rest = steady
+    reach = max(max(map(abs, fit.reach)) for fit in known)
+    if nearer_than(known, RESOLVED_BINS / (reach * data.pulses)):
+        return None
+    rates, stds = np.array([fit.spacing for fit in known]), np.array([fit.spacing_std for fit in known])
+    return replace(apart, rates=rates, stds=stds, spread=float(np.ptp(rates)), fits=known, rest=rest)
 
 
 class ChangingSeparation(Separation):

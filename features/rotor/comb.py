@@ -1,6 +1,5 @@
 """The comb of a rotor in one record: sought, judged against chance, fitted; or why there is none."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,8 +7,10 @@ from numpy.typing import NDArray
 
 from ..chopping import CHOPPING_RANGE_HZ
 from ..lines import squared
+from ..reasons import LOW_PRF, SHORT_DWELL
 from .comb_centre import centred
 from .comb_fit import CombFit, fit_combs
+from .comb_scores import even_scores, heights
 from .comb_search import (
     FINE_STEPS,
     LEAST_FRACTION_HZ,
@@ -17,10 +18,8 @@ from .comb_search import (
     SEARCHED_RATIO,
     Candidate,
     best_candidate,
-    even_scores,
     factors_about,
     fastest_chopping,
-    heights,
     spacing_limits,
     with_faster,
 )
@@ -29,15 +28,13 @@ from .flash_rate import of_flashes
 from .folding import may_come_back
 from .past_edge import told_no_further
 from .periodogram import Periodogram
+from .unlike_blades import lines_a_turn, weak_lines_show
 from .wide_line import beside_line
 
 #: Score that chance alone exceeds in under 1 % of the records: of white noise, also where a line was taken out; and
 #: where the static background was, with its skirt, or in one channel, whose combs are sought about two places [nats].
 #: Checked by tests/benchmarks/measurement_tables.py.
 THRESHOLD, THRESHOLD_AT_REST = 18.0, 25.0
-
-#: Unlike blades show in the weak lines: so many deviations of noise over its mean.
-WEAK_DEVIATIONS = 3.0
 
 #: A rotor's lines reach at least so far from the body [m/s]; wings, limbs and wheels seldom do with so few lines.
 LEAST_REACH_MPS = 12.0
@@ -62,22 +59,6 @@ MAINS_BINS = 4.0
 #: Beside a static background a comb of less evidence [nats], or one channel's, is not believed at such a spacing,
 #: wherever its centre is: supplies click.
 MAINS_SCORE = 70.0
-
-#: A rotor has up to so many blades, if its number is not known.
-MOST_BLADES = 6
-
-#: Every k-th line stronger than the others by this factor in power: unequal blades, k to a turn.
-UNEQUAL_FACTOR = 4.0
-
-#: Among the outer half of the lines alone, they must be by this.
-OUTER_FACTOR = 2.5
-
-#: Several rotors' lines run into one another there. Of combs of so many orders the inner half alone tells as well, by
-#: this: of blades that reflect at their tips the lines of one parity may be stronger, but not over so many orders.
-MANY_ORDERS, INNER_FACTOR = 30, 8.0
-
-#: And so much must speak for two kinds of lines [nats]: near the noise every other one is strong by chance.
-UNEQUAL_NATS = 8.0
 
 #: A fraction of the spacing, where that is too fine for the search, may be the comb's nevertheless: if its lines speak
 #: for it as loudly as this beside those of the spacing found. Most rotors chop faster than so many hertz: where a dwell
@@ -135,107 +116,9 @@ class Comb:
         return self.fit.spacing_std * self.per_turn
 
 
-def blade_numbers(blades: int | None) -> range:
-    """Numbers of blades, from two on, that lines of unlike strength may show: the one given, or any up to the most."""
-    return range(2, MOST_BLADES + 1) if blades is None else range(max(blades, 2), blades + 1)
-
-
-def strong_multiple(
-    orders: NDArray[np.intp], power: NDArray[np.float64], tried: Iterable[int], factor: float = UNEQUAL_FACTOR
-) -> int:
-    """Every how many-th line is strong: 1, or one of those tried.
-
-    Parameters
-    ----------
-    orders : ndarray of int, shape (lines,)
-        Orders.
-    power : ndarray, shape (lines,)
-        Power of each line over the noise [1].
-    tried : iterable of int
-        Multiples that are tried.
-    factor : float
-        By which the strong ones are stronger in power.
-    """
-    multiples, away = np.array(tuple(tried), np.intp), np.abs(orders)
-    if not len(multiples) or not len(orders):
-        return 1
-    outer = away > np.median(away)
-    parts, least = np.ones((1, len(orders)), bool), np.array([factor])  # which lines tell it, and by what
-    if away.max() >= MANY_ORDERS:
-        parts, least = np.stack([parts[0], ~outer]), np.array([factor, INNER_FACTOR])
-    is_strong = orders % multiples[:, None] == 0
-    number, total = (is_strong.astype(float) @ (parts * each).T for each in (1.0, power))
-    weak_number, weak_total = parts.sum(axis=1) - number, parts @ power - total
-    ratio = _contrast(total / np.maximum(number, 1), weak_total / np.maximum(weak_number, 1))
-    # the outermost lines are edges; four of each kind tell them apart
-    tells = (np.minimum(number, weak_number) >= 4) & (ratio > least)
-    best, best_ratio = 1, factor
-    for place, part in np.argwhere(tells):
-        if ratio[place, part] <= best_ratio * (1 + 1e-9):  # or of the very same lines
-            continue
-        strong, weak = parts[part] & is_strong[place], parts[part] & ~is_strong[place]
-        # several rotors' lines lie in one another at the low orders and may cancel at some; further out they part
-        far = power[outer & strong], power[outer & weak]
-        if min(map(len, far)) and _contrast(far[0].mean(), far[1].mean()) <= OUTER_FACTOR:
-            continue
-        if two_means_nats(power[strong], power[weak]) > UNEQUAL_NATS:
-            best, best_ratio = int(multiples[place]), float(ratio[place, part])
-    return best
-
-
-def _weak_lines_show(orders: NDArray[np.intp], power: NDArray[np.float64], number: int) -> bool:
-    """Whether the lines between every so many-th are more than noise."""
-    weak = power[orders % number != 0]
-    return bool(len(weak) and weak.mean() > 1 + WEAK_DEVIATIONS / np.sqrt(len(weak)))
-
-
-def _lines_a_turn(orders: NDArray[np.intp], power: NDArray[np.float64], blades: int | None, most: int) -> int:
-    """Every how many-th line is strong, `most` or fewer: 1, the blades given, or what else their comb may show.
-
-    Of blades that are given every second of four may be alike; and where a fraction of their comb was found, the lines
-    between are noise.
-    """
-
-    def strong(numbers: range) -> int:
-        return strong_multiple(orders, power, range(numbers.start, min(numbers.stop, most + 1)))
-
-    number = strong(blade_numbers(blades))
-    if number > 1 and blades is not None:
-        return _fewest_alike(orders, power, number)
-    if number > 1 or blades is None or blades == 1:
-        return number
-    other = strong(blade_numbers(None))
-    return other if blades % other == 0 or not _weak_lines_show(orders, power, other) else 1
-
-
-def _fewest_alike(orders: NDArray[np.intp], power: NDArray[np.float64], number: int) -> int:
-    """Every how many-th line is strong, where those of so many are: that, or a part of it at which all are as strong.
-
-    The search may take every second line of six unlike blades for all there are: every third of these is strong.
-    """
-    for part in range(number // 2, 1, -1):
-        strong = orders % number == 0
-        between = power[(orders % part == 0) & ~strong]
-        if number % part == 0 and len(between) and _contrast(power[strong].mean(), between.mean()) < UNEQUAL_FACTOR:
-            number = part
-    return number
-
-
 def powers_over_noise(data: Periodogram, fit: CombFit, rest: NDArray[np.complex128]) -> NDArray[np.float64]:
     """Power of each line of a comb over the noise [1], as they are beside what combs leave of the record."""
     return squared(fit.seen_beside(rest)) * data.pulses / data.level_of(rest)(fit.frequencies)
-
-
-def two_means_nats(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """Log likelihood ratio of two means of exponentials against one, of powers of two kinds of lines."""
-    means = (max(float(each.mean()), 1e-9) for each in (np.concatenate([one, other]), one, other))
-    both, first, second = (float(np.log(mean)) for mean in means)
-    return (len(one) + len(other)) * both - len(one) * first - len(other) * second
-
-
-def _contrast(strong: NDArray[np.floating], weak: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Ratios of two mean powers without their noise."""
-    return np.asarray(np.maximum(strong - 1, 0) / np.maximum(weak - 1, 0.1), np.float64)
 
 
 def of_mains(fit: CombFit, data: Periodogram, score: float, per_turn: int = 1) -> bool:
@@ -321,9 +204,9 @@ def _too_short(data: Periodogram) -> str:
     if CHOPPING_RANGE_HZ[0] * SEARCHED_RATIO >= highest * data.prf_hz:
         needed_hz = CHOPPING_RANGE_HZ[0] * SEARCHED_RATIO / highest
         rule = f"chopping frequencies from {CHOPPING_RANGE_HZ[0]:.0f} Hz up do not fit into {data.prf_hz:g} Hz"
-        return span_too_slow(data) or f"PRF too low: {rule}: raise it to {needed_hz:.0f} Hz at least"
+        return span_too_slow(data) or f"{LOW_PRF}: {rule}: raise it to {needed_hz:.0f} Hz at least"
     least_s = MIN_SPACING_BINS * SEARCHED_RATIO / highest / data.prf_hz
-    return f"dwell too short: no chopping frequency can be told in less than {1e3 * least_s:.1f} ms at this PRF"
+    return f"{SHORT_DWELL}: no chopping frequency can be told in less than {1e3 * least_s:.1f} ms at this PRF"
 
 
 def span_too_slow(data: Periodogram) -> str:
@@ -333,7 +216,7 @@ def span_too_slow(data: Periodogram) -> str:
         return ""
     least_hz = data.prf_hz * LEAST_REACH_MPS / unambiguous_mps
     return (
-        f"PRF too low: velocities are told to {unambiguous_mps:.1f} m/s, rotors' lines reach {LEAST_REACH_MPS:.0f} m/s "
+        f"{LOW_PRF}: velocities are told to {unambiguous_mps:.1f} m/s, rotors' lines reach {LEAST_REACH_MPS:.0f} m/s "
         f"and more: raise it to {least_hz / 1e3:.1f} kHz at least"
     )
 
@@ -393,7 +276,7 @@ def _counted(
     if finer is not None:
         least_s = MIN_SPACING_BINS / finer / data.prf_hz
         return None, (
-            f"dwell too short: lines {fit.spacing * data.prf_hz:.0f} Hz apart with others between them, "
+            f"{SHORT_DWELL}: lines {fit.spacing * data.prf_hz:.0f} Hz apart with others between them, "
             f"to tell them apart takes {1e3 * least_s:.0f} ms at least"
         )
     slower = slower_spacing(data, fit)
@@ -405,12 +288,12 @@ def _counted(
     power = powers_over_noise(data, fit, fitted[1])
     within = (fit.orders >= start.low) & (fit.orders <= start.high)
     orders, power = fit.orders[within], power[within]
-    per_turn = _lines_a_turn(orders, power, blades, int(fastest_chopping(data) / fit.spacing))
+    per_turn = lines_a_turn(orders, power, blades, int(fastest_chopping(data) / fit.spacing))
     for number in sorted({1, per_turn}):
         if of_mains(fit, data, start.score, number):
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"
     # further lines fall on every so many-th; and of a comb that is sought less, a fraction may be what was found
     few = fit.spacing * per_turn * data.prf_hz > CHOPPING_RANGE_HZ[1]
-    unlike = per_turn > 1 and _weak_lines_show(orders, power, per_turn)
+    unlike = per_turn > 1 and weak_lines_show(orders, power, per_turn)
     is_sure = unlike and not few and not may_come_back(start.last, fit.spacing)
     return Comb(fit, fitted[1], start.last, per_turn, open_orders * fit.spacing, has_line, per_turn, is_sure), ""

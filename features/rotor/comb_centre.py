@@ -8,7 +8,8 @@ from scipy import fft
 
 from ..bodies import LINE_DB
 from ..notch import parabola_offset
-from .comb_search import FINE_STEPS, Candidate, even_scores, factors_about
+from .comb_scores import even_scores
+from .comb_search import FINE_STEPS, Candidate, factors_about
 from .folding import outermost_orders
 from .one_sided import Sides
 from .periodogram import Periodogram

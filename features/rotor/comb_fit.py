@@ -66,6 +66,12 @@ class CombFit:
         return bool(comes_back(np.abs(self.orders).max(initial=0), self.spacing))
 
     @property
+    def reach(self) -> tuple[int, int]:
+        """Outermost orders, without the margin beyond them that was fitted as well: low <= 0 <= high."""
+        margin = 0 if self.is_folded else MARGIN_ORDERS
+        return min(int(self.orders.min()) + margin, 0), max(int(self.orders.max()) - margin, 0)
+
+    @property
     def frequencies(self) -> NDArray[np.float64]:
         """Where its lines are [cycles a sample]."""
         return np.asarray(self.centre + self.spacing * self.orders, np.float64)
@@ -195,7 +201,7 @@ def fit_combs(
     -------
     (list of CombFit, ndarray of complex128 of shape (pulses,)) or None
         A fit for each spacing and the samples that the lines leave. None where a comb has fewer than three usable
-        lines.
+        lines, or they lie in one another too closely.
     """
     from scipy.linalg import lapack  # here, because predicting needs no such import
 
@@ -242,7 +248,9 @@ def fit_combs(
         held_back = ridges(snr, together, used)
         factor, failed = _factored(products.plain, held_back)
         if failed:  # what is tabulated of the notch is a little off where nearly all was taken out
-            factor, _ = _factored(products.plain, held_back + NOTCH_RIDGE)
+            factor, failed = _factored(products.plain, held_back + NOTCH_RIDGE)
+        if failed:
+            return None
         amplitudes: NDArray[np.complex128] = whole(lapack.dpotrs(factor, parts(seen))[0])[:, 0]
         left = seen - times(products.plain, amplitudes)
         snr = np.maximum(smooth(np.abs(amplitudes + left) ** 2 * pulses / level) - 1, 1e-3)
@@ -258,7 +266,10 @@ def fit_combs(
             break
         # what the lines leak lifts the level between them: as they are fitted, it is taken from what they leave
         level = np.maximum(data.level_of(left_by(frequency, amplitudes))(frequency), least)
-    std = np.sqrt(np.maximum(np.diag(np.linalg.inv(fisher)), 0) * data.ends_noise)
+    variance = np.diag(np.linalg.inv(fisher))
+    std = np.sqrt(
+        np.where(variance > 0, variance, np.inf) * data.ends_noise
+    )  # what tells nothing of one rounds below 0
     out = []
     for number in range(count):
         own, middle = (comb == number) & used, number if own_centres else 0

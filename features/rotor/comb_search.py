@@ -1,6 +1,5 @@
 """Where a comb may be: spacings from the autocorrelation of band-limited spectra, scored by the likelihood of lines."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -9,9 +8,9 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..chopping import CHOPPING_RANGE_HZ
-from ..evidence import MOST_SNRS, Evidence
+from ..evidence import Evidence
 from ..lines import from_whole
-from .comb_sums import running_sums
+from .comb_scores import Scored, heights, loudest_of_each, score
 from .flashes import flash_evidence
 from .folding import FOLDED_TIMES, comes_back, fastest_tip, outermost_orders
 from .octaves import MULTIPLE_SHARE, coarsest
@@ -45,9 +44,6 @@ OCTAVES = (1.0, 0.5, 2.0, 1 / 3, 3.0)
 #: hardly is one.
 #: Beside a static background, where supplies click, it is less.
 FLASH_SHARE, REST_FLASH_SHARE = 2.0, 1.0
-
-#: What a comb whose sides reach unequally far must have more [nats].
-UNEVEN_COST = 4.0
 
 #: Lines of tips faster than the unambiguous velocity count where they speak for so much more [nats]: noise there speaks
 #: for less than nothing.
@@ -216,141 +212,6 @@ def _apart(periods: NDArray[np.float64], sums: NDArray[np.float64], least: float
     return taken
 
 
-def score(
-    evidence: Evidence,
-    spacings: NDArray[np.float64],
-    centres: NDArray[np.float64],
-    outermost: NDArray[np.intp] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
-    """Score combs by their lines, each side of the centre out to where its lines stop.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        Of each bin.
-    spacings, centres : ndarray, shape (candidates,)
-        [cycles a sample].
-    outermost : ndarray of int, shape (candidates,), optional
-        Lines up to this order count, of sides that reach equally far; else those within half a span of the centre.
-
-    Returns
-    -------
-    score : ndarray of float64, shape (candidates,)
-        [nats]
-    low, high : ndarray of int, shape (candidates,)
-        Outermost orders.
-    """
-    size = evidence.rows.shape[-1]
-    widest = (0.5 / spacings).astype(np.intp) if outermost is None else outermost
-    order = np.arange(1, widest.max(initial=0) + 1)
-    beyond = order > widest[:, None]
-    step = (spacings * size)[:, None] * order
-    middle = (centres * size)[:, None]
-    places = [np.rint(middle + sign * step).astype(np.intp) for sign in (-1, 1)]
-    number = np.arange(len(spacings))
-    best = np.full(len(spacings), -np.inf, np.float32)
-    reach = np.zeros((2, len(spacings)), np.intp)
-    for row in evidence.rows:
-        sides = [row.take(place, mode="wrap") for place in places]
-        for side in sides:
-            side[beyond] = 0.0
-        for side in sides:
-            side.cumsum(axis=1, out=side)
-        # a rotor's lines reach equally far to both sides; other reaches cost as much as the choice of two ends gives
-        both = sides[0] + sides[1]
-        last = both.argmax(axis=1)
-        total = np.maximum(both[number, last], 0)
-        ends = np.stack([last, last]) + 1
-        if outermost is None:
-            apart = np.stack([side.argmax(axis=1) for side in sides])
-            peaks = np.stack([np.maximum(side[number, end], 0) for side, end in zip(sides, apart, strict=True)])
-            uneven = peaks.sum(axis=0) - np.float32(UNEVEN_COST)
-            ends = np.where(uneven > total, np.where(peaks > 0, apart + 1, 0), ends)
-            total = np.maximum(total, uneven)
-        better = total > best
-        best[better] = total[better]
-        reach[:, better] = ends[:, better]
-    return best.astype(np.float64), -reach[0], reach[1]
-
-
-#: Of combs: what speaks for each [nats], and its outermost orders, low <= 0 <= high.
-_Scored = tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]
-
-
-def loudest_of_each(
-    data: Periodogram,
-    tried: NDArray[np.float64],
-    centres: NDArray[np.float64],
-    outermost: NDArray[np.intp] | None = None,
-) -> tuple[NDArray[np.float64], _Scored]:
-    """Of the spacings tried for each comb, shape (combs, spacings), the loudest; and what `score` gives for that."""
-    scores, lows, highs = score(data.contrast, tried.ravel(), np.repeat(centres, tried.shape[1]), outermost)
-    loudest = scores.reshape(tried.shape).argmax(axis=1) + np.arange(0, tried.size, tried.shape[1])
-    return tried.ravel()[loudest], (scores[loudest], lows[loudest], highs[loudest])
-
-
-def even_scores(
-    evidence: Evidence, spacings: NDArray[np.float64], centres: NDArray[np.float64], furthest: float = 0.5
-) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Score combs whose two sides reach equally far.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        Of each bin.
-    spacings, centres : ndarray, shape (candidates,)
-        [cycles a sample]; the spacings rise.
-    furthest : float
-        Lines up to so far from the centre count [cycles a sample].
-
-    Returns
-    -------
-    score : ndarray of float64, shape (candidates,)
-        [nats]
-    reach : ndarray of int, shape (candidates,)
-        Outermost order.
-    """
-    best = np.full((len(spacings), MOST_SNRS), -np.inf, np.float32)
-    reach = np.ones(best.shape, np.intp)
-    first = 1
-    for sums in _sums_of_sides(evidence, spacings, centres, furthest):
-        both = sums[:, 0] + sums[:, 1]
-        highest = both.max(axis=0)
-        held, ends = best[: len(highest)], reach[: len(highest)]
-        better = highest > held
-        held[better], ends[better] = highest[better], both[:, better].argmax(axis=0) + first
-        first += len(both)
-    best = best[:, : len(evidence.rows)]
-    row = best.argmax(axis=1)[:, None]
-    scores = np.maximum(np.take_along_axis(best, row, axis=1)[:, 0], 0)
-    return scores.astype(np.float64), np.take_along_axis(reach, row, axis=1)[:, 0]
-
-
-def _sums_of_sides(
-    evidence: Evidence, spacings: NDArray[np.float64], centres: NDArray[np.float64], furthest: float = 0.5
-) -> Iterator[NDArray[np.float32]]:
-    """Running sums to both sides of combs, the spacings rising: as `running_sums` gives them."""
-    size = evidence.rows.shape[-1]
-    # a line beyond half the PRF is the alias on the other side; turns more, that no place is below 0
-    start, step = (np.ceil(furthest) + centres % 1.0) * size, spacings * size
-    return running_sums(evidence, np.stack([start, start]), np.stack([-step, step]), furthest * size)
-
-
-def heights(evidence: Evidence, spacings: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The scores of many combs, as `score` gives them, without their reaches, shape (candidates,) [nats]."""
-    rising = np.argsort(spacings)
-    sides = np.zeros((2, len(rising), MOST_SNRS), np.float32)
-    both = np.zeros((len(rising), MOST_SNRS), np.float32)
-    for sums in _sums_of_sides(evidence, spacings[rising], centres[rising]):
-        some = sums.shape[2]
-        np.maximum(sides[:, :some], sums.max(axis=0), out=sides[:, :some])
-        np.maximum(both[:some], (sums[:, 0] + sums[:, 1]).max(axis=0), out=both[:some])
-    best = np.maximum(both, sides.sum(axis=0) - np.float32(UNEVEN_COST)).max(axis=1)
-    out = np.empty(len(best))
-    out[rising] = best
-    return out
-
-
 def _loudness(data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
     """What speaks for combs: their lines, and where there is one channel those that it has of the other side."""
     return heights(data.contrast, spacings, centres) + _mirrored(data, spacings, centres)
@@ -451,7 +312,7 @@ def _with_flashes(
     data: Periodogram,
     spacings: NDArray[np.float64],
     centres: NDArray[np.float64],
-    scored: _Scored,
+    scored: Scored,
     mirrored: NDArray[np.float64] | float = 0.0,
 ) -> NDArray[np.float64]:
     """What speaks for combs with their flashes, shape (combs,) [nats]; 0 where these do not bring one near the best."""

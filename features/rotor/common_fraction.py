@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..lines import from_whole
-from .comb_search import FINE_STEPS, FLASH_SHARE, Candidate, factors_about, heights, loudest_of_each, spacing_limits
+from .comb_scores import heights, loudest_of_each
+from .comb_search import FINE_STEPS, FLASH_SHARE, Candidate, factors_about, spacing_limits
 from .flashes import flash_evidence
 from .folding import may_come_back
 from .periodogram import Periodogram

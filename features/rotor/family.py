@@ -6,11 +6,11 @@ from typing import TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from ..lines import squared
+from ..lines import energy, squared
 from ..spectrum import Spectrum
-from .changing import ChangingSeparation, may_be_sought
+from .changing import ChangingSeparation, as_steady, may_be_sought
 from .changing_fit import ChangingFit, Start, fit_changing
-from .comb import LEAST_REACH_MPS, OVER_BODY, Comb, blade_numbers, counted_from, find_comb, is_short, span_too_slow
+from .comb import Comb, counted_from, find_comb
 from .comb_fit import CombFit
 from .drift import Straightened, ahead_left, straightened
 from .family_edge import edge_around, edge_of_lines, span_of
@@ -19,10 +19,11 @@ from .flash_rate import may_be_fraction
 from .gain import Evened
 from .helicopter import Gear, find_gear
 from .meeting import meeting_of, with_body
-from .past_edge import told_no_further
 from .periodogram import Level, Periodogram, prepared_again
+from .refusals import slower_than_rotors
 from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
 from .turning import DEGREES, bend, is_sure
+from .unlike_blades import blade_numbers
 from .unresolved import judged, left_over, not_all, power_about
 from .weak_lines import by_rotation, with_all_lines, without_weak_lines
 
@@ -48,14 +49,8 @@ CHANGE_LEAVES = 2.0
 #: lines went astray.
 EDGE_DEVIATIONS = 4.0
 
-#: In a short dwell rotors that are not told apart show by so many flashes or orders what they have in common.
-LEAST_FLASHES, MANY_ORDERS = 5.5, 60
-
 #: A comb whose spacing is off by more than this, relative, from any multiple of another's is no part of that.
 FAR_OFF = 0.003
-
-#: Lines that reach so far from a body, in shares of its own speed, are a wheel's: spokes end a little within the rim.
-WHEEL = (0.8, OVER_BODY)
 
 #: A comb of several rotors is counted anew so often, at most.
 RECOUNTS = 2
@@ -118,42 +113,6 @@ class Family:
         if self.ahead is None:
             return np.full((2, len(self.rotors.rates)), np.nan)
         return np.array([[bend(own, self.data.pulses) for own in values] for values in self.ahead])
-
-
-def slower_than_rotors(data: Periodogram, fit: CombFit, edge: float, edge_std: float) -> str:
-    """Why a line family of this comb and edge [cycles a sample] is no rotor's; empty where it may be one's."""
-    edge_mps, edge_std_mps = (value * data.span_mps for value in (edge, edge_std))
-    if not edge_mps + edge_std_mps < LEAST_REACH_MPS:
-        return ""
-    reason = f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
-    return span_too_slow(data) or told_no_further(data, fit, edge, edge_std) or reason
-
-
-def as_wheels(data: Periodogram, edge: float, velocity_mps: float) -> str:
-    """Why a line family of this edge [cycles a sample] about a body is a wheel's; empty where it may be a rotor's.
-
-    Seen from the body a wheel's rim is as fast as the body. A rotor's tips are 2.5 times as fast as it flies and more;
-    only of a propeller that flies at the radar, within a narrow range of angles, they seem to be as fast.
-    """
-    edge_mps = edge * data.span_mps
-    if WHEEL[0] * abs(velocity_mps) < edge_mps < WHEEL[1] * abs(velocity_mps):
-        return f"no rotor: lines as wheels have: they end {edge_mps:.1f} m/s from a body at {velocity_mps:.1f} m/s"
-    return ""
-
-
-def too_few_flashes(family: Family) -> str:
-    """Why rotors that are not told apart give no number, in so short a dwell; empty where they do.
-
-    Their lines, some bins apart, run into one another, and what that leaves may be strong at any spacing.
-    """
-    data, chopping = family.data, family.comb.chopping
-    shows = chopping * data.pulses > LEAST_FLASHES or family.comb.last > MANY_ORDERS
-    if family.is_told_apart or shows or not is_short(data):
-        return ""
-    return (
-        f"dwell too short: lines about {chopping * data.prf_hz:.0f} Hz apart are not one rotor's, "
-        f"to tell what they are takes {1e3 * LEAST_FLASHES / chopping / data.prf_hz:.0f} ms at least"
-    )
 
 
 def told_from_multiples(family: Family) -> Family:
@@ -260,7 +219,7 @@ def _evened_by_rotors(even: Evened, family: Family, blades: int | None) -> tuple
 
 def _not_twins(family: Family) -> list[CombFit]:
     """Combs of a family, where not told apart the strongest of those as near to one another as a gain splits lines."""
-    fits = sorted(family.rotors.fits, key=lambda fit: -float(squared(fit.amplitudes).sum()))
+    fits = sorted(family.rotors.fits, key=lambda fit: -energy(fit.amplitudes))
     if family.is_told_apart:
         return fits
     out: list[CombFit] = []
@@ -344,6 +303,9 @@ def _changing(data: Periodogram, family: Family, edge: float) -> Family:
     fits = [fit for fit in apart.fits if isinstance(fit, ChangingFit)]
     if len(fits) < 2 or (known.resolved and len(fits) > len(known.rates)):
         return unsure
+    steady = as_steady(data, apart)
+    if steady is not None:
+        return replace(family, rotors=judged(steady, data, comb, family.edge))
     powers = powers_of(fits)
     own = edge_of_lines(data, apart.fits, apart.rest, 1, None)
     around = edge_around(data, comb, apart, None, own)
@@ -393,7 +355,7 @@ def _as_it_is(
         if meeting is not None and meeting.order != 0 and meeting.is_near and recounts > 0:
             counted = counted_from(data, comb, meeting.place, blades)
             anew = _as_it_is(data, counted, blades, even, recounts=recounts - 1)
-            if anew[0] is not None and _power(anew[0].rotors.rest) < _power(rotors.rest):
+            if anew[0] is not None and energy(anew[0].rotors.rest) < energy(rotors.rest):
                 return anew
     if gear is None and len(rotors.rates) == 1:  # of several the lines lie anywhere
         without, alike = without_weak_lines(data, comb, blades)
@@ -419,11 +381,6 @@ def _as_it_is(
     return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead), ""
 
 
-def _power(rest: NDArray[np.complex128]) -> float:
-    """What combs leave of a record."""
-    return float(squared(rest).sum())
-
-
 def _geared(gear: Gear, even: Straightened, level_about: Level) -> tuple[Gear, ChangingFit]:
     """Two combs of a straightened record as they are in the record itself.
 
@@ -432,7 +389,7 @@ def _geared(gear: Gear, even: Straightened, level_about: Level) -> tuple[Gear, C
     combs = (gear.first.fit, gear.second)
 
     def fitted(ahead: NDArray[np.float64]) -> tuple[float, list[ChangingFit]]:
-        starts = [Start(comb.spacing, int(np.abs(comb.orders).max()), ahead) for comb in combs]
+        starts = [Start(comb.spacing, max(map(abs, comb.reach)), ahead) for comb in combs]
         found = fit_changing(
             even.record, starts, even.fit.centre, degrees=len(DEGREES), steps=GEARED_STEPS, level_about=level_about
         )

@@ -256,7 +256,8 @@ def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple
     """
     if not np.isfinite(lines[0] + around[0]):
         return np.inf, np.inf
-    if around[0] < ASTRAY_SHARE * lines[0] and lines[1] < ASTRAY_SURE * lines[0]:
+    nothing_seen = np.isinf(around[1])
+    if nothing_seen or (around[0] < ASTRAY_SHARE * lines[0] and lines[1] < ASTRAY_SURE * lines[0]):
         return lines
     apart = abs(around[0] - lines[0])
     std = float(np.hypot(lines[1], max(APART_SHARE * apart, CHANCE_SHARE * around[1])))

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..lines import squared
-from .comb_search import FINE_STEPS, Candidate, factors_about, score, spacing_limits
+from .comb_scores import score
+from .comb_search import FINE_STEPS, Candidate, factors_about, spacing_limits
 from .flashes import flash_evidence
 from .folding import comes_round, may_come_back, outermost_orders
 from .octaves import MULTIPLE_SHARE

@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..lines import middle_times, squared
+from ..lines import energy, middle_times, squared
 from ..spectrum import Spectrum
 from .comb_fit import CombFit, fit_combs
 from .periodogram import Periodogram, prepared_again
@@ -59,7 +59,7 @@ def gain_left(data: Periodogram, rest: NDArray[np.complex128], chopping: float) 
     nats = float(seen @ factors - seen[0] ** 2 / products[0, 0])
     if nats < LEAST_NATS:
         return np.ones(pulses), 0.0
-    left = float(squared(rest).sum()) - pulses
+    left = energy(rest) - pulses
     return factors @ shapes, nats / max(left, nats)
 
 
@@ -111,8 +111,7 @@ class Evened:
         even = self
         for _ in range(FITTED_STEPS):
             spacings = [fit.spacing for fit in fits]
-            reaches = [(int(fit.orders.min()), int(fit.orders.max())) for fit in fits]
-            fitted = fit_combs(even.record, fits[0].centre, spacings, reaches)
+            fitted = fit_combs(even.record, fits[0].centre, spacings, [fit.reach for fit in fits])
             if fitted is None:
                 break
             fits, rest = fitted

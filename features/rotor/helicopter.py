@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from ..evidence import MOST_SNRS, Evidence, line_evidence
 from ..lines import from_whole, sum_of_lines
-from .comb import Comb, powers_over_noise, strong_multiple
-from .comb_fit import MARGIN_ORDERS, CombFit, fit_combs
-from .comb_search import FINE_STEPS, Candidate, factors_about, heights, score, spacing_limits
-from .comb_sums import running_sums
+from .comb import Comb, powers_over_noise
+from .comb_fit import CombFit, fit_combs
+from .comb_scores import heights, running_sums, score
+from .comb_search import FINE_STEPS, Candidate, factors_about, spacing_limits
 from .periodogram import LEAST_LEVEL, Periodogram, local_level
 from .rotors import MOST_GEAR, Rotors, separate_rotors
 from .slow_lines import remove_bands
+from .unlike_blades import strong_multiple
 from .unresolved import judged
 
 #: Ratio of tail to main chopping frequency: 4.73 in the paper, 4 to 6 in general, and some room.
@@ -154,10 +155,8 @@ def _second_comb(data: Periodogram, comb: Comb, furthest: float) -> tuple[Gear |
     rival = _rival(rest, evidence, hidden, best)
     if rival > 0:
         return None, f"no second comb: the lines left over repeat every {rival * data.prf_hz:.1f} Hz as well"
-    orders, margin = comb.fit.orders, 0 if comb.fit.is_folded else MARGIN_ORDERS
-    reach = (min(int(orders.min()) + margin, 0), max(int(orders.max()) - margin, 0))
     spacings = [comb.fit.spacing, best.spacing]
-    fitted = fit_combs(data, comb.fit.centre, spacings, [reach, (best.low, best.high)])
+    fitted = fit_combs(data, comb.fit.centre, spacings, [comb.fit.reach, (best.low, best.high)])
     if fitted is None:
         return None, "no second comb: fewer than three lines of it are usable"
     (first, second), samples = fitted

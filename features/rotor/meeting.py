@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..lines import squared
 from .comb import Comb
-from .comb_fit import MARGIN_ORDERS, CombFit, fit_combs
+from .comb_fit import CombFit, fit_combs
 from .periodogram import Level, Periodogram
 from .rotors import Rotors
 
@@ -87,11 +87,10 @@ def meeting_of(data: Periodogram, fits: Sequence[CombFit], level_about: Level, *
     Meeting or None
         None where they cannot be fitted each about a centre of its own.
     """
-    ends = [(int(fit.orders.min()) + MARGIN_ORDERS, int(fit.orders.max()) - MARGIN_ORDERS) for fit in fits]
-    reaches = [(min(low, 0), max(high, 0)) for low, high in ends]
+    reaches = [fit.reach for fit in fits]
     spacings = [fit.spacing for fit in fits]
     apart = fit_combs(data, fits[0].centre, spacings, reaches, MEETING_STEPS, level_about=level_about, own_centres=True)
-    if apart is None or not all(fit.centre_std > 0 for fit in apart[0]):
+    if apart is None or not all(np.isfinite(fit.centre_std) for fit in apart[0]):
         return None
     merged = np.array([0.0 if resolved else MERGED_BINS / np.sqrt(len(fit.orders)) for fit in apart[0]])
     most = min(MOST_ORDERS, max(max(-low, high) for low, high in reaches))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import fft, special
 
 from ..lines import from_whole, squared
+from ..reasons import TOLD_NO_FURTHER
 from .comb_fit import CombFit
 from .periodogram import PADDING, Periodogram
 from .slow_lines import remove_bands
@@ -85,7 +86,7 @@ def told_no_further(data: Periodogram, fit: CombFit, edge: float, edge_std: floa
     """Why a comb whose lines seem to end at an edge [cycles a sample] may reach further; empty where they end there."""
     if not past_edge_of(data, data.samples, fit.centre, [fit.spacing], 0.0, (edge, edge_std)).flashes:
         return ""
-    return f"no comb: lines are told apart to {edge * data.span_mps:.1f} m/s, and blades flash past that: raise the PRF"
+    return f"{TOLD_NO_FURTHER} to {edge * data.span_mps:.1f} m/s, and blades flash past that: raise the PRF"
 
 
 def past_edge(

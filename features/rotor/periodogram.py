@@ -226,14 +226,17 @@ def _block(size: int, pulses: int) -> int:
 @lru_cache(maxsize=16)
 def _taper(pulses: int) -> NDArray[np.float64]:
     window = np.kaiser(pulses, TAPER_BETA)
-    return window / np.sqrt(np.mean(window**2))
+    taper = window / np.sqrt(np.mean(window**2))
+    taper.setflags(write=False)
+    return taper
 
 
 @lru_cache(maxsize=16)
 def _middle(pulses: int, size: int) -> NDArray[np.complex64]:
     """Turns the phases of a spectrum to those in the middle of the record, and norms noise to the power 1."""
-    turn = np.exp(1j * np.pi * (pulses - 1) * fft.fftfreq(size)) / np.sqrt(pulses)
-    return turn.astype(np.complex64)
+    turn = (np.exp(1j * np.pi * (pulses - 1) * fft.fftfreq(size)) / np.sqrt(pulses)).astype(np.complex64)
+    turn.setflags(write=False)
+    return turn
 
 
 def _spectrum(samples: NDArray[np.complex128], size: int, *, tapered: bool) -> NDArray[np.complex64]:
@@ -279,8 +282,10 @@ def _blocks(size: int, block: int) -> tuple[NDArray[np.intp], NDArray[np.float64
     # the few bins that whole blocks leave over are skipped, evenly
     upper = 1 + ((np.arange(count) * half) // count)[:, None] + np.arange(length)
     inside = np.concatenate([upper, size - upper[::-1]])
-    inside.setflags(write=False)
-    return inside, inside.mean(axis=1)
+    middles = inside.mean(axis=1)
+    for shared in (inside, middles):
+        shared.setflags(write=False)
+    return inside, middles
 
 
 def _level_at_bins(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from ..lines import squared
+from ..lines import energy, squared
 from .comb_fit import CombFit
 
 #: Points are taken for this many at most, and for no more than so many lines tell: each takes three numbers.
@@ -103,7 +103,7 @@ def fit_points(fit: CombFit, per_turn: int, pulses: int, numbers: Iterable[int])
     turn, apart = _turn(order, ahead, behind)
     # held back as the amplitudes are, they have so much less of it
     noise = float(((fit.snr[own] / (1 + fit.snr[own])) ** 2).mean()) / (2 * pulses)
-    total = float(squared(ahead).sum() + squared(behind).sum()) / 2
+    total = (energy(ahead) + energy(behind)) / 2
     if len(order) * noise > MOST_NOISE * total:
         return None
     rows: list[_Row] = []
@@ -161,7 +161,7 @@ def _rows_of_points(
     noise : float
         Power of the noise in each line.
     """
-    row, rows, total = np.empty(0), [], float(squared(lines).sum())
+    row, rows, total = np.empty(0), [], energy(lines)
     numbers, turns = 2 * len(lines), blades * order
     while len(row) < MOST_POINTS and NUMBERS_OF_POINT * (len(row) + 1) < len(lines):
         known = np.linalg.qr(bessel_functions(row, int(turns[-1]))[turns])[0] if len(row) else np.empty((len(lines), 0))
@@ -211,14 +211,14 @@ def _refined(
         slope = change * strength
         slope = slope - known @ (inverse @ slope)
         information = (slope.conj().T @ slope).real
-        left = float(squared(rest).sum())
+        left = energy(rest)
         if left < best[1]:
             edge = int(row.argmax())
             # Bessel's equation
             curve = -change[:, edge] / row[edge] - (1 - (order / row[edge]) ** 2) * known[:, edge]
             both = np.linalg.qr(np.concatenate([known, change], axis=1))[0]
             curve = strength[edge] * (curve - both @ (both.T @ curve))
-            best = row, left, information, float(squared(curve).sum())
+            best = row, left, information, energy(curve)
         information = information + 1e-9 * np.trace(information) * np.eye(len(row))
         step = np.linalg.solve(information, (slope.conj().T @ rest).real)
         if np.abs(step).max() < REFINED_ENOUGH * STEP_GAMMA:

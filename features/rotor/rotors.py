@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bodies import LINE_DB
-from ..lines import squared
-from .comb import MOST_BLADES, UNEQUAL_FACTOR, Comb, strong_multiple
+from ..lines import energy, squared
+from .comb import Comb
 from .comb_fit import CombFit, fit_combs
-from .comb_search import even_scores
+from .comb_scores import even_scores
 from .flashes import LEAST_LINES, flash_nats
 from .periodogram import Level, Periodogram
+from .unlike_blades import MOST_BLADES, UNEQUAL_FACTOR, strong_multiple
 
 #: Rotors looked for at most.
 MAX_ROTORS = 8
@@ -63,6 +64,9 @@ TWO_POWER = 1.7
 #: Steps of the joint fit each time a rotor is added, and once all are found: only then their deviations matter. And at
 #: most where what they leave would be called unresolved: strong lines not fitted to the end leave some of themselves.
 JOINT_STEPS, LAST_STEPS, FURTHER_STEPS = 2, 1, 4
+
+#: A fit that leaves no less than this share of what the one before left has come to its end; and at most so many.
+FITTED_SHARE, MOST_FITS = 0.9, 8
 
 #: A helicopter's tail rotor turns at most so many times as fast as its main rotor: at a fraction of its rate every so
 #: many-th line is there, and that fraction may lie among the rates of rotors like the first one. By so much are these
@@ -183,7 +187,7 @@ def hidden_shift(fits: Sequence[CombFit]) -> float:
     return float(np.average(rates, weights=np.rint(may_hold(fits))) - rates.mean())
 
 
-def _meet(fits: Sequence[CombFit], resolution: float) -> bool:
+def nearer_than(fits: Sequence[CombFit], resolution: float) -> bool:
     """True where rates lie nearer than the dwell tells apart."""
     rates = np.sort([fit.spacing for fit in fits])
     return len(rates) > 1 and float(np.diff(rates).min()) < resolution
@@ -344,7 +348,7 @@ class Separation:
         if self.fits and _lines_apart(together[-1], self.data.pulses, GEAR_FACTOR) > 1:
             self.seeks_apart &= not one.is_apart
             return _NO_ROTOR
-        if _meet(together, self.resolution):
+        if nearer_than(together, self.resolution):
             return self._unresolved(rate)
         powers = powers_of(together)
         if powers[-1] < LEAST_POWER_SHARE * max(powers):  # beside several, nobody's rate
@@ -358,15 +362,30 @@ class Separation:
         return _Verdict(unresolved=True, spread=float(np.ptp([rate, *self.rates])))
 
     def fit_out(self, steps: int) -> bool:
-        """Fit what was found once more, if there is anything to gain by it; whether that was done."""
+        """Fit what was found once more, and again while that leaves much less; whether anything was done."""
         if self.fitted_out:
             return False
-        self.fitted_out = True
-        fitted = self._fitted(None, steps)
-        if fitted is None or _meet(fitted[0], self.resolution):
-            return False
-        self._take(*fitted)
-        return True
+        self.fitted_out, done = True, False
+        self.reaches = self._alike()
+        for _ in range(MOST_FITS):
+            fitted = self._fitted(None, steps)
+            if fitted is None or nearer_than(fitted[0], self.resolution):
+                return done
+            left = energy(self.rest.samples)
+            self._take(*fitted)
+            done = True
+            if energy(self.rest.samples) > FITTED_SHARE * left:
+                break
+        return done
+
+    def _alike(self) -> list[int]:
+        """Outermost orders of like rotors: each as far as the one that is seen to reach furthest.
+
+        As a rotor came in, those not found yet hid its outer lines.
+        """
+        pairs = list(zip(self.reaches, self.rates, strict=True))
+        alike = [max(r for r, other in pairs if abs(other / rate - 1) < 2 * RATE_SPREAD) for _, rate in pairs]
+        return alike if self._may_fit(alike) else self.reaches
 
     def make_whole(self) -> None:
         """Seek rotors of which only every so many-th line is there anew, now that the others are known.

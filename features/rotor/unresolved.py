@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..lines import from_whole, squared
-from .comb import Comb, blade_numbers
+from .comb import Comb
 from .comb_fit import CombFit
 from .flash_count import FLASH_PADDING, FLASH_WIDTH, flashes_in_period
 from .left_flashes import others_flash
@@ -17,6 +17,7 @@ from .like_lines import like_shares
 from .periodogram import Periodogram
 from .points import fit_points
 from .rotors import RATE_SPREAD, RESOLVED_BINS, TWO_POWER, Rotors, may_hold
+from .unlike_blades import blade_numbers
 
 #: A rotor flashes once a period on each side of the body. A second flash of this share of the first one's power is
 #: another rotor's, of a rate that the dwell does not tell apart, where so many lines tell.

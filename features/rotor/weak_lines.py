@@ -9,12 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..lines import LinesSeen, squared, sum_of_lines
-from .comb import LEAST_LINES, UNEQUAL_NATS, Comb, blade_numbers, two_means_nats
+from .comb import LEAST_LINES, Comb
 from .comb_fit import CombFit, fit_combs
 from .comb_search import MIRROR_BINS, from_mirror_bins
 from .folding import may_come_back
 from .periodogram import Level, Periodogram
 from .slow_lines import remove_bands
+from .unlike_blades import UNEQUAL_NATS, blade_numbers, two_means_nats
 
 #: They are fitted where so much speaks for them, beside what lies as far from any line [nats]: noise that is fitted
 #: does no harm. They must be so far from the strong ones and from one another [bins].

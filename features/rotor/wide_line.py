@@ -7,7 +7,8 @@ found is half a comb, and its middle no body's.
 
 import numpy as np
 
-from .comb_search import FINE_STEPS, Candidate, factors_about, loudest_of_each
+from .comb_scores import loudest_of_each
+from .comb_search import FINE_STEPS, Candidate, factors_about
 from .folding import outermost_orders
 from .periodogram import Periodogram
 

@@ -2,13 +2,15 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from bladewing.classify import BadInput, Classifier, model_file
-from bladewing.classify.inference import SURE, Cascade
+from bladewing.classify.cascade import SURE, Cascade
 from bladewing.classify.ladder import CASCADE, PLACES, STAGES_KEY, shipped_account
 from bladewing.classify.model_file import CURVE_KEY, model_names
+from bladewing.classify.rules import Rules
 from bladewing.features import model_inputs
 from bladewing.models.operating import OperatingCurve
 from bladewing.simulate import Radar, draw_records
@@ -63,6 +65,12 @@ def test_the_first_is_sure_of_nothing_that_either_would_not_name(cascade, monkey
         with monkeypatch.context() as patch:
             patch.setattr(model, "accept", (0.98, *model.accept[1:]))
             assert not cascade.sure(p).any()
+        with monkeypatch.context() as patch:  # nor where that depends on the number of pulses
+            stricter = replace(model.rules.of(100), accept=(0.98, *model.accept[1:]))
+            patch.setattr(model, "rules", Rules((stricter, *(rule for rule in model.rules.each if rule.pulses > 100))))
+            assert not cascade.sure(p, 100).any()
+            assert cascade.sure(p, 5000).all()
+            assert cascade.sure(np.repeat(p, 2, axis=0), np.array([100, 5000])).tolist() == [False, True]
 
 
 def test_inputs_that_are_made_are_answered_as_samples_are(cascade, records):
@@ -129,7 +137,7 @@ def test_what_a_cascade_cannot_do_is_told_in_one_line(tmp_path, monkeypatch):
         Classifier.load(CASCADE, coverage=0.9)
     with pytest.raises(BadInput, match=r"cascade: two models.*give one of them as --model"):
         export_raw_iq(tmp_path / "x.onnx", **RADAR, pulses=500, model=CASCADE)
-    monkeypatch.setattr("bladewing.classify.inference.shipped_account", dict)
+    monkeypatch.setattr("bladewing.classify.cascade.shipped_account", dict)
     with pytest.raises(BadInput, match="tells of no 'cascade'"):
         Classifier.load(CASCADE)
 

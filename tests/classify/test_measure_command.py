@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from bladewing.classify import measure_plot
 from bladewing.classify.cli import main
-from bladewing.classify.measure import OF_COMBS, Measured, Settings, disagreement, measure_recording
+from bladewing.classify.measure import Settings, measure_recording
 from bladewing.classify.measure_words import _blades, _unlike, _wheel, with_error
+from bladewing.classify.measured import OF_COMBS, Measured, disagreement
 from bladewing.classify.recording import Recording, load_recording
 from bladewing.features.rotor.comb import OVER_BODY
 from bladewing.simulate import RotorMotion, Scene, rotor_echo

@@ -334,6 +334,12 @@ def test_epochs_without_a_number_are_told_and_do_not_cost_the_network(monkeypatc
     json.dumps(detail, allow_nan=False)
 
 
+def test_a_training_that_never_gives_a_number_is_bad_input(tmp_path):
+    with pytest.raises(BadInput, match=r"spectrum-cnn: .*learning_rate inf is too high: choose a smaller one$"):
+        _run(tmp_path, learning_rate=float("inf"))
+    assert not (tmp_path / "spectrum-cnn.onnx").exists()
+
+
 @pytest.mark.parametrize(("others", "tied"), [(200, 0), (201, 0), (350, 0), (401, 0), (3333, 0), (400, 60), (10, 0)])
 def test_the_threshold_of_a_rate_keeps_to_it_on_its_own_records(others, tied):
     probabilities = np.random.default_rng(others).dirichlet(np.ones(3), others + 50).astype(np.float32)

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
-from bladewing.features.rotor.comb import find_comb, strong_multiple
+from bladewing.features.rotor.comb import find_comb
 from bladewing.features.rotor.octaves import coarsest, over_neighbours
 from bladewing.features.rotor.periodogram import prepare
+from bladewing.features.rotor.unlike_blades import strong_multiple
 from scipy import special
 
 from ..signals import PRF_HZ, PULSES, RADAR, TIMES_S, WAVELENGTH_M, moving_at, rotors_by_chance, white

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from bladewing.features.evidence import MOST_SNRS, Evidence
-from bladewing.features.rotor.comb_search import even_scores, heights, score
-from bladewing.features.rotor.comb_sums import running_sums
+from bladewing.features.rotor.comb_scores import even_scores, heights, running_sums, score
 
 
 @pytest.mark.parametrize("combs", [1, 40, 900])

@@ -1,0 +1,54 @@
+"""Why a line family is no rotor's, or tells no number."""
+
+from typing import TYPE_CHECKING
+
+from ..reasons import SHORT_DWELL
+from .comb import LEAST_REACH_MPS, OVER_BODY, is_short, span_too_slow
+from .comb_fit import CombFit
+from .past_edge import told_no_further
+from .periodogram import Periodogram
+
+if TYPE_CHECKING:
+    from .family import Family
+
+#: In a short dwell rotors that are not told apart show by so many flashes or orders what they have in common.
+LEAST_FLASHES, MANY_ORDERS = 5.5, 60
+
+#: Lines that reach so far from a body, in shares of its own speed, are a wheel's: spokes end a little within the rim.
+WHEEL = (0.8, OVER_BODY)
+
+
+def slower_than_rotors(data: Periodogram, fit: CombFit, edge: float, edge_std: float) -> str:
+    """Why a line family of this comb and edge [cycles a sample] is no rotor's; empty where it may be one's."""
+    edge_mps, edge_std_mps = (value * data.span_mps for value in (edge, edge_std))
+    if not edge_mps + edge_std_mps < LEAST_REACH_MPS:
+        return ""
+    reason = f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
+    return span_too_slow(data) or told_no_further(data, fit, edge, edge_std) or reason
+
+
+def as_wheels(data: Periodogram, edge: float, velocity_mps: float) -> str:
+    """Why a line family of this edge [cycles a sample] about a body is a wheel's; empty where it may be a rotor's.
+
+    Seen from the body a wheel's rim is as fast as the body. A rotor's tips are 2.5 times as fast as it flies and more;
+    only of a propeller that flies at the radar, within a narrow range of angles, they seem to be as fast.
+    """
+    edge_mps = edge * data.span_mps
+    if WHEEL[0] * abs(velocity_mps) < edge_mps < WHEEL[1] * abs(velocity_mps):
+        return f"no rotor: lines as wheels have: they end {edge_mps:.1f} m/s from a body at {velocity_mps:.1f} m/s"
+    return ""
+
+
+def too_few_flashes(family: "Family") -> str:
+    """Why rotors that are not told apart give no number, in so short a dwell; empty where they do.
+
+    Their lines, some bins apart, run into one another, and what that leaves may be strong at any spacing.
+    """
+    data, chopping = family.data, family.comb.chopping
+    shows = chopping * data.pulses > LEAST_FLASHES or family.comb.last > MANY_ORDERS
+    if family.is_told_apart or shows or not is_short(data):
+        return ""
+    return (
+        f"{SHORT_DWELL}: lines about {chopping * data.prf_hz:.0f} Hz apart are not one rotor's, "
+        f"to tell what they are takes {1e3 * LEAST_FLASHES / chopping / data.prf_hz:.0f} ms at least"
+    )
