@@ -175,7 +175,10 @@ def measure(
     dwell: MeasuredDwellS = DWELL_S,
     plot: Annotated[
         Path | None,
-        _path_option("FILE.svg", "Draw the clearest dwell of all recordings: spectrum, comb, band and notch."),
+        _path_option(
+            "FILE.svg",
+            "Draw the clearest dwell of all recordings: spectrum, comb, band, notch; replaces it.",
+        ),
     ] = None,
     carrier_hz: CarrierHz = None,
     prf_hz: PrfHz = None,

@@ -73,7 +73,7 @@ def exit_code(command: Callable[[], object]) -> int:
     except _UsageError as error:
         return _usage(error)
     except ModuleNotFoundError as error:
-        if error.name not in _TRAIN_EXTRA:
+        if error.name not in _TRAIN_EXTRA or _was_interrupted(error):
             return _unexpected(error)
         cure = "pip install -c constraints.txt '.[train]' where bladewing's source lies"
         complain(f"{error.name} is not installed, this command needs it: {cure}")
@@ -124,7 +124,21 @@ def _usage(error: Exception) -> int:
     return 2
 
 
+def _was_interrupted(error: BaseException | None) -> bool:
+    """Whether an interrupt is what an exception was raised for: libraries that load make others of it."""
+    seen: set[int] = set()
+    while error is not None and id(error) not in seen:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        seen.add(id(error))
+        error = error.__cause__ or error.__context__
+    return False
+
+
 def _unexpected(error: Exception) -> int:
+    if _was_interrupted(error):
+        complain("interrupted", kind="stopped")
+        return 130
     if os.environ.get(_TRACEBACK):
         import traceback
 

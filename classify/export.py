@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 import onnx
-import onnxruntime
 from bladewing.features.graph.inputs import IN_GRAPH, IQ, input_graph
 from bladewing.features.graph.operators import Graph, Value, needed
 from bladewing.models.export import attach_metadata
 from bladewing.models.operating import OperatingPoint
+from bladewing.models.runtime import onnxruntime
 from bladewing.models.seal import SEAL_KEY, seal
 from onnx import TensorProto, helper
 from scipy import fft

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import onnxruntime
 from bladewing.features.schema import INPUT_SHAPES, schema_hash
 from bladewing.models import DEFAULT_MODEL, KIND_SCORES
 from bladewing.models.operating import OperatingCurve, OperatingPoint
+from bladewing.models.runtime import onnxruntime
 from bladewing.models.session import quiet_session
 
 from .envelope import Envelope
@@ -108,7 +108,8 @@ def read_model(given: str) -> tuple[bytes, str]:
             f"or {', '.join((CASCADE, *PLACES))}"
         ) from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name, no file, too large
-        raise BadInput(f"{given}: the model cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        said = getattr(error, "strerror", None) or error
+        raise BadInput(f"{given}: the model cannot be read: {said}: name another, or make it readable") from None
 
 
 def open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.InferenceSession:

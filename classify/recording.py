@@ -20,7 +20,10 @@ from .envelope import dwell_length, refuse_exchanged
 from .errors import BadInput, unreadable
 from .limits import require_size
 from .samples import complex_samples, positive
-from .sigmf_file import find_sigmf, read_sigmf
+from .sigmf_file import ARCHIVES, find_sigmf, read_sigmf
+
+#: What packed files end in: who reads their bytes as samples gets some.
+PACKED_SUFFIXES = (".gz", ".tgz", ".xz", ".bz2", ".zst", ".zip", ".tar", ".7z")
 
 Result = TypeVar("Result")
 
@@ -260,6 +263,8 @@ def find_recording(path: str | os.PathLike[str]) -> Path:
         require_size(given)
     except OSError as error:
         raise unreadable(path, error) from None
+    if given.suffix.lower() in PACKED_SUFFIXES:
+        raise BadInput(f"{path}: it is packed: unpack it first, or name a SigMF archive {', '.join(ARCHIVES)}")
     if given.suffix.lower() not in ARRAY_SUFFIXES:
         raise BadInput(
             f"{path}: not a kind of recording known here: give SigMF, {', '.join(ARRAY_SUFFIXES)} (I and Q by turns: "

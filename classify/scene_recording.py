@@ -33,7 +33,8 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
     Parameters
     ----------
     stem
-        Path without the suffix; a .sigmf, .sigmf-meta or .sigmf-data at its end is taken off.
+        Path without the suffix; a .sigmf, .sigmf-meta or .sigmf-data at its end is taken off, and what an archive's
+        name ends in.
     rendering, scene, seed
         What was rendered, from what.
 
@@ -48,7 +49,7 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
         The folder is missing or cannot be written to, a sample is not finite, or a recording of that name was not made
         by a rendering.
     """
-    name = re.sub(r"\.sigmf(-meta|-data)?$", "", stem.name)
+    name = re.sub(r"\.sigmf(-meta|-data|\.gz|\.xz|\.zip)?$", "", stem.name)
     if not name or name == "..":
         raise BadInput(f"{stem}: no name for the recording: give --out NAME")
     if stem.is_dir():

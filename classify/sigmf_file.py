@@ -7,6 +7,7 @@ import tarfile
 import warnings
 from contextlib import suppress
 from datetime import UTC, datetime
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -33,7 +34,7 @@ _TIME = "core:datetime"
 _CLOCK_S, _ROUNDED_S, _DRIFT = 0.1, 1.5, 1e-3
 
 _MOST_COUNT = 1 << 63  # JSON's whole numbers have no end, and what is reckoned with them would leave every type
-_ARCHIVES = (".sigmf", ".sigmf.gz", ".sigmf.xz", ".sigmf.zip")
+ARCHIVES = (".sigmf", ".sigmf.gz", ".sigmf.xz", ".sigmf.zip")
 _DATATYPE = re.compile(r"([cr])(?!f8|f16)([fiu])(8|16|32|64)(_le|_be)?")
 
 
@@ -71,7 +72,7 @@ def find_sigmf(path: Path) -> Path | None:
     """
     if path.name.endswith(".sigmf-collection"):
         raise BadInput(f"{path}: a collection of recordings: name the recordings themselves (.sigmf-meta)")
-    if path.name.endswith(_ARCHIVES):
+    if path.name.endswith(ARCHIVES):
         return path if path.is_file() else None
     with suppress(OSError):
         settle(path.parent)  # both files of a pair, or what stood there before
@@ -90,7 +91,8 @@ def find_sigmf(path: Path) -> Path | None:
             "--carrier-hz and --prf-hz, are saved as .npy"
         )
     if missing:
-        raise BadInput(missing)
+        is_folder = path.is_dir()
+        raise BadInput(f"{path}: it is a directory: name a file" if is_folder else missing)
     return None
 
 
@@ -115,12 +117,23 @@ def read_sigmf(path: Path) -> SigmfSamples:
             raise unreadable(path, error) from None
 
 
+def _each_once(path: Path, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object of metadata that says nothing twice: of two that differ, nobody can tell which holds."""
+    said = dict(pairs)
+    for name, value in pairs:
+        if said[name] is not value and said[name] != value:
+            raise BadInput(f"{path}: {name} is said twice, {value!r} and {said[name]!r}: leave one of them")
+    return said
+
+
 def _read_pair(path: Path) -> SigmfSamples:
     import sigmf
 
     try:
         text = read_bounded(path, MOST_TEXT_BYTES)
-        metadata = json.loads(text)
+        metadata = json.loads(text, object_pairs_hook=partial(_each_once, path))
+    except BadInput:
+        raise
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
         if not text:
             raise BadInput(f"{path}: the file is empty (0 bytes): copy it again") from None

@@ -38,6 +38,9 @@ _TWO_TRUE = np.array([True, True]).view(np.uint16)
 #: Fewer sizes that differ are a converter's that hardly steps at all: it may give 0 most of the time.
 LEAST_DISTINCT = 8
 
+#: Of so few samples that are not 0 nothing is told whose zeros the others are: a silence, rather than a converter's.
+LEAST_HELD = 64
+
 #: A converter's steps that were turned in phase, or whose channels were set right, show about 0 alone: several of the
 #: smallest samples have one size, to so much of it, and that is no more than so many times their distance from any
 #: other, or the next size is larger by so much. As many places as about steps not turned lie within so many of it.
@@ -226,7 +229,7 @@ def _silences(iq: NDArray[np.complex64]) -> tuple[NDArray[np.intp], NDArray[np.i
     long = lengths > MOST_IN_A_ROW
     if lengths.max(initial=0) == len(iq):
         long[:] = False
-    elif long.any() and _hardly_steps(*_sorted_steps(_sizes(iq)[~zero])):
+    elif long.any() and len(iq) - lengths.sum() >= LEAST_HELD and _hardly_steps(*_sorted_steps(_sizes(iq)[~zero])):
         # what hardly steps is often 0: so long in a row by chance, by how often it is elsewhere?
         others = len(iq) - int(lengths[long].sum())
         share = int(lengths[~long].sum()) / others

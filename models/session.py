@@ -1,6 +1,6 @@
 """Sessions of onnxruntime on the processor, all opened alike."""
 
-import onnxruntime
+from .runtime import onnxruntime
 
 
 def quiet_session(onnx_bytes: bytes, threads: int = 1) -> onnxruntime.InferenceSession:

@@ -1,6 +1,6 @@
 """The report: what the models get right, what an answer costs, what a record weighs, drawn as one page.
 
-`run` makes it; this package alone imports nothing. ``report.json`` holds every number of the page:
+`run` makes it; importing the package alone loads no library. ``report.json`` holds every number of the page:
 
 ==================== ==============================================================================================
 ``schema_version``   "3"; a page is drawn from this version alone
@@ -26,3 +26,8 @@
 ``config``           the settings of the run: see `settings.ReportConfig`
 ==================== ==============================================================================================
 """
+
+import logging
+
+# where matplotlib keeps its fonts, if the user has no home that can be written to, is nothing to warn of
+logging.getLogger("matplotlib").setLevel(logging.ERROR)

@@ -36,7 +36,7 @@ def peak_bytes(work: Callable[..., Callable[[], object]], *arguments: Any) -> in
 
 def _measure(work: Callable[..., Callable[[], object]], arguments: tuple[Any, ...]) -> int | None:
     """The rise, in this process."""
-    import onnxruntime  # noqa: F401
+    import bladewing.models.runtime  # noqa: F401
     import scipy.fft  # noqa: F401
 
     before = _resident("VmRSS")

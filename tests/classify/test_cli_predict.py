@@ -364,6 +364,28 @@ def test_interrupted_by_the_user(run, sigmf_pair, monkeypatch):
     assert run("--json", sigmf_pair()) == (130, "", "bladewing: stopped: interrupted\n")
 
 
+def test_an_interrupt_that_a_library_makes_another_error_of_is_one(run, sigmf_pair, monkeypatch):
+    def fail(*_, **__):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as stop:
+            raise ImportError("initialization failed") from stop
+
+    monkeypatch.setattr(recordings, "load_recording", fail)
+    assert run("--json", sigmf_pair()) == (130, "", "bladewing: stopped: interrupted\n")
+
+
+def test_nothing_is_kept_in_the_home_nor_sent(sigmf_pair, uav_model, tmp_path):
+    """As onnxruntime's telemetry does."""
+    home = tmp_path / "home"
+    home.mkdir()
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("ORT_", "XDG_"))}
+    command = [sys.executable, "-m", "bladewing.classify", "predict", "--model", str(uav_model), str(sigmf_pair())]
+    told = subprocess.run(command, env={**kept, "HOME": str(home)}, capture_output=True, text=True, check=False)
+    assert (told.returncode, told.stderr) == (0, "")
+    assert not list(home.rglob("*"))
+
+
 def test_what_nobody_expected_is_one_line_and_exit_code_1(run, sigmf_pair, monkeypatch):
     def fail(*_, **__):
         raise ZeroDivisionError("two\nlines")

@@ -61,7 +61,7 @@ def test_a_scene_becomes_a_recording_that_sigmf_validates_and_predict_can_read(s
     assert all(entry["core:sample_count"] == 500 for entry in truth.values())
 
 
-@pytest.mark.parametrize("suffix", [".sigmf", ".sigmf-meta", ".sigmf-data"])
+@pytest.mark.parametrize("suffix", [".sigmf", ".sigmf-meta", ".sigmf-data", ".sigmf.gz", ".sigmf.zip"])
 def test_the_name_of_a_recording_may_carry_a_suffix_of_sigmf(scene_file, tmp_path, suffix, capsys):
     assert main(["simulate", str(scene_file), "--out", str(tmp_path / f"rec.v1{suffix}")]) == 0
     written = {str(tmp_path / f"rec.v1.sigmf-{kind}") for kind in ("data", "meta")}

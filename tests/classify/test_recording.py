@@ -147,6 +147,12 @@ def test_a_missing_file_is_named(tmp_path, name):
     assert "no such file" in refused(tmp_path / name)
 
 
+@pytest.mark.parametrize("name", ["rec.npy.gz", "rec.tgz", "rec.tar", "rec.ZIP"])
+def test_packed_files_are_to_be_unpacked(tmp_path, name):
+    (tmp_path / name).write_bytes(b"\x1f\x8b" * 100)
+    assert f"{name}: it is packed: unpack it first" in refused(tmp_path / name)
+
+
 @pytest.mark.parametrize("name", ["rec.wav", "rec", "rec.bin", "rec.txt"])
 def test_other_kinds_are_refused_with_those_that_are_known(tmp_path, name):
     (tmp_path / name).write_bytes(b"x" * 100)

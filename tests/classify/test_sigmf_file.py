@@ -132,6 +132,10 @@ def test_one_altered_byte_is_found_by_the_hash(sigmf_pair):
         ('{"global": []}', "no 'global' object"),
         ('{"captures": []}', "no 'global' object"),
         ("\xff", "not JSON"),
+        (
+            '{"global": {"core:sample_rate": 1.0, "core:sample_rate": 2.0}}',
+            "core:sample_rate is said twice, 1.0 and 2.0",
+        ),
     ],
 )
 def test_bad_metadata(sigmf_pair, text, said):
