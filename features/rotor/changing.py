@@ -133,6 +133,9 @@ class ChangingSeparation(Separation):
     def _may_fit(self, reaches: list[int]) -> bool:
         return super()._may_fit(reaches) and 2 * sum(reaches) <= most_lines(self.data.pulses)
 
+    def _alike(self) -> list[int]:
+        return self.reaches  # lines that are smeared end elsewhere for each
+
     def _further(self) -> list[int]:
         """Outermost orders with some more, if those may be fitted: weak ones are held back."""
         more = [
