@@ -1,4 +1,4 @@
-"""The comb of a rotor in one record: sought, judged against chance, fitted; or why there is none."""
+"""The comb of a rotor in one record: searched, judged against chance and fitted; or the reason why there is none."""
 
 from dataclasses import dataclass
 
@@ -31,44 +31,44 @@ from .periodogram import Periodogram
 from .unlike_blades import lines_a_turn, weak_lines_show
 from .wide_line import beside_line
 
-#: Score that chance alone exceeds in under 1 % of the records: of white noise, also where a line was taken out; and
-#: where the static background was, with its skirt, or in one channel, whose combs are sought about two places [nats].
-#: Checked by tests/benchmarks/measurement_tables.py.
+#: Score that noise alone exceeds in under 1 % of the records [nats]. THRESHOLD: white noise, also where a body line was
+#: taken out. THRESHOLD_AT_REST: where the static background with its skirt was taken out, or in one channel, whose
+#: combs are sought about two places. Checked by tests/benchmarks/measurement_tables.py.
 THRESHOLD, THRESHOLD_AT_REST = 18.0, 25.0
 
-#: A rotor's lines reach at least so far from the body [m/s]; wings, limbs and wheels seldom do with so few lines.
+#: A rotor's lines reach at least this far from the body [m/s]; if so few, those of wings, limbs and wheels seldom do.
 LEAST_REACH_MPS = 12.0
 
-#: A wheel rolls: its lines reach from rest to twice the body's velocity, as far from the body as that moves. A rotor's
-#: must reach further by this factor. On simulated tracks of 2.5 s it keeps 0.02 of vehicles (0.12 without it).
+#: The lines of a rolling wheel reach from rest to twice the body's velocity: as far from the body as the body is fast.
+#: A rotor's must reach further, by this factor. On simulated tracks of 2.5 s, 0.02 of vehicles pass (0.12 without it).
 OVER_BODY = 1.15
 
-#: A comb needs so many lines, at least.
+#: A comb has at least this many lines.
 LEAST_LINES = 4
 
-#: A comb whose lines all lie on multiples of the mains is taken for the supply's, this near to them, relative: a simple
-#: converter's clock is off by some thousandths. Of two channels, and a comb that speaks loudly, less: that is what the
-#: mains themselves are off by.
+#: A comb is the supply's if its spacing is one of MAINS_MULTIPLES of a mains frequency and its lines lie on multiples
+#: of that. MAINS_SHARE: relative tolerance of the spacing, as a simple converter's clock is off by some thousandths.
+#: MAINS_SHARE_OF_TWO: the same in two channels for scores from MAINS_SCORE up, what the mains themselves are off by.
 MAINS_HZ = (50.0, 60.0)
 MAINS_MULTIPLES = (1, 2, 3, 4, 6)
 MAINS_SHARE, MAINS_SHARE_OF_TWO = 0.0055, 0.0025
 
-#: Where fewer bins than this lie between multiples of the mains, any centre lies near one: only one at rest tells then.
+#: If multiples of the mains are nearer together than this [bins], any centre lies near one: then only rest counts.
 MAINS_BINS = 4.0
 
-#: Beside a static background a comb of less evidence [nats], or one channel's, is not believed at such a spacing,
-#: wherever its centre is: supplies click.
+#: Beside a static background a comb of such a spacing is the supply's wherever its centre is, if its score is below
+#: this [nats] or the record is of one channel: supplies click.
 MAINS_SCORE = 70.0
 
-#: A fraction of the spacing, where that is too fine for the search, may be the comb's nevertheless: if its lines speak
-#: for it as loudly as this beside those of the spacing found. Most rotors chop faster than so many hertz: where a dwell
-#: is too short for that, less is enough, and of further fractions.
+#: The true spacing may be that found over one of FRACTIONS, too fine for the search: if the finer comb scores more than
+#: FRACTION_SHARE of the one found. Most rotors chop faster than USUAL_HZ [Hz]. If the dwell is too short to search from
+#: there on, USUAL_FRACTIONS and USUAL_SHARE hold instead, for finer combs above USUAL_HZ.
 FRACTIONS, FRACTION_SHARE = (2, 3), 0.9
 USUAL_HZ, USUAL_FRACTIONS, USUAL_SHARE = 60.0, (2, 3, 4, 5, 6, 7, 8), 0.85
 
-#: A comb is no rotor's where lines so many times as dense, slower than rotors chop, speak for so many times as much:
-#: a full-size helicopter's for twice as much, noise between a rotor's lines for less than those alone. Asked where they
-#: are so many bins apart and more: fewer than a search takes, but these are about one that it found.
+#: A comb is no rotor's if one SLOWER_FRACTIONS times as dense, slower than rotors chop, scores more than SLOWER_SHARE
+#: times as much: that of a full-size helicopter scores twice as much; noise between a rotor's lines lowers the score.
+#: SLOWER_BINS: least spacing of the denser comb [bins], below the search's, as it is about a comb already found.
 SLOWER_FRACTIONS, SLOWER_SHARE, SLOWER_BINS = (2, 3, 4), 1.3, 1.5
 
 
@@ -83,17 +83,17 @@ class Comb:
     rest : ndarray of complex128, shape (pulses,)
         Samples that its lines leave.
     last : int
-        Outermost order that speaks for it.
+        Outermost order that counts in its score.
     per_turn : int
         Strong lines are this many spacings apart: 1 for equal blades (or a lone one), else the number of blades.
     body_std : float
-        Standard deviation of the body's place, where several of its lines may be the body's [cycles a sample].
+        Standard deviation of the body's frequency where several lines may be the body's, else 0 [cycles a sample].
     body_has_line : bool
-        Whether a line that stands out tells the body.
+        Whether the body is told by a line that stands out.
     blades : int
-        How many blades unequal lines speak for; 1 where they are equal.
+        Number of blades by lines of unequal power; 1 where they are equal.
     blades_sure : bool
-        Whether that is more than chance.
+        Whether that is sure: neither chance nor folded lines or a missed comb may explain it.
     """
 
     fit: CombFit
@@ -112,17 +112,20 @@ class Comb:
 
     @property
     def chopping_std(self) -> float:
-        """Its standard deviation [cycles a sample]."""
+        """Standard deviation of `chopping` [cycles a sample]."""
         return self.fit.spacing_std * self.per_turn
 
 
 def powers_over_noise(data: Periodogram, fit: CombFit, rest: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Power of each line of a comb over the noise [1], as they are beside what combs leave of the record."""
+    """Power of each line over the local noise of a bin [1]: of the fitted line plus what the residual holds there."""
     return squared(fit.seen_beside(rest)) * data.pulses / data.level_of(rest)(fit.frequencies)
 
 
 def of_mains(fit: CombFit, data: Periodogram, score: float, per_turn: int = 1) -> bool:
-    """True where spacing and centre of strong lines (`per_turn` apart) are the mains', or a weak comb's spacing is."""
+    """True where strong lines (`per_turn` apart) have the mains' spacing and centre, or a weak comb the spacing alone.
+
+    The spacing alone counts only beside a static background.
+    """
     spacing = fit.spacing * per_turn
     share = MAINS_SHARE if data.one_channel or score < MAINS_SCORE else MAINS_SHARE_OF_TWO
     for mains_hz in MAINS_HZ:
@@ -137,19 +140,19 @@ def of_mains(fit: CombFit, data: Periodogram, score: float, per_turn: int = 1) -
 
 
 def is_short(data: Periodogram) -> bool:
-    """True where a dwell is too short for the lines of a usual rotor to be told apart."""
+    """True where a dwell is too short to resolve the lines of all rotors that chop faster than `USUAL_HZ`."""
     return MIN_SPACING_BINS / data.pulses * data.prf_hz > USUAL_HZ
 
 
 def finer_spacing(data: Periodogram, fit: CombFit) -> float | None:
-    """Spacing that is too fine for the search, where lines stand between those of a comb; or None [cycles a sample].
+    """Spacing too fine for the search if lines stand between those of a comb, else None [cycles a sample].
 
     Parameters
     ----------
     data : Periodogram
         The record.
     fit : CombFit
-        A comb of some times that spacing: it holds every second, third or eighth line.
+        The comb found: every second, third, ... or eighth line of the finer one.
     """
     fractions, share, least_hz = (
         (USUAL_FRACTIONS, USUAL_SHARE, USUAL_HZ)
@@ -158,7 +161,7 @@ def finer_spacing(data: Periodogram, fit: CombFit) -> float | None:
     )
     spacings = fit.spacing / np.array([1, *fractions])
     finer = (spacings * data.pulses < MIN_SPACING_BINS) & (spacings * data.prf_hz > least_hz)
-    if not finer.any() or fit.is_folded:  # what comes back from the other end of the span lies between as well
+    if not finer.any() or fit.is_folded:  # folded lines lie between the others as well
         return None
     finer[0] = True
     spacings = spacings[finer]
@@ -168,7 +171,7 @@ def finer_spacing(data: Periodogram, fit: CombFit) -> float | None:
 
 
 def slower_spacing(data: Periodogram, fit: CombFit) -> float | None:
-    """Spacing at which no rotor chops, where lines stand between those of a comb; or None [cycles a sample].
+    """Spacing below any rotor's if lines stand between those of a comb, else None [cycles a sample].
 
     Parameters
     ----------
@@ -187,19 +190,19 @@ def slower_spacing(data: Periodogram, fit: CombFit) -> float | None:
 
 
 def _scores_near(data: Periodogram, fit: CombFit, spacings: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What speaks for combs of about these spacings, about the centre of another [nats]."""
+    """Highest score near each of these spacings, counted from the centre of `fit` [nats]."""
     tried = np.outer(spacings, factors_about(data.pulses, FINE_STEPS, FINE_STEPS))
     scores = heights(data.contrast, tried.ravel(), np.full(tried.size, fit.centre)).reshape(tried.shape)
     return np.asarray(scores.max(axis=1), np.float64)
 
 
 def threshold(data: Periodogram) -> float:
-    """Score a comb must exceed in this record [nats]."""
+    """Least score of a comb in this record [nats]."""
     return THRESHOLD_AT_REST if data.rest_half > 0 or data.one_channel else THRESHOLD
 
 
 def _too_short(data: Periodogram) -> str:
-    """Why no comb is sought at all."""
+    """The reason why no comb is searched for at all."""
     _, highest = spacing_limits(data.pulses, data.prf_hz)
     if CHOPPING_RANGE_HZ[0] * SEARCHED_RATIO >= highest * data.prf_hz:
         needed_hz = CHOPPING_RANGE_HZ[0] * SEARCHED_RATIO / highest
@@ -210,7 +213,7 @@ def _too_short(data: Periodogram) -> str:
 
 
 def span_too_slow(data: Periodogram) -> str:
-    """Why no line can be seen to reach as far as a rotor's: they come back from the other end of the span; or empty."""
+    """Why lines cannot be seen to reach as far as a rotor's: the span is too narrow; empty where they can."""
     unambiguous_mps = data.span_mps / 2
     if unambiguous_mps >= LEAST_REACH_MPS:
         return ""
@@ -229,14 +232,14 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
     data : Periodogram
         From `prepared`.
     blades : int, optional
-        Of a rotor.
+        Number of blades of a rotor, if known.
 
     Returns
     -------
     comb : Comb or None
         None where there is none.
     reason : str
-        Why not; empty where there is one.
+        Why there is no comb; empty where there is one.
     """
     start = best_candidate(data)
     if start is None:
@@ -251,7 +254,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
 
 
 def counted_from(data: Periodogram, comb: Comb, place: float, blades: int | None) -> tuple[Comb | None, str]:
-    """A comb that was found counted from the place of another of its lines, the likeliest body's [cycles a sample]."""
+    """The comb counted anew from another of its lines, the likeliest body's, at `place` [cycles a sample]."""
     steps = comb.fit.spacing * factors_about(data.pulses, FINE_STEPS, 2 * FINE_STEPS)
     scores, reaches = even_scores(data.contrast, steps, np.full(len(steps), place))
     best = int(scores.argmax())
@@ -262,7 +265,7 @@ def counted_from(data: Periodogram, comb: Comb, place: float, blades: int | None
 def _counted(
     data: Periodogram, start: Candidate, open_orders: float, has_line: bool, blades: int | None
 ) -> tuple[Comb | None, str]:
-    """A comb fitted and judged, once it is known which of its lines is the body's: what `find_comb` gives."""
+    """Fit and judge a comb whose body line is known; returns what `find_comb` does."""
     fitted = fit_combs(data, start.centre, [start.spacing], [(start.low, start.high)])
     if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
         return None, span_too_slow(data) or f"no comb: fewer than {LEAST_LINES} lines"
@@ -292,7 +295,8 @@ def _counted(
     for number in sorted({1, per_turn}):
         if of_mains(fit, data, start.score, number):
             return None, f"no rotor: lines every {fit.spacing * number * data.prf_hz:.1f} Hz may be the mains"
-    # further lines fall on every so many-th; and of a comb that is sought less, a fraction may be what was found
+    # not sure where folded lines may add to every k-th line, or beyond the usual range, where the search may have found
+    # a fraction of the comb
     few = fit.spacing * per_turn * data.prf_hz > CHOPPING_RANGE_HZ[1]
     unlike = per_turn > 1 and weak_lines_show(orders, power, per_turn)
     is_sure = unlike and not few and not may_come_back(start.last, fit.spacing)

@@ -1,4 +1,4 @@
-"""Which line of a comb is the body's, about which its orders count."""
+"""Which line of a comb is the body's: orders are counted from that line."""
 
 from dataclasses import replace
 
@@ -15,61 +15,63 @@ from .one_sided import Sides
 from .periodogram import Periodogram
 from .wide_line import is_beside
 
-#: What speaks for the comb's centre where a line stands so far over all others of it [nats, dB], and more for each dB
-#: beyond. Blades may be the stronger: then their outermost lines are, and say nothing of the body.
+#: Bonus of a strong line as the body's: STRONG_LINE [nats] if it stands STRONG_OVER_DB [dB] over all lines of the comb,
+#: in proportion below that, and STRONG_LINE_DB [nats] for each further dB. If blades are stronger than the body, their
+#: outermost lines are the strongest, which tell nothing of the body.
 STRONG_LINE, STRONG_OVER_DB = 10.0, 6.0
 STRONG_LINE_DB = 1.0
 
-#: A line that speaks for so much tells the body: one-sided lines about it must not outvote it [nats].
+#: A line with this bonus or more tells the body: one-sided lines about it must not outvote it [nats].
 TELLS = 5.0
 
-#: Counted from its outermost line, a family that takes up most of the unambiguous span reaches around all of it but for
-#: so many orders.
+#: If a comb, counted from its outermost line, covers the whole span but for this many orders, it has no middle and
+#: every line may be the body's.
 AROUND_ORDERS = 4
 
-#: What speaks for the order about which all that shows within so much of the strongest line is even, where that stands
-#: so high over the noise that both ends show [nats, dB, dB].
+#: EVEN: bonus of the order about which levels are symmetric [nats]. All within ENDS_DB of the strongest line counts
+#: [dB], provided that line is more than CLEAR_DB over the noise [dB], so that both ends of the comb show.
 EVEN, ENDS_DB, CLEAR_DB = 20.0, 20.0, 30.0
 
-#: Levels to both sides are never more alike than by this variance [nats^2]; what an order says that is less even than
-#: another is so many times that of Gaussian levels, which are those of several rotors' lines.
+#: LEAST_UNEVEN: added to the variance of level differences between both sides, which are never more alike [nats^2].
+#: UNEVEN_WEIGHT: factor on the log likelihood ratio of two orders by Gaussian levels, those of several rotors' lines.
 LEAST_UNEVEN, UNEVEN_WEIGHT = 0.05, 3.0
 
-#: By this variance [nats^2] levels to both sides differ that have nothing to do with one another; from half of it on it
-#: says less that they are about even there.
+#: Variance of the difference between unrelated levels on both sides [nats^2]. From half of it on, the bonus EVEN of the
+#: most symmetric order is reduced.
 UNRELATED = np.pi**2 / 3
 
-#: A family goes on over so many orders that do not show. So far about the middle of its ends [orders] the one about
-#: which it is even is sought.
+#: ENDS_GAP: a line family continues across up to this many orders that do not show. MIDDLE_REACH: its order of symmetry
+#: is sought up to this many orders from the middle of its ends.
 ENDS_GAP, MIDDLE_REACH = 2, 3
 
-#: Where no line tells the body, what shows so many times over the level is compared with its mirror image about each
-#: order, twice as far from that as so many bins of the padded spectrum too; a line and its image take up so many.
+#: If no line tells the body, all that stands over SHOWS times the level is compared with its mirror image about each
+#: order. The image may be shifted by up to BESIDE bins of the padded spectrum; a line and its image fill PAIR_BINS.
 SHOWS, BESIDE, PAIR_BINS = 3.0, 8, 12
 
-#: So many orders about which all is most even are tried.
+#: This many of the most symmetric orders are tried as the body's.
 EVENEST = 8
 
-#: What speaks for the order at rest at most where a background lies there, and more where no line that moves is as
-#: strong as a body's [nats]: a background is strong whatever hovers in it, and a line of the comb comes as near to it
-#: by chance, but many do hover. Where no line stands out that moves, the body hides in what was taken out there.
+#: REST: highest bonus of a line at rest [nats]. A background is strong whatever hovers in it, and a line of the comb
+#: may lie there by chance. HOVERS: what the bonus of a moving line lacks to this raises that limit, as many bodies
+#: hover. If the strongest line is at rest and none moves, the body hides in the band taken out: REST is then added.
 REST, HOVERS = 14.0, 5.0
 
-#: Lines that are even about their middle no more than this may all lie on one side of another line, if that is a strong
-#: one; however uneven they are, that leaves both open [nats].
+#: Symmetry evidence up to FLAT does not rule out that all lines lie on one side of a strong body line; LEAST_EVEN
+#: limits how far asymmetry counts against the middle, so that both stay possible [nats].
 FLAT, LEAST_EVEN = 5.0, -2.0
 
-#: A line is at rest so near to it [bins].
+#: A line nearer than this to velocity zero is at rest [bins].
 AT_REST_BINS = 1.0
 
-#: A strong line is another target's where the comb counted from it speaks for less than this share of what it does
-#: counted from its own nearest line; lines nearer than this to one [bins] are as good as on it.
+#: OWN_SHARE: a strong line is another target's if the comb counted from it scores no more than this share of the comb
+#: counted from its own nearest line. ON_COMB_BINS: a line nearer than this to one of the comb lies on it [bins].
 OWN_SHARE, ON_COMB_BINS = 0.15, 0.5
 
-#: Before a static background only what stands so far out of its skirt is a line [times the local level].
+#: In the skirt of a static background, only what exceeds this many times the local level is a line.
 OUT_OF_SKIRT = 12.0
 
-#: Other orders that have at most so much less [nats] leave the choice open; asked are those within so many of the best.
+#: OPEN_NATS: orders up to this far below the best one leave the choice open [nats]. NEAR_ORDERS: orders up to this far
+#: from the best one are always compared with it.
 OPEN_NATS, NEAR_ORDERS = 3.0, 3
 
 
@@ -89,18 +91,18 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, bool
     Returns
     -------
     best : Candidate
-        The same comb.
+        The same comb, counted from that line.
     open_orders : float
-        Standard deviation of the body's order, of those that may be the body's as well; 0 where none is as likely.
+        Standard deviation of the body's order about the chosen one, over all that may be the body's; else 0.
     has_line : bool
-        Whether a line that stands out tells the body.
+        Whether the body is told by a line that stands out.
     """
     evidence = data.contrast
     best, most = found, -np.inf
     totals: dict[int, float] = {}
     bonuses, even = _bonuses(data, found)
     shifts = [round((centre - found.centre) / found.spacing) for centre in bonuses]
-    # one comb for several rotors may pass a little beside the body's line: either place will do
+    # a comb that merges several rotors may miss the body's line a little: the better of both places counts
     either = np.stack([list(bonuses), found.centre + found.spacing * np.array(shifts)], axis=1)
     within, furthest = _furthest(data, found)
     steps, scores = _scores_about(data, found, either)
@@ -112,7 +114,7 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, bool
         if total > most:
             most = total
             best = found if centre == found.centre else _counted_from(found, float(steps[index]), centre, shift, within)
-    # as one-sided lines of a strong line's, all that speaks for the best order speaks for that one
+    # if the comb is one-sided about a strong line, that line inherits the score of the best order
     for shift, nats in _one_sided(data, found, best, bonuses).items():
         totals[shift] = max(totals.get(shift, -np.inf), most + nats)
     shift = max(totals, key=totals.__getitem__)
@@ -132,28 +134,28 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, bool
     if found.is_folded:
         _, (reach,) = even_scores(evidence, np.array([best.spacing]), np.array([best.centre]), furthest)
         best = replace(best, centre=best.centre - round(best.centre), low=-int(reach), high=int(reach))
-        if not best.is_folded:  # counted from its own end it only seemed to go all around the span
+        if not best.is_folded:  # it seemed folded only because it was counted from its end
             return centred(data, best)
     return best, float(np.sqrt((likely * away**2).sum() / likely.sum())), has_line
 
 
 def _counted_from(found: Candidate, spacing: float, centre: float, order: int, within: int) -> Candidate:
-    """A comb counted from one of its orders, its spacing and centre as given [cycles a sample]."""
+    """A comb counted from one of its orders, at most `within` orders far; spacing and centre [cycles a sample]."""
     low, high = max(min(found.low - order, 0), -within), min(max(found.high - order, 0), within)
     return Candidate(spacing, centre, low, high, found.score)
 
 
 def _line_nats(bonuses: dict[float, float], comb: Candidate) -> float:
-    """What speaks for the line that a comb is counted from besides the comb [nats]."""
+    """Bonus of the line that a comb is counted from; at least 0 [nats]."""
     own = (nats for place, nats in bonuses.items() if abs(place - comb.centre) < comb.spacing / 2)
     return max(own, default=0.0)
 
 
 def _one_sided(data: Periodogram, found: Candidate, best: Candidate, bonuses: dict[float, float]) -> dict[int, float]:
-    """What speaks for strong lines that all of a comb's lines lie on one side of, by order [nats over the best].
+    """Lead over the best order of strong lines that have the whole comb on one side, by order [nats].
 
-    Nothing does where the best order tells the body by how even all is about it, where too little shows to say that, or
-    where a filter took it out, or it hides in a background.
+    Symmetry about the best order counts against them. There are none if too little shows to judge that symmetry, if a
+    filter took out the line of the best order, or if that order lies within the background.
     """
     if found.is_folded or data.one_channel or abs(best.centre) < data.rest_half:
         return {}
@@ -179,7 +181,7 @@ def _one_sided(data: Periodogram, found: Candidate, best: Candidate, bonuses: di
 
 def _furthest(data: Periodogram, found: Candidate) -> tuple[int, float]:
     """Outermost order that the body may have, and how far from it lines are looked for [cycles a sample]."""
-    # only lines that were found to come back from the other end of the span lie past it
+    # lines past the end of the span are looked for only where folded ones were found
     within = int(outermost_orders(data, found.spacing)) if found.is_folded else int(0.5 / found.spacing)
     return within, within * found.spacing if found.is_folded else 0.5
 
@@ -187,7 +189,7 @@ def _furthest(data: Periodogram, found: Candidate) -> tuple[int, float]:
 def _scores_about(
     data: Periodogram, found: Candidate, places: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Spacings tried about that of a comb [cycles a sample], and its score with each counted from each place [nats].
+    """Spacings tried about that of a comb [cycles a sample], and scores with each, counted from each place [nats].
 
     The scores are of shape (spacings, *places.shape).
     """
@@ -198,7 +200,7 @@ def _scores_about(
 
 
 def _is_own(data: Periodogram, found: Candidate, line: float) -> bool:
-    """False for another target's line, about which the comb has no lines: it says nothing of the body's."""
+    """False for another target's line, about which the comb has no lines: it tells nothing of the body."""
     nearest = found.centre + found.spacing * round((line - found.centre) / found.spacing)
     if abs(line - nearest) * data.pulses < ON_COMB_BINS or is_beside(data, found, line):
         return True
@@ -207,7 +209,7 @@ def _is_own(data: Periodogram, found: Candidate, line: float) -> bool:
 
 
 def _moves(data: Periodogram, centre: float) -> bool:
-    """True where a line is a moving body's: of slow ones, where another is nearer to rest, the background's."""
+    """True where a line is a moving body's; within the background's band only if another line is nearer to rest."""
     nearer = any(abs(line) < abs(centre) for line in data.strong.centres)
     return abs(centre) * data.pulses >= AT_REST_BINS and (nearer or abs(centre) > data.rest_half)
 
@@ -215,12 +217,12 @@ def _moves(data: Periodogram, centre: float) -> bool:
 def _stands_out(
     data: Periodogram, places: NDArray[np.floating], power: NDArray[np.floating] | float
 ) -> NDArray[np.bool_]:
-    """False where so much power at places [cycles a sample] is a static background's skirt, or may be."""
+    """False where this power at places [cycles a sample] may be that of a static background's skirt."""
     return np.asarray(~data.in_skirt(places) | (power > OUT_OF_SKIRT * data.level_at(places)), np.bool_)
 
 
 def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], dict[int, float]]:
-    """What speaks for the body's line besides the comb [nats]: by place [cycles a sample], and by order of the comb."""
+    """Bonuses besides the comb's score [nats]: of lines by place [cycles a sample], of symmetry by order."""
     middle = found.centre + found.spacing * round((found.high + found.low) / 2)
     out = [(found.centre, 0.0), (middle, 0.0)]
     places = found.centre + found.spacing * np.arange(found.low, found.high + 1)
@@ -232,7 +234,7 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
     others_db = max(highest_db, LINE_DB - STRONG_OVER_DB)
     moving, told = 0.0, []
     centres = data.strong.centres
-    # a line beside rest is a slow body's own, and hides no other
+    # the body is not hidden at rest where any line moves, even one right beside rest
     hides = abs(centres[0]) * data.pulses < AT_REST_BINS and not any(_moves(data, line) for line in centres)
     for centre, level_db in sorted(data.strong.lines, key=lambda line: -abs(line[0])):
         if not _is_own(data, found, centre):
@@ -241,7 +243,7 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
         over_db = max(level_db - others_db, 0.0) if is_line else 0.0
         nats = STRONG_LINE * min(over_db / STRONG_OVER_DB, 1.0)
         nats += STRONG_LINE_DB * max(over_db - STRONG_OVER_DB, 0.0)
-        # a line at rest that is no background may be an offset of the receiver all the same
+        # without a background, a line at rest may still be an offset of the receiver
         if _moves(data, centre):
             moving = nats
         elif hides:
@@ -251,10 +253,10 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
             nats += REST
         else:
             nats = min(nats, REST + max(HOVERS - moving, 0.0))
-        # a wide line's top is not its mean, which the comb was sought about
+        # the top of a wide line is not its mean, and the comb was moved to the mean
         place = found.centre if is_beside(data, found, centre) else centre
         orders = (place - found.centre) / found.spacing
-        # several rotors' spacings differ: the further off, the less one comb for them all tells where a line must be
+        # spacings of several rotors differ: further from the middle, their common comb places lines less precisely
         from_middle = abs(orders - (found.low + found.high) / 2)
         off = (orders - round(orders)) * found.spacing * data.pulses / (1 + 0.2 * from_middle)
         if abs(off) < 1.5 and level_db > LINE_DB:
@@ -262,7 +264,7 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
             if _moves(data, centre) and out[-1][1] > TELLS:
                 told.append(round(orders))
     even: dict[int, float] = {}
-    if not found.is_folded:  # on both sides of any line there are those of the other end
+    if not found.is_folded:  # a folded comb has lines on both sides of any order
         if max(nats for _, nats in out) < TELLS:
             even = _mirrored(data, found)
         if highest_db > CLEAR_DB:
@@ -272,21 +274,21 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
             )
             unlikely, most_even = _even_orders(data, shifted, 10 ** ((highest_db - ENDS_DB) / 10))
             even |= {about + order: most_even - nats for order, nats in unlikely.items() if nats < most_even}
-        # lines of several rotors of nearly one rate are as even about another order by chance
+        # by chance several rotors of nearly one rate are as symmetric about another order: at most TELLS counts
         even |= {order: max(even.get(order, 0.0), max(even.values(), default=0.0) - TELLS) for order in told}
         evenest = sorted(even, key=even.__getitem__)[-EVENEST:]
         out += [(found.centre + found.spacing * order, 0.0) for order in evenest]
     most: dict[float, float] = {}
-    for place, nats in out:  # a place may come in twice, as a line's and as one that hides
+    for place, nats in out:  # a place may occur twice, as that of a line and as a hidden one
         most[place] = max(most.get(place, -np.inf), nats)
     return most, even
 
 
 def _mirrored(data: Periodogram, found: Candidate) -> dict[int, float]:
-    """What speaks for each order of a comb by how even all that shows is about it: 0 for the evenest [nats].
+    """Symmetry evidence of each order of a comb, from all that shows: 0 for the most symmetric one, else less [nats].
 
-    Lines of several rotors too lie where their mirror images about the body do, and noise past an end of the comb has
-    none. All orders are compared at once: what a spectrum has in common with its mirror image is its own convolution.
+    The lines of several rotors, too, fall on lines when mirrored about the body; noise past an end of the comb does
+    not. All orders are compared at once: products of a spectrum with its mirror images are its self-convolution.
     """
     shows = np.log(np.maximum(data.power * data.seen / SHOWS, 1))
     size = len(shows)
@@ -294,11 +296,11 @@ def _mirrored(data: Periodogram, found: Candidate) -> dict[int, float]:
     order = np.arange(found.low, found.high + 1)
     places = found.centre + found.spacing * order
     sums = np.rint(2 * places * size).astype(np.intp)[:, None] + np.arange(-BESIDE - 1, BESIDE + 2)
-    # what has no image that could be seen, as a strong line's is taken out, says nothing
+    # what has its mirror image in a band taken out tells nothing
     unlike = _lowest(fft.irfft(squares * seen - spectrum**2, size)[sums % size])
     pairs = max(np.count_nonzero(shows) / PAIR_BINS, 1)
     unlikely = pairs / 2 * np.log(2 * np.maximum(unlike, 0) / pairs + LEAST_UNEVEN)
-    # about the place across the circle all is as even, but less of it is near
+    # half a span away all is as symmetric, but less of it is near: that order is penalised
     across = round(0.5 / found.spacing)
     both = (order - across >= found.low) | (order + across <= found.high)
     middle = np.exp(2j * np.pi * np.flatnonzero(shows) / size).sum()
@@ -307,7 +309,7 @@ def _mirrored(data: Periodogram, found: Candidate) -> dict[int, float]:
 
 
 def _lowest(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The lowest value of each row within, between its columns too: where the parabola through three of them is."""
+    """Lowest inner value of each row, by a parabola through it and its neighbours also between columns."""
     row = np.arange(len(values))
     lowest = 1 + values[:, 1:-1].argmin(axis=1)
     before, own, after = (values[row, lowest + beside] for beside in (-1, 0, 1))
@@ -316,10 +318,10 @@ def _lowest(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _even_orders(data: Periodogram, found: Candidate, least: float) -> tuple[dict[int, float], float]:
-    """Orders about which what shows of this power is about even, and what the evenest has before each, and by itself.
+    """Lead of the most symmetric order over each order near the middle of what exceeds `least`, and its bonus [nats].
 
-    All that lies about each order counts, the lines of several rotors too that it has parted from. The levels of two
-    places as far to both sides differ by what the blades' echoes make of it and by chance, of one variance for all.
+    The highest level about each order counts, also that of rotors whose lines have parted from it. Levels as far to
+    both sides differ by the blades' echoes and by chance; one variance is assumed for all.
     """
     size, furthest = len(data.power), int(0.49 / found.spacing)
     order = np.arange(-furthest, furthest + 1)
@@ -330,11 +332,11 @@ def _even_orders(data: Periodogram, found: Candidate, least: float) -> tuple[dic
     power = data.power * data.level
     seen = data.seen & _stands_out(data, np.arange(size) / size, power)
     highest = np.maximum.reduceat((power * seen)[bins], starts)
-    # the strongest line may have been taken out alone, and what is left about it be seen
+    # hidden is also an order of which only the line itself was taken out, and what is about it is seen
     hidden = ~(np.logical_or.reduceat(data.seen[bins], starts) & data.seen[data.bins_of(places)])
     shows = np.flatnonzero((highest > least) | hidden)
     hidden |= ~np.logical_or.reduceat(seen[bins], starts)
-    # from what speaks for the comb outwards: another family may follow
+    # only groups that reach into the comb: another family may follow
     groups = np.split(shows, np.flatnonzero(np.diff(shows) > 1 + ENDS_GAP) + 1)
     own = [group for group in groups if np.any((order[group] >= found.low) & (order[group] <= found.high))]
     if not own:

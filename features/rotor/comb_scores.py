@@ -1,4 +1,4 @@
-"""What speaks for combs: the evidence of their lines, summed order by order out to where it is most."""
+"""Scores of combs: the evidence of their lines, summed order by order out to where the sum is highest."""
 
 from collections.abc import Iterator
 
@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from ..evidence import MOST_SNRS, Evidence
 from .periodogram import Periodogram
 
-#: Lines summed at once: they must stay in the cache. And orders at least and at most.
+#: LINES_AT_ONCE: lines summed at once, which must fit into the cache; ORDERS_AT_ONCE: orders at least and at most.
 LINES_AT_ONCE, ORDERS_AT_ONCE = 16000, (6, 64)
 
-#: What a comb whose sides reach unequally far must have more [nats].
+#: Penalty on a comb whose sides reach unequally far [nats].
 UNEVEN_COST = 4.0
 
 
@@ -23,19 +23,19 @@ def running_sums(
     Parameters
     ----------
     evidence : Evidence
-        Of each bin; past the last one it begins anew.
+        Evidence of each bin; indices past the last bin wrap around.
     starts : ndarray, shape (sides, combs)
-        Place of each comb's order 0 [bins], so high that no line's is below 0.
+        Place of each comb's order 0 [bins], so high that no line lies below bin 0.
     steps : ndarray, shape (sides, combs)
-        From line to line [bins]; their sizes rise, and are the same on every side.
+        Signed spacing [bins]; magnitudes rise from comb to comb and are the same on every side.
     reach : float
-        Lines up to so far from order 0 count [bins].
+        Lines up to this far from order 0 count [bins].
 
     Yields
     ------
     ndarray of float32, shape (orders, sides, combs, MOST_SNRS)
-        Sums out to each of the next orders, of the first combs only: of those that still have lines within reach.
-        Past its last line a comb's sums stay as they are; 0 where there is no such line SNR.
+        Sums out to each of the next orders, only of the first combs, which still have lines within reach. Past its
+        last line a comb's sums stay constant; columns without a line SNR are 0.
     """
     nearest = starts + 0.5
     outermost = reach / np.abs(steps[0])
@@ -65,16 +65,17 @@ def score(
     centres: NDArray[np.float64],
     outermost: NDArray[np.intp] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
-    """Score combs by their lines, each side of the centre out to where its lines stop.
+    """Score combs by their lines, on each side of the centre out to the order where the sum is highest.
 
     Parameters
     ----------
     evidence : Evidence
-        Of each bin.
+        Evidence of each bin.
     spacings, centres : ndarray, shape (candidates,)
         [cycles a sample].
     outermost : ndarray of int, shape (candidates,), optional
-        Lines up to this order count, of sides that reach equally far; else those within half a span of the centre.
+        Lines up to this order count, and both sides reach equally far. Without it lines within half a span of the
+        centre count.
 
     Returns
     -------
@@ -99,7 +100,7 @@ def score(
             side[beyond] = 0.0
         for side in sides:
             side.cumsum(axis=1, out=side)
-        # a rotor's lines reach equally far to both sides; other reaches cost as much as the choice of two ends gives
+        # a rotor's lines reach equally far to both sides; unequal reaches cost what free choice of two ends may gain
         both = sides[0] + sides[1]
         last = both.argmax(axis=1)
         total = np.maximum(both[number, last], 0)
@@ -116,7 +117,7 @@ def score(
     return best.astype(np.float64), -reach[0], reach[1]
 
 
-#: Of combs: what speaks for each [nats], and its outermost orders, low <= 0 <= high.
+#: Score of each comb [nats] and its outermost orders, low <= 0 <= high.
 Scored = tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]
 
 
@@ -126,7 +127,7 @@ def loudest_of_each(
     centres: NDArray[np.float64],
     outermost: NDArray[np.intp] | None = None,
 ) -> tuple[NDArray[np.float64], Scored]:
-    """Of the spacings tried for each comb, shape (combs, spacings), the loudest; and what `score` gives for that."""
+    """The best of the spacings tried for each comb, shape (combs, spacings), and what `score` gives for it."""
     scores, lows, highs = score(data.contrast, tried.ravel(), np.repeat(centres, tried.shape[1]), outermost)
     loudest = scores.reshape(tried.shape).argmax(axis=1) + np.arange(0, tried.size, tried.shape[1])
     return tried.ravel()[loudest], (scores[loudest], lows[loudest], highs[loudest])
@@ -140,11 +141,11 @@ def even_scores(
     Parameters
     ----------
     evidence : Evidence
-        Of each bin.
+        Evidence of each bin.
     spacings, centres : ndarray, shape (candidates,)
         [cycles a sample]; the spacings rise.
     furthest : float
-        Lines up to so far from the centre count [cycles a sample].
+        Lines up to this far from the centre count [cycles a sample].
 
     Returns
     -------
@@ -172,9 +173,9 @@ def even_scores(
 def _sums_of_sides(
     evidence: Evidence, spacings: NDArray[np.float64], centres: NDArray[np.float64], furthest: float = 0.5
 ) -> Iterator[NDArray[np.float32]]:
-    """Running sums to both sides of combs, the spacings rising: as `running_sums` gives them."""
+    """`running_sums` to both sides of combs of rising spacings."""
     size = evidence.rows.shape[-1]
-    # a line beyond half the PRF is the alias on the other side; turns more, that no place is below 0
+    # a line beyond half the PRF aliases to the other side; whole spans are added so that no place is below 0
     start, step = (np.ceil(furthest) + centres % 1.0) * size, spacings * size
     return running_sums(evidence, np.stack([start, start]), np.stack([-step, step]), furthest * size)
 

@@ -1,4 +1,4 @@
-"""Where a comb may be: spacings from the autocorrelation of band-limited spectra, scored by the likelihood of lines."""
+"""Search for combs: spacings from the autocorrelation of band-limited spectra, scored by the likelihood of lines."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,56 +19,59 @@ from .periodogram import Periodogram
 #: Lines nearer than this are not told apart [bins].
 MIN_SPACING_BINS = 3.0
 
-#: A rotor chops at this at most [Hz]: four blades at 60 000 rpm, as the smallest drones have them. Beyond the range of
-#: the cepstrum a comb is believed where it speaks louder than that found within, which may be a fraction of it: a fifth
-#: and more, so that it is not sought where that found is finer.
+#: FASTEST_HZ: highest chopping frequency of a rotor [Hz], four blades at 60 000 rpm, as the smallest drones have them.
+#: Beyond the cepstrum's range a comb is believed if it scores more than the one found within. That one may be a
+#: fraction of it, a fifth or more: a clear comb below LEAST_FRACTION_HZ needs no search beyond the range [Hz].
 FASTEST_HZ, LEAST_FRACTION_HZ = 4000.0, 300.0
 
-#: No lines further apart than this share of the PRF are a comb's: five fit into the span.
+#: Largest spacing of a comb, as a share of the PRF: five lines fit into the span.
 MOST_SPACING = 0.2
 
-#: The largest spacing sought is so many times the smallest, or none is sought.
+#: The largest spacing sought must exceed this many times the smallest, or no comb is sought.
 SEARCHED_RATIO = 1.5
 
 #: Shares of the whole span within which lines are sought: noise outside a comb's band only hides it.
 BANDS = (1.0, 0.5, 0.25, 0.125)
 
-#: Multiples of the period that are summed at most.
+#: Most multiples of a period at which the autocorrelation is summed.
 MAX_PERIODS = 12
 
-#: Candidates taken from each band, and the other octaves tried for each.
+#: PER_BAND: spacings taken from each band; OCTAVES: multiples tried of each.
 PER_BAND = 4
 OCTAVES = (1.0, 0.5, 2.0, 1 / 3, 3.0)
 
-#: Flashes speak for a comb by at most so many times what the powers of its lines do: they must not make one of what
-#: hardly is one.
-#: Beside a static background, where supplies click, it is less.
+#: The evidence of flashes counts up to FLASH_SHARE times that of the line powers: flashes alone must not make a comb.
+#: Beside a static background, where supplies click, it counts up to REST_FLASH_SHARE times.
 FLASH_SHARE, REST_FLASH_SHARE = 2.0, 1.0
 
-#: Lines of tips faster than the unambiguous velocity count where they speak for so much more [nats]: noise there speaks
-#: for less than nothing.
+#: Folded lines, of tips faster than the unambiguous velocity, count if they add more than this to the score [nats]:
+#: noise there lowers it.
 FOLDED_NATS = 8.0
 
-#: They may be those of the comb found without them, no further off than so many bins at the PRF. Another comb is
-#: believed where none without them has this share of its score, and if it is hardly finer than the one found: each
-#: finer one finds some of several rotors' lines all over the span.
+#: SAME_BINS: folded lines belong to the comb found without them if the spacings differ by less [bins at the PRF].
+#: UNFOLDED_SHARE: another folded comb is believed if no comb without folded lines has this share of its score. FINER:
+#: least spacing of a folded comb, in spacings of that found: any finer one meets some of several rotors' lines all over
+#: the span.
 SAME_BINS, UNFOLDED_SHARE, FINER = 4.0, 0.88, 0.9
 
-#: A comb of several times the spacing found needs so many times its score, if its lines that come back may be the
-#: others; and any other one to be believed where that found has lines that come back, that one's over this share.
+#: SAME_LINES_SHARE: a comb at an odd multiple of the spacing found needs this many times the best score, as its folded
+#: lines may be the lines in between. HELD_SHARE: if the comb found has folded lines itself, any other one needs its
+#: score over this share (at an even multiple over UNFOLDED_SHARE).
 SAME_LINES_SHARE, HELD_SHARE = 1.01, 0.92
 
-#: Further than this from its mirror image about velocity zero a comb's lines are others than that one's [bins].
+#: If a comb's lines lie further than this from those of its mirror image about velocity zero, both are distinct [bins].
 MIRROR_BINS = 1.5
 
-#: Steps to each side of a coarse spacing, of one bin at the PRF; then finer ones about the best families.
+#: COARSE_STEPS: steps to each side of a coarse spacing, of one bin at the PRF; FINE_STEPS: finer ones about the best
+#: FAMILIES.
 COARSE_STEPS = 4
 FAMILIES = 8
 FINE_STEPS = 4
 
-#: And about combs of lines that come back, which are further out; where so much speaks for any comb [nats]: near the
-#: noise the best of many would pass for one. Lines that come back fill the span: where so much speaks for one that
-#: reaches less far than this [cycles a sample], none are sought (of 311 that came back, lines reached 0.426 and more).
+#: FOLDED_STEPS: the same for folded combs, whose lines lie further out, if the best score exceeds REFINED_FROM [nats]:
+#: near the noise the best of many would pass for a comb. FILLS_SPAN: folded lines fill the span. With such a score and
+#: a comb that reaches less far than this [cycles a sample] none are sought (of 311 folded combs, lines reached 0.426
+#: and more). CENTRE_SHIFTS: tried about centres that only a correlation's phase tells [bins].
 FOLDED_STEPS, REFINED_FROM, FILLS_SPAN = 48, 50.0, 0.4
 CENTRE_SHIFTS = (-0.3, 0.0, 0.3)
 
@@ -84,7 +87,7 @@ class Candidate:
     centre : float
         The line about which the orders count [cycles a sample].
     low, high : int
-        Outermost orders that speak for it, low <= 0 <= high.
+        Outermost orders that count in its score, low <= 0 <= high.
     score : float
         Log likelihood ratio against noise [nats].
     """
@@ -107,13 +110,13 @@ class Candidate:
 
     @property
     def is_folded(self) -> bool:
-        """Whether its outer lines come back from the other end of the span."""
+        """Whether its outer lines are folded, back from the other end of the span."""
         return bool(comes_back(self.last, self.spacing))
 
 
 @dataclass(frozen=True)
 class _Grid:
-    """Periods tried, and the lags each one sums."""
+    """Periods tried, and for each the lags that are summed, from `starts` on."""
 
     periods: NDArray[np.float64]
     lags: NDArray[np.intp]
@@ -123,7 +126,7 @@ class _Grid:
 
 @lru_cache(maxsize=16)
 def _grid(pulses: int, low: float, high: float) -> _Grid:
-    """Periods of spacings between two [cycles a sample], in geometric steps of half a bin at the edge of the span."""
+    """Periods of spacings from `low` to `high` [cycles a sample], in relative steps of `MAX_PERIODS` / (4 pulses)."""
     shortest, longest = 1 / high, 1 / low
     count = int(np.ceil(np.log(longest / shortest) * 2 * pulses / MAX_PERIODS * 2)) + 1
     periods = np.geomspace(shortest, longest, count)
@@ -131,31 +134,31 @@ def _grid(pulses: int, low: float, high: float) -> _Grid:
     starts = np.concatenate([[0], np.cumsum(summed)[:-1]])
     number = np.arange(summed.sum()) - np.repeat(starts, summed) + 1
     lags = np.minimum(np.rint(number * np.repeat(periods, summed)).astype(np.intp), pulses - 1)
-    # the real part of a lag of noise has half the variance of its complex value, pulses - lag terms make it up
+    # of noise a lag sums pulses - lag terms; its real part has half the variance of its complex value
     variance = np.add.reduceat((pulses - lags) / 2.0, starts)
     return _Grid(periods, lags, starts, 1 / np.sqrt(variance))
 
 
 def factors_about(pulses: int, steps: int, per_bin: int) -> NDArray[np.float64]:
-    """Factors of the spacings tried about one: so many steps to each side, so many of them to a bin at the PRF."""
+    """Factors of the spacings tried about one: `steps` to each side, `per_bin` of them to a bin at the PRF."""
     return np.asarray(1 + np.arange(-steps, steps + 1) / (per_bin * pulses), np.float64)
 
 
 def spacing_limits(pulses: int, prf_hz: float) -> tuple[float, float]:
-    """Smallest and largest spacing sought [cycles a sample]; empty where the first is not below the second."""
+    """Smallest and largest spacing sought [cycles a sample]; none is sought if the first is not below the second."""
     low, high = CHOPPING_RANGE_HZ
     return max(low / prf_hz, MIN_SPACING_BINS / pulses), min(high / prf_hz, MOST_SPACING)
 
 
 def fastest_chopping(data: Periodogram) -> float:
-    """The highest chopping frequency that is told [cycles a sample]."""
+    """The highest chopping frequency that is sought [cycles a sample]."""
     return min(FASTEST_HZ / data.prf_hz, MOST_SPACING)
 
 
 def coarse_spacings(
     data: Periodogram, evidence: Evidence, centre: float, limits: tuple[float, float]
 ) -> NDArray[np.float64]:
-    """Spacings within limits that are worth a closer look [cycles a sample], best of every band, with their octaves."""
+    """Candidate spacings within limits [cycles a sample]: the best of every band, with their octaves."""
     low, high = limits
     grid = _grid(data.pulses, low, high)
     size = len(data.power)
@@ -213,7 +216,7 @@ def _apart(periods: NDArray[np.float64], sums: NDArray[np.float64], least: float
 
 
 def _loudness(data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What speaks for combs: their lines, and where there is one channel those that it has of the other side."""
+    """Scores of combs [nats]: of their lines and, in one channel, of those about the body's mirror image."""
     return heights(data.contrast, spacings, centres) + _mirrored(data, spacings, centres)
 
 
@@ -226,9 +229,9 @@ def from_mirror_bins(
 
 
 def _mirrored(data: Periodogram, spacings: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What else speaks for combs in one channel, where they stand about the body's mirror image as well [nats].
+    """Additional score of combs in one channel, whose lines stand about the body's mirror image as well [nats].
 
-    Without it a third or a fourth of the spacing, which holds about all of these lines and others, is the louder one.
+    Without it a third or a fourth of the spacing, which holds nearly all of these lines and others, scores higher.
     """
     if not data.one_channel:
         return np.zeros(len(spacings))
@@ -250,7 +253,7 @@ def _families(
 
 
 def best_candidate(data: Periodogram) -> Candidate | None:
-    """The spacing in the cepstrum's range whose lines speak loudest; None where the dwell is too short to search.
+    """The best comb of a spacing in the cepstrum's range; None where the dwell is too short to search.
 
     Any line of the comb may pass for its centre: see `comb_centre`.
     """
@@ -258,14 +261,14 @@ def best_candidate(data: Periodogram) -> Candidate | None:
 
 
 def with_faster(data: Periodogram, found: Candidate) -> Candidate:
-    """The loudest comb beyond the cepstrum's range where it speaks louder than that found, which else stays."""
+    """The best comb beyond the cepstrum's range if it scores more than the comb found; else the comb found."""
     low, _ = spacing_limits(data.pulses, data.prf_hz)
     faster = _best_within(data, (max(low, CHOPPING_RANGE_HZ[1] / data.prf_hz), fastest_chopping(data)))
     return faster if faster is not None and faster.score > found.score else found
 
 
 def _best_within(data: Periodogram, limits: tuple[float, float]) -> Candidate | None:
-    """The spacing within limits whose lines speak loudest; None where these lie too near to each other."""
+    """The best comb of a spacing within limits; None where the limits lie too near to each other."""
     low, high = limits
     if low * SEARCHED_RATIO >= high:
         return None
@@ -285,7 +288,7 @@ def _best_within(data: Periodogram, limits: tuple[float, float]) -> Candidate | 
         return None
     chosen = _families(spacings, scores, centres, data.pulses)
     fine = factors_about(data.pulses, FINE_STEPS, 2 * FINE_STEPS)
-    # a line's frequency is known to a hundredth of a bin; the phase of a correlation tells less
+    # a line's frequency is known to a hundredth of a bin; a centre from the phase of a correlation less well
     shifts = [(0.0,) if centres[i] in data.strong.centres else CENTRE_SHIFTS for i in chosen]
     family = np.repeat(np.arange(len(chosen)), [len(fine) * len(s) for s in shifts])
     centres = np.concatenate(
@@ -315,7 +318,7 @@ def _with_flashes(
     scored: Scored,
     mirrored: NDArray[np.float64] | float = 0.0,
 ) -> NDArray[np.float64]:
-    """What speaks for combs with their flashes, shape (combs,) [nats]; 0 where these do not bring one near the best."""
+    """Scores of combs with their flashes, shape (combs,) [nats]; 0 where these cannot bring a comb near the best."""
     scores, lows, highs = scored
     all_scores = scores + mirrored
     share = REST_FLASH_SHARE if data.rest_half > 0 else FLASH_SHARE
@@ -334,7 +337,7 @@ def _folded(
     most: float,
     found: Candidate,
 ) -> Candidate | None:
-    """The comb whose lines come back from the other end of the span, if one speaks louder than all that do not.
+    """The best comb with folded lines, if one is believed beside those without.
 
     Parameters
     ----------
@@ -343,15 +346,15 @@ def _folded(
     spacings, centres, within : ndarray, shape (candidates,)
         Combs [cycles a sample] and their scores within the span [nats].
     most : float
-        The most that speaks for any of these [nats].
+        The highest score of any of these, with flashes [nats].
     found : Candidate
-        The one chosen of them.
+        The one chosen of these.
     """
     is_loud = most > REFINED_FROM
     ends_within = found.reach < FILLS_SPAN
     if fastest_tip(data) <= 0.5 or (is_loud and ends_within):
         return None
-    # outer lines are some spans away: they tell the spacing so much finer than lines within the span do
+    # folded lines lie up to FOLDED_TIMES as far out, so the spacing must be tried in steps as much finer
     count = FOLDED_STEPS if is_loud else 0
     tried = spacings[:, None] * factors_about(data.pulses, count, 2 * FINE_STEPS * FOLDED_TIMES)
     spacings, (scores, lows, highs) = loudest_of_each(data, tried, centres, outermost_orders(data, tried.ravel()))
@@ -361,8 +364,8 @@ def _folded(
     totals = np.zeros(len(spacings))
     totals[own] = _with_flashes(data, spacings[own], centres[own], (scores[own], lows[own], highs[own]))
     same = np.abs(spacings / found.spacing - 1) * data.pulses < SAME_BINS
-    # lines of a multiple that come back may be all those of the comb found: it need not have more of them. But blades
-    # of an odd number flash twice a period, so that an even multiple speaks nearly as loudly
+    # the folded lines of a multiple may be all other lines of the comb found: it then needs hardly more than that
+    # score. But an even multiple scores nearly as much where an odd number of blades flashes twice a period
     times = np.rint(spacings / found.spacing)
     off = np.abs(spacings / np.maximum(times, 1) / found.spacing - 1) * data.pulses
     whole = (times > 2) & (times % 2 == 1) & (off < SAME_BINS)

@@ -1,8 +1,9 @@
-"""A comb that holds several rotors' lines among its own: at a common fraction of their rates, or anywhere below them.
+"""A comb that holds lines of several rotors: at a common fraction of their spacings, or at any finer spacing.
 
-Lines of rotors of unlike rates stand all over the band. A fifth of one rate is then a sixth of another's, and a comb at
-that holds the lines of both, more than those of either; and any fine one meets some of many lines by chance. But of a
-rotor's comb nearly all lines are there, far more than of the places between them, and of such a one few are.
+Lines of rotors of unlike rates stand all over the band. If a fifth of one spacing is a sixth of another, a comb of that
+spacing holds the lines of both rotors and scores more than either. Any fine comb also meets some of many lines by
+chance. But of a rotor's own comb nearly all lines are there, far more than of the places between them; of a comb that
+holds several rotors few are.
 """
 
 from collections.abc import Iterable
@@ -20,29 +21,30 @@ from .flashes import flash_evidence
 from .folding import may_come_back
 from .periodogram import Periodogram
 
-#: A comb may be such a one where fewer of its lines are there than this share, and those that are speak by so much on
+#: A comb may hold several rotors if no more than FEW_THERE of its lines are there and these have LOUD_NATS or more on
 #: average [nats]: of any comb near the noise many are missing.
 FEW_THERE, LOUD_NATS = 0.75, 1.6
 
-#: Then a whole multiple of its spacing, so near to it [bins at the PRF], is the rotor's where more than this share of
-#: its lines are there, where a line speaks for it by so much on average [nats], of `LINE_CAP` at most, and all of them
-#: by this share of what those of the comb found do: one that holds two rotors' lines among others is hardly twice as
-#: loud as the louder one, and outer lines by chance are a far smaller share. Unlike blades leave the comb as it is.
+#: Then a whole multiple of its spacing, to OFF_BINS [bins at the PRF], is the rotor's if more than WHOLE_THERE of its
+#: lines are there, if a line has more than WHOLE_MEAN_NATS on average [nats] (at most `LINE_CAP`), and if it scores
+#: more than WHOLE_SHARE of the comb found: a comb that holds two rotors' lines among others scores hardly twice the
+#: louder rotor's, and outer lines met by chance add a far smaller share. Unlike blades leave the comb as it is.
 OFF_BINS, WHOLE_THERE, WHOLE_MEAN_NATS, WHOLE_SHARE = 4, 0.85, 2.5, 0.65
 
-#: Any other, or a multiple of more times than this, near which one in twenty lies by chance, is where this holds, where
-#: lines reach this share as far, and where their being there says so much [nats], so many times as much as it does of
-#: the comb found, and times what they speak for this share.
+#: Any other spacing, or a multiple above FEW_TIMES (near which one in twenty lies by chance), is the rotor's if a share
+#: MOST_THERE of the lines is there, with LEAST_MEAN_NATS on average [nats]; if they reach SHARE_OF_REACH as far as the
+#: comb found; if the evidence of presence is LEAST_TOLD [nats] and MORE_TOLD times that of the comb found; and if this
+#: evidence times the score is SHARE_OF_BOTH of that product.
 FEW_TIMES = 4
 MOST_THERE, LEAST_MEAN_NATS = 0.78, 2.0
 SHARE_OF_REACH, LEAST_TOLD, MORE_TOLD, SHARE_OF_BOTH = 0.75, 10.0, 1.08, 0.6
 
-#: Coarser ones are so many times as far apart at least; and so many of the loudest are looked at.
+#: COARSER: least spacing of the combs tried, in spacings of that found; LOUDEST: how many of the best are examined.
 COARSER, LOUDEST = 1.3, 60
 
 
 def of_one_rotor(data: Periodogram, found: Candidate) -> Candidate:
-    """The comb of one rotor, where that found holds the lines of several; else the same.
+    """The comb of one rotor, if the comb found holds the lines of several; else the comb found.
 
     Parameters
     ----------
@@ -67,7 +69,7 @@ def of_one_rotor(data: Periodogram, found: Candidate) -> Candidate:
     spacings, (scores, lows, highs) = loudest_of_each(data, tried[loudest, None] * steps, about[loudest])
     each = zip(*(values.tolist() for values in (spacings, about[loudest], lows, highs, scores)), strict=True)
     coarser = _apart((Candidate(*values) for values in each), OFF_BINS / data.pulses)
-    # all of its lines may lie to one side
+    # the lines of the comb found may all lie on one side of its centre
     sides = (_told_by_presence(data, side) for side in (replace(found, low=0), replace(found, high=0)))
     told = max(one.told for one in (own, *sides))
     rotors = (_with_its_flashes(data, one) for one in coarser)
@@ -75,7 +77,7 @@ def of_one_rotor(data: Periodogram, found: Candidate) -> Candidate:
 
 
 def _apart(combs: Iterable[Candidate], least: float) -> list[Candidate]:
-    """The loudest combs, each further from louder ones than so much, relative: of many alike one is whole by chance."""
+    """The best combs, each more than `least` off better ones, relative: of many alike one is whole by chance."""
     taken: list[Candidate] = []
     for comb in sorted(combs, key=attrgetter("score"), reverse=True):
         if all(abs(comb.spacing / other.spacing - 1) > least for other in taken):
@@ -88,7 +90,7 @@ def _is_rotors(data: Periodogram, comb: Candidate, found: Candidate, found_told:
     there, mean, _, told = _told_by_presence(data, comb)
     multiple = comb.spacing / found.spacing
     if abs(multiple / round(multiple) - 1) * data.pulses <= OFF_BINS:
-        # lines that come back from the other end of the span lie between a comb's own
+        # folded lines lie between a comb's other lines
         comes_back = may_come_back(found.last, found.spacing)
         is_whole = there > WHOLE_THERE and mean > WHOLE_MEAN_NATS
         if is_whole and not comes_back and comb.score > WHOLE_SHARE * found.score:
@@ -102,18 +104,18 @@ def _is_rotors(data: Periodogram, comb: Candidate, found: Candidate, found_told:
 
 
 class _Presence(NamedTuple):
-    """Which of a comb's lines are there, of those that can be seen.
+    """How many of a comb's lines are there (have positive evidence), of those that can be seen.
 
     Parameters
     ----------
     there : float
-        Their share.
+        Share of the lines that are there.
     mean : float
-        What a line, there or not, speaks for the comb on average [nats].
+        Mean evidence of a line, there or not [nats].
     mean_there : float
-        The same of those that are there.
+        Mean evidence of the lines that are there [nats].
     told : float
-        How far the share is from chance, out to the order where that is furthest [nats], at least 0.
+        Evidence of that share against chance, out to the order where it is highest [nats], at least 0.
     """
 
     there: float
@@ -123,10 +125,10 @@ class _Presence(NamedTuple):
 
 
 def _told_by_presence(data: Periodogram, comb: Candidate) -> _Presence:
-    """What the lines of a comb say by being there.
+    """Presence of a comb's lines and its evidence.
 
-    By chance as many are there as of all places as near to the centre: the log likelihood ratio of so many of so many
-    against that share.
+    By chance the share of lines that are there is that of all places as near to the centre. The evidence is the
+    binomial log likelihood ratio of the share found against that one.
     """
     order = np.arange(comb.low, comb.high + 1)
     frequency = comb.centre + comb.spacing * order
@@ -154,14 +156,14 @@ def _told_by_presence(data: Periodogram, comb: Candidate) -> _Presence:
 def _up_to_order(
     orders: NDArray[np.intp], there: NDArray[np.bool_], last: int
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """How many of these places are of each order or a lower one, and how many of those are there, shape (last + 1,)."""
+    """Number of these places up to each order, and how many of them are there, shape (last + 1,)."""
     orders = np.minimum(orders, last)
     count, held = (np.bincount(orders, weights, last + 1).cumsum() for weights in (None, there))
     return count, held
 
 
 def _with_its_flashes(data: Periodogram, comb: Candidate) -> Candidate:
-    """The same comb, its flashes counted in its score."""
+    """The same comb with the evidence of its flashes added to its score."""
     reach = (np.array([comb.low]), np.array([comb.high]))
     flashes = flash_evidence(data, np.array([comb.spacing]), np.array([comb.centre]), *reach)
     total = comb.score + min(float(flashes[0]), FLASH_SHARE * comb.score)

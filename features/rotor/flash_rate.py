@@ -1,8 +1,8 @@
-"""Which multiple of a comb's spacing blades flash at, where the lines of that fall on those of the comb.
+"""At which multiple of a comb's spacing blades flash, where folding gives both combs the same lines.
 
-Where the PRF is nearly p / k times the chopping frequency, lines that come back from the other end of the span fall on
-those of a k-th of it: both combs are the same lines, and no power of any tells which of them it is. But the power of
-the samples comes and goes with the flashes.
+If the PRF is nearly p / k times the chopping frequency, folded lines fall on those of a comb at a k-th of it. Both
+combs are then the same lines, and no line power tells which of them is the rotor's. But the power of the samples over
+time varies with the flashes.
 """
 
 import numpy as np
@@ -17,21 +17,21 @@ from .folding import comes_round, may_come_back, outermost_orders
 from .octaves import MULTIPLE_SHARE
 from .periodogram import PADDING, Periodogram
 
-#: The power over time speaks where the mean line of it is so many times its noise.
+#: The power over time counts if its lines have this many times its noise on average.
 LEAST_OVER_NOISE = 10.0
 
-#: Factors by which a spacing may be too fine. Every so many-th line of the power holds one such part of it by chance;
-#: where blades flash at that multiple it holds of the rest this share more. Over twice the spacing so little is asked
-#: because the combs are asked as well: blades of an odd number flash twice a period, one on each side.
+#: Factors by which a spacing may be too fine, each with a least excess. By chance every k-th line of the power over
+#: time holds 1 / k of it; if blades flash at k times the spacing, these lines hold that excess of the rest as well. It
+#: is small for k = 2 since the combs are compared too: blades of an odd number flash twice a period, once on each side.
 FACTORS = {2: 0.06, 3: 0.13, 5: 0.2, 7: 0.2}
 
-#: Where a span is whole spacings but for so little [bins], no line of any multiple that comes back lies beside the
+#: If the span differs from whole spacings by no more than this [bins], no folded line of any multiple falls beside the
 #: comb's own, however fast the tips are.
 ALL_ROUND_BINS = 0.7
 
 
 def of_flashes(data: Periodogram, found: Candidate) -> Candidate:
-    """The comb at the multiple of a comb's spacing that blades flash at, where only that tells; else the same comb.
+    """The comb at the multiple of a comb's spacing at which blades flash, where only flashes tell; else the same comb.
 
     Parameters
     ----------
@@ -53,7 +53,8 @@ def of_flashes(data: Periodogram, found: Candidate) -> Candidate:
     scores, lows, highs = score(data.contrast, spacings, centres, outermost_orders(data, spacings))
     scores += flash_evidence(data, spacings, centres, lows, highs)
     best = int(scores.argmax())
-    # it must be the same lines: at 5.8 to 24 GHz 34 of 36 right ones had this share, 9 of 32 wrong ones had not
+    # it must hold the same lines: at 5.8 to 24 GHz 34 of 36 right ones had this share of the score, 9 of 32 wrong ones
+    # had not
     if multiples[best // len(steps)] == 1 or scores[best] < MULTIPLE_SHARE * found.score:
         return found
     most = max(float(scores[best]), found.score)
@@ -61,18 +62,18 @@ def of_flashes(data: Periodogram, found: Candidate) -> Candidate:
 
 
 def may_be_fraction(data: Periodogram, spacing: float, last: int) -> bool:
-    """True where a comb may be every line there is of a multiple, and no flash tells which of them it is.
+    """True where a comb may be the folded lines of a multiple of its spacing, and no flashes tell which it is.
 
-    Flashes shorter than a sample are seen by chance: of tips some times as fast as the unambiguous velocity.
+    Flashes of tips several times as fast as the unambiguous velocity are shorter than a sample and seen by chance.
 
     Parameters
     ----------
     data : Periodogram
         The record.
     spacing : float
-        Of the comb [cycles a sample].
+        Spacing of the comb [cycles a sample].
     last : int
-        Its outermost order.
+        Outermost order of the comb.
     """
     if data.one_channel or not may_come_back(last, spacing) or not comes_round(spacing, data.pulses, ALL_ROUND_BINS):
         return False
@@ -80,7 +81,7 @@ def may_be_fraction(data: Periodogram, spacing: float, last: int) -> bool:
 
 
 def _flash_multiples(data: Periodogram, spacing: float) -> list[int]:
-    """Multiples of a spacing that blades may flash at; none where they flash at that itself or nothing tells."""
+    """Multiples of a spacing at which blades may flash; none where they flash at the spacing or nothing tells."""
     lines = _lines_of_power(data, spacing)
     if lines is None:
         return []
@@ -91,7 +92,7 @@ def _flash_multiples(data: Periodogram, spacing: float) -> list[int]:
         return float(lines[factor * multiple - 1 :: factor * multiple].sum() / max(held, 1e-30))
 
     for factor, more in sorted(FACTORS.items(), reverse=True):
-        # where the factor divides the way around, lines of that multiple come back to themselves alone
+        # if the factor divides the spacings in the span, lines of that multiple fold onto themselves alone
         while (
             around % factor
             and 2 * factor * multiple <= len(lines)
@@ -104,9 +105,9 @@ def _flash_multiples(data: Periodogram, spacing: float) -> list[int]:
 
 
 def _lines_of_power(data: Periodogram, spacing: float) -> NDArray[np.float64] | None:
-    """Power over noise of the lines, of all multiples of a spacing, that the power of the samples has over time.
+    """Lines of the samples' power over time at all multiples of a spacing, noise subtracted.
 
-    None where they hardly stand out of the noise. Flashes longer than a sample have their lines within the span.
+    None where they hardly stand out of the noise. The lines of flashes longer than a sample lie within the span.
     """
     power = squared(data.samples)
     size = fft.next_fast_len(PADDING * data.pulses, real=True)
@@ -114,7 +115,7 @@ def _lines_of_power(data: Periodogram, spacing: float) -> NDArray[np.float64] | 
     spectrum = squared(fft.rfft((power - power.mean()) * window, size))
     orders = np.arange(1, int(0.5 / spacing) + 1)
     lines = spectrum[np.minimum(np.rint(orders * spacing * size).astype(np.intp), len(spectrum) - 1)]
-    # noise of unit power, and what it beats with the blades
+    # noise of unit power, by itself and beating with the blades' echoes
     noise = float((window**2).sum()) * (2 * max(float(power.mean()) - 1, 0.0) + 1)
     lines = lines - noise
     return np.maximum(lines, 0.0) if lines.mean() > LEAST_OVER_NOISE * noise else None

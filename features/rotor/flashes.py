@@ -3,7 +3,7 @@
 A uniform blade's line of rotation order n has the amplitude exp(j n (phi - pi/2)) / Gamma x integral of J_n (the
 paper's eq. 16 summed along the blade): inside the band that integral is near 1 at every order, so that the phases grow
 by equal steps from line to line. In time that is the flash of the blade at right angles to the line of sight. Noise has
-no such order, so the phases are evidence that the powers of the lines do not hold.
+no such phase law, so the phases are evidence besides the powers of the lines.
 """
 
 import numpy as np
@@ -13,24 +13,24 @@ from scipy import fft
 from ..lines import squared
 from .periodogram import Periodogram
 
-#: A side with fewer lines than this says nothing by its phases.
+#: A side with fewer lines than this has no phase evidence.
 LEAST_LINES = 5
 
-#: Frequencies tried for each line that a side has, at least.
+#: Phase steps tried for each order of a side, at least.
 OVERSAMPLING = 4
 
 
 def flash_nats(amplitudes: NDArray[np.complexfloating]) -> NDArray[np.float64]:
     """Evidence of equal phase steps in the lines of one side [nats].
 
-    With the powers as they are and random phases, the share of the power that adds up at one step follows a beta law
-    of the parameters 1 and lines - 1, exactly so for lines of noise; its tail, times the number of steps told apart, is
-    the probability that chance does as well.
+    For given powers and random phases, the share of the power that adds up at one phase step follows a beta law of
+    parameters 1 and lines - 1, exactly so for lines of noise. Its tail times the number of independent steps, taken as
+    2 x lines, is the probability that chance does as well.
 
     Parameters
     ----------
     amplitudes : ndarray of complex, shape (..., orders)
-        Lines in the rising order; 0 where one cannot be seen.
+        Lines in rising order; 0 where a line cannot be seen.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def flash_evidence(
     counted = data.usable(frequency) & (order <= reach[..., None])
     left, right = np.where(counted, data.amplitude[data.bins_of(frequency)], 0)
     apart = flash_nats(np.stack([left, right])).sum(axis=0)
-    # J_-n = (-1)^n J_n: one step for both sides, with half a turn more on the one where the blades are of odd number
+    # J_-n = (-1)^n J_n: both sides share one phase step, with half a turn more on one if the number of blades is odd
     turned = left * np.where(order % 2, -1, 1).astype(np.float32)
     rest = np.zeros_like(left[:, :1])
     both = np.stack([np.concatenate([side[:, ::-1], rest, right], axis=1) for side in (left, turned)])

@@ -1,8 +1,8 @@
-"""Where the combs of several rotors meet: at the body, whichever of their lines it was counted from.
+"""Where the combs of several rotors meet: at the body, whichever line they were counted from.
 
-About the body every rotor's line of order n lies n of its own rates away. Counted from another line, m orders off, each
-comb has a centre of its own, m times its rate further on. How levels are to both sides hardly tells these apart, as the
-lines of several rotors beat; where they lie does.
+Every rotor's line of order n lies n times its own spacing from the body. Counted from a line m orders off, each comb
+has a centre of its own, m times its own spacing from the body: the centres coincide only at the body. Levels on both
+sides hardly tell the body's order, as the lines of several rotors beat; their frequencies do.
 """
 
 from collections.abc import Sequence
@@ -17,28 +17,29 @@ from .comb_fit import CombFit, fit_combs
 from .periodogram import Level, Periodogram
 from .rotors import Rotors
 
-#: Gauss-Newton steps from the joint fit, none of whose combs is more than a part of a bin off.
+#: Gauss-Newton steps of the separate fit, from the joint fit, whose combs are off by a fraction of a bin at most.
 MEETING_STEPS = 3
 
-#: Asked are so many orders to each side.
+#: The body is tried at up to this many orders to each side of the common centre.
 MOST_ORDERS = 100
 
-#: Beside what their places say, so much speaks for the order that they were counted from; orders less likely than the
-#: likeliest by more than the second are none [nats].
+#: COUNTED: prior in favour of the order that the combs were counted from; OPEN_NATS: orders less likely than the best
+#: one by more than this are dropped [nats].
 COUNTED, OPEN_NATS = 3.0, 3.0
 
-#: They surely meet about one order where no other is nearer to it than this [nats].
+#: The best order is sure if every other one is less likely by more than this [nats].
 SURE = 15.0
 
-#: A joint fit about a place off theirs by more than this is drawn to combs that are none [bins].
+#: If the separately fitted centres differ by more than this, the joint fit has converged on wrong combs [bins].
 NEAR_BINS = 0.35
 
-#: A comb that is several rotors not told apart has each of its lines drawn off its place by so much [bins], rms.
+#: Rms frequency error of each line of a comb that merges several unresolved rotors [bins].
 MERGED_BINS = 0.2
 
-#: Of rotors that one comb holds, and no line that tells the body, that is so many orders off, rms: 8 of 60 were.
-#: Two that beat are about as even about another order, by 0.3 nats^2 as a rule; a lone one's lines by 0.01, of so many
-#: orders of such an snr to each side.
+#: BEATING_ORDERS: rms error of the body's order if one comb holds several rotors and no line tells the body: 8 of 60
+#: were off. Two rotors that beat are about as symmetric about another order, as a rule to 0.3 nats^2, a lone rotor to
+#: 0.01. EVEN_NATS: below this, beside noise, it is a lone rotor [nats^2], by at least EVEN_PAIRS orders whose lines on
+#: both sides exceed the snr EVEN_SNR.
 BEATING_ORDERS, EVEN_NATS, EVEN_PAIRS, EVEN_SNR = 0.5, 0.03, 4, 10.0
 
 
@@ -49,15 +50,15 @@ class Meeting:
     Parameters
     ----------
     order : int
-        The likeliest, counted from their common centre.
+        The body's likeliest order, counted from the combs' common centre.
     place, std : float
-        That of it, and standard deviation, by how near they come to one another too [cycles a sample].
+        Mean place of the combs at that order and its standard deviation, raised if they scatter [cycles a sample].
     open_std : float
-        What other orders add to that, where they are about as likely [cycles a sample].
+        Further standard deviation by other orders that are about as likely [cycles a sample].
     is_sure : bool
-        Whether none is by far.
+        True where every other order is less likely by more than SURE nats.
     is_near : bool
-        Whether it is told from combs that the joint fit was not far from.
+        Whether the separately fitted centres agree to NEAR_BINS, as after a good joint fit.
     """
 
     order: int
@@ -78,14 +79,14 @@ def meeting_of(data: Periodogram, fits: Sequence[CombFit], level_about: Level, *
     fits : sequence of CombFit
         Two combs at least, fitted about one centre.
     level_about : callable
-        Local level of what these leave.
+        Local level of the residual of these combs.
     resolved : bool
-        Whether each is one rotor's.
+        Whether each comb is a single rotor's.
 
     Returns
     -------
     Meeting or None
-        None where they cannot be fitted each about a centre of its own.
+        None where the combs cannot be fitted with a centre each.
     """
     reaches = [fit.reach for fit in fits]
     spacings = [fit.spacing for fit in fits]
@@ -95,7 +96,7 @@ def meeting_of(data: Periodogram, fits: Sequence[CombFit], level_about: Level, *
     merged = np.array([0.0 if resolved else MERGED_BINS / np.sqrt(len(fit.orders)) for fit in apart[0]])
     most = min(MOST_ORDERS, max(max(-low, high) for low, high in reaches))
     unlike, place, std = _by_order(apart[0], most, merged / data.pulses)
-    # combs that meet nowhere as near as they should say so much less
+    # if the combs meet at no order within their deviations, all evidence is reduced in proportion
     nats = -unlike / 2 / max(float(unlike.min()) / (len(fits) - 1), 1.0)
     nats[most] += COUNTED
     best = int(nats.argmax())
@@ -109,7 +110,7 @@ def meeting_of(data: Periodogram, fits: Sequence[CombFit], level_about: Level, *
 
 
 def with_body(comb: Comb, rotors: Rotors, meeting: Meeting | None) -> tuple[Comb, float | None]:
-    """A comb that may be several rotors' with what is known of the body: where they meet, and how sure that is."""
+    """The comb with `body_std` by the meeting of its rotors; and the std of a sure meeting at its centre, else None."""
     if meeting is None:
         beats = len(rotors.rates) == 1 and not (comb.body_has_line or _is_even(comb.fit))
         return replace(comb, body_std=max(comb.body_std, BEATING_ORDERS * comb.chopping)) if beats else comb, None
@@ -133,9 +134,9 @@ def _is_even(fit: CombFit) -> bool:
 def _by_order(
     fits: Sequence[CombFit], most: int, merged: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """How unlike combs' places are at each order from `-most` to `most`, their mean and its deviation.
+    """Chi-squared of the combs' places at each order from `-most` to `most`, their mean and its standard deviation.
 
-    Each place has a further deviation of so much [cycles a sample].
+    `merged` is a further standard deviation of each comb's place [cycles a sample].
     """
     known = [(fit.centre, fit.spacing, fit.centre_std, fit.spacing_std) for fit in fits]
     centre, spacing, centre_std, spacing_std = np.array(known).T

@@ -1,21 +1,21 @@
-"""Which of a comb's multiples and fractions is the rotor's: several rotors' lines fill all places further out."""
+"""Which multiple or fraction of a comb's spacing is the rotor's, where several rotors' lines fill the outer orders."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-#: Where a place has so much evidence on average, lines fill its neighbourhood [nats]; noise has less than none.
+#: If the mean evidence nearby is at least this, lines fill the neighbourhood [nats]; that of noise is negative.
 FILLED_NATS = 0.2
 
-#: A comb at a multiple of the best one's spacing, so near to it, relative, is taken from this share of its score where
-#: that is so much [nats], and chance little of it.
+#: A comb at a multiple of the best one's spacing, within MULTIPLE_OFF of that (relative), is preferred from more than
+#: MULTIPLE_SHARE of its score on; if that score is MULTIPLE_FROM or more [nats], of which chance is a small part.
 MULTIPLE_OFF, MULTIPLE_SHARE, MULTIPLE_FROM = 0.025, 0.85, 50.0
 
 
 def over_neighbours(evidence: NDArray[np.float32], block: int) -> NDArray[np.float32]:
-    """Evidence less what any place of its neighbourhood has, where lines fill that [nats], same shape.
+    """Evidence less the mean of its neighbourhood, where lines fill that [nats], same shape.
 
-    At the high orders the lines of several rotors fill all there is between two orders. A comb of a third of the
-    spacing finds three times as many lines there, wherever it looks: such places tell no comb from another.
+    At the high orders lines of several rotors fill the whole gap between two orders. A comb of a third of the spacing
+    finds three times as many lines there, wherever it is placed: such bins do not tell one comb from another.
 
     Parameters
     ----------
@@ -32,10 +32,10 @@ def over_neighbours(evidence: NDArray[np.float32], block: int) -> NDArray[np.flo
 
 
 def coarsest(spacings: ArrayLike, scores: ArrayLike) -> int:
-    """Which comb has the highest score, or lies at a multiple of that one's spacing and comes near its score.
+    """Index of the comb of highest score, or of the coarsest at a multiple of its spacing with nearly that score.
 
-    The lines that a fraction of the spacing adds, if they are there, speak as loudly as the others; of several rotors'
-    lines some lie there by chance.
+    Lines that a finer spacing adds speak as loudly as the others if they are a rotor's own. Of several rotors' lines
+    some lie there by chance.
 
     Parameters
     ----------

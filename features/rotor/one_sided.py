@@ -1,8 +1,8 @@
-"""How even a comb's levels are to both sides of a line, or whether all lie on one side of it.
+"""How symmetric a comb's levels are about a line, or whether all its lines lie on one side of that line.
 
-A blade that reflects only as it comes, or as it goes, has lines to one side of the body alone. About their own middle
-they are even as well, as far as they reach: what tells is whether levels are more like their mirror images than like
-their neighbours.
+A blade that reflects only as it approaches, or only as it recedes, has lines on one side of the body alone. They reach
+equally far from their own middle as well. A true centre has levels more like their mirror images than like their
+neighbours.
 """
 
 import numpy as np
@@ -11,29 +11,30 @@ from numpy.typing import NDArray
 from .comb_search import Candidate
 from .periodogram import Periodogram
 
-#: Compared is what stands so many times over the level; an order shows where a place so much of a spacing to each side
-#: of it, at most, stands so much further over it [nats].
+#: Powers are compared above OVER times the highest local level. An order shows if a place within NEAR_SHARE of a
+#: spacing of it stands more than SHOWS over that [nats].
 OVER, NEAR_SHARE, SHOWS = 3.0, 0.25, 1.0
 
-#: All lies on one side of a line where that is the stronger one at such a share of the orders that show.
+#: All lies on one side of a line if that side is stronger at this share or more of the orders that show.
 SAME_SIDE = 0.85
 
-#: Fewer orders tell nothing.
+#: Fewer orders than this tell nothing.
 LEAST_ORDERS = 4
 
-#: No two levels are told to be more alike than by so much [nats], or its square.
+#: Added to differences between levels: LEAST_UNLIKE to medians [nats], LEAST_UNEVEN to mean squares [nats^2].
 LEAST_UNLIKE, LEAST_UNEVEN = 0.02, 0.01
 
-#: The image of an order is sought so many bins of the padded spectrum beside its place too; a line takes up so many.
+#: The mirror image of an order may lie up to BESIDE bins of the padded spectrum off its place; a line fills LINE_BINS.
 BESIDE, LINE_BINS = 4, 12
 
-#: A filter took a line out that is so near to rest [bins] and so far below its neighbours [nats], of so many orders,
-#: in the bins of the padded spectrum so near to it: other rotors' lines lie beside.
+#: A filter took out a line nearer than AT_REST_BINS to rest [bins] if it lies more than FILTERED_BELOW [nats] under the
+#: median of NEIGHBOURS orders to each side. HOLE_BINS: its level is read up to this many bins of the padded spectrum
+#: from its place; lines of other rotors lie beside.
 AT_REST_BINS, FILTERED_BELOW, NEIGHBOURS, HOLE_BINS = 1.0, 2.0, 4, 2
 
 
 class Sides:
-    """What lies to both sides of a line of a comb.
+    """Levels on both sides of a line of a comb.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ class Sides:
         near = max(int(2 * NEAR_SHARE * half), 2)
         middles = np.rint((comb.centre + comb.spacing * np.arange(-reach, reach + 1)) * size).astype(np.intp)
         bins = (middles[:, None] + np.arange(-half, half + 1)) % size
-        level = data.level[bins]  # lines lift it, and not to both sides alike: what is compared are powers
+        level = data.level[bins]  # lines lift the level, unequally on both sides: powers are compared instead
         nats = np.log(np.maximum(data.power[bins] * data.seen[bins] * level / (OVER * level.max()), 1))
         tops = nats[:, half - near : half + near + 1].max(axis=1)
         self._is_at_rest = abs(comb.centre) * data.pulses < AT_REST_BINS
@@ -62,7 +63,7 @@ class Sides:
 
     @property
     def filtered_out(self) -> bool:
-        """Whether the line itself is missing, at rest: a filter takes out what stands there."""
+        """Whether the line itself is missing and at rest, where a filter takes lines out."""
         return self._is_at_rest and self._below > FILTERED_BELOW
 
     @property
@@ -74,9 +75,9 @@ class Sides:
         return max(stronger, 1 - stronger) >= SAME_SIDE
 
     def even_nats(self) -> float:
-        """What speaks for the line by how much more like their mirror images levels are than like their neighbours.
+        """Symmetry evidence: how much more levels resemble their mirror images than their neighbours [nats].
 
-        One side may be weaker than the other by any factor: the edges of a blade reflect unlike.
+        Of the levels of orders, one side may be weaker by any factor: the edges of a blade reflect unlike.
         """
         both = self._both
         return self._of_levels(both) + self._of_places(both) if self.compares else 0.0
@@ -91,7 +92,7 @@ class Sides:
         return np.asarray(np.minimum(self._tops_after, self._tops_before) > SHOWS, np.bool_)
 
     def _of_levels(self, both: NDArray[np.bool_]) -> float:
-        """By the level of each order."""
+        """Symmetry evidence by the highest level of each order [nats]."""
         after, before = self._tops_after, self._tops_before
         unlike = (after - before)[both]
         in_a_row = both[1:] & both[:-1]
@@ -102,14 +103,14 @@ class Sides:
         return len(unlike) * float(np.log((np.median(steps) + LEAST_UNLIKE) / (images + LEAST_UNLIKE)))
 
     def _of_places(self, both: NDArray[np.bool_]) -> float:
-        """By where lines lie about each order: those of several rotors part."""
+        """Symmetry evidence by all bins about each order [nats]: where lines of several rotors part."""
         images, bins = self._uneven(both, 0)
         neighbours, _ = self._uneven(both, 1)
         ratio = (neighbours + LEAST_UNEVEN) / (images + LEAST_UNEVEN)
         return bins / LINE_BINS / 2 * float(np.log(ratio))
 
     def _uneven(self, both: NDArray[np.bool_], apart: int) -> tuple[float, int]:
-        """Mean square by which orders and images so many orders apart differ [nats^2], and of how many bins."""
+        """Mean square difference of orders and mirror images `apart` orders off [nats^2], and number of bins."""
         kept = slice(None, len(both) - apart), slice(apart, None)
         out = []
         for shift in range(-BESIDE, BESIDE + 1):

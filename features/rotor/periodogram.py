@@ -19,32 +19,32 @@ from .octaves import over_neighbours
 from .slow_lines import remove_bands
 from .strong_lines import StrongLines, strong_lines
 
-#: So many bins beside what was taken out the noise is thinner: it would lower the level of its block.
+#: Up to this many bins beside a band taken out the noise is reduced: these bins do not count for the local level.
 THINNED_BINS = 4
 
-#: Transform length in units of the dwell: between two bins a line loses 0.2 dB.
+#: Transform length over the number of pulses: half way between two bins a line loses 0.2 dB.
 PADDING = 4
 
-#: The same where only the level is wanted: half of what lies between the bins tells nothing new.
+#: The same where only the local level is wanted: a finer grid tells nothing new about it.
 LEVEL_PADDING = 2
 
-#: The local level is followed in blocks of so many independent bins, by their lower quartile: lines
-#: may fill the rest. What that is of the mean of an exponential stands beside it.
+#: The local level is the lower quartile of blocks of BLOCK_BINS independent bins: lines may fill the rest.
+#: LEVEL_QUANTILE: lower quartile of an exponential law over its mean.
 BLOCK_BINS = 24
 LEVEL_QUANTILE = -np.log(3 / 4)
 
-#: Of noise alone the logarithms of blocks' levels, transformed as `LEVEL_PADDING` says, are too high by this and have
-#: this variance.
+#: For noise alone, padded by `LEVEL_PADDING`, the logarithms of block levels are too high by BLOCK_BIAS and have the
+#: variance BLOCK_SCATTER.
 BLOCK_BIAS, BLOCK_SCATTER = 0.05, 0.106
 
-#: What fitted lines leave is not taken to be below this share of the floor: the fit takes noise out too.
+#: The level of the residual of fitted lines is at least this share of the noise floor: the fit removes noise too.
 LEAST_LEVEL = 0.8
 
-#: Lines over the floor by more than this [dB] leak past the plain periodogram: it is then tapered.
+#: Lines more than TAPER_FROM_DB over the local level [dB] leak too far: a Kaiser window of TAPER_BETA is then applied.
 TAPER_FROM_DB = 23.0
 TAPER_BETA = 3.0
 
-#: A receiver's filter stops what lies where the local level is below this share of the floor.
+#: If the local level is below this share of the noise floor, the receiver's filter blocks these frequencies.
 STOP_SHARE = 0.3
 
 
@@ -52,7 +52,8 @@ STOP_SHARE = 0.3
 Level = Callable[[NDArray[np.floating]], NDArray[np.float64]]
 
 
-#: The skirt of a static background falls by so much from one octave of the velocity to the next [nats], over so many.
+#: In the skirt of a static background the level falls by more than SKIRT_FALL from each octave of velocity to the next
+#: [nats], at least SKIRT_OCTAVES times.
 SKIRT_FALL, SKIRT_OCTAVES = 0.3, 2
 
 
@@ -63,21 +64,22 @@ class Periodogram:
     Parameters
     ----------
     samples : ndarray of complex128, shape (pulses,)
-        Samples of unit noise power, the strong slow lines taken out, whitening not applied.
+        Samples in units of the noise's rms, strong slow lines removed, not whitened.
     amplitude : ndarray of complex64, shape (PADDING * pulses, about)
-        Amplitude over the root of the local level in FFT order, its phase that in the middle of the record.
+        Spectrum over the square root of the local level, FFT order; phases refer to the middle of the record.
     power : ndarray of float32, same shape
-        Its square: noise has mean 1.
+        Its squared magnitude: noise has mean 1; 1 in bands taken out.
     level : ndarray of float64, same shape
         The local level [noise power a sample].
     strong : StrongLines
         The strong slow lines: what was taken out, and the centres about which a comb is sought.
     wavelength_m, prf_hz : float
-        Of the radar.
+        Wavelength and pulse repetition frequency of the radar.
     one_channel : bool
-        Whether one side of the spectrum is empty: both sides of all lines lie on the other, see `half_empty`.
+        Whether one side of the spectrum is empty: the other holds both sides of every comb, see `half_empty`.
     ends_noise : float
-        Noise power over the dwell, weighed by the time from its middle squared, as rates are told, over its mean.
+        Mean noise power weighted by the squared time from the middle of the dwell, as in the variance of a frequency,
+        over its plain mean.
     """
 
     samples: NDArray[np.complex128]
@@ -107,7 +109,7 @@ class Periodogram:
 
     @property
     def span_mps(self) -> float:
-        """The unambiguous span: what a cycle a sample is as a velocity [m/s]."""
+        """The unambiguous span of velocities, one cycle a sample [m/s]."""
         return self.prf_hz * self.wavelength_m / 2
 
     @cached_property
@@ -117,12 +119,12 @@ class Periodogram:
 
     @cached_property
     def contrast(self) -> Evidence:
-        """Evidence of a line in every bin, over what any place near by has where lines fill that: see `octaves`."""
+        """Evidence of a line in every bin, less the mean nearby where lines fill that; 0 where not `seen`."""
         return Evidence(over_neighbours(line_evidence(self.power, self.block), self.block) * self.seen)
 
     @property
     def block(self) -> int:
-        """Bins of a neighbourhood."""
+        """Bins of a neighbourhood, which span `BLOCK_BINS` independent ones."""
         return _block(len(self.power), self.pulses)
 
     @cached_property
@@ -145,7 +147,7 @@ class Periodogram:
         return self.level[self.bins_of(frequency)]
 
     def usable(self, frequency: NDArray[np.floating]) -> NDArray[np.bool_]:
-        """True where a line at this frequency [cycles a sample] is not touched by what was taken out."""
+        """True where a line at this frequency [cycles a sample] is clear of the bands taken out."""
         ok = np.ones(np.shape(frequency), bool)
         for centre, half in self.blocked:
             ok &= np.abs(from_whole(frequency - centre)) > half + 1.5 / self.pulses
@@ -168,28 +170,28 @@ class Periodogram:
         return float(ends[last + 1]) / size
 
     def in_skirt(self, frequency: NDArray[np.floating]) -> NDArray[np.bool_]:
-        """True at frequencies [cycles a sample] where the level is that of the skirt of a static background.
+        """True at frequencies [cycles a sample] within the skirt of a static background.
 
-        That falls from velocity zero to both sides, and no level further out is higher; where lines fill their band it
-        rises towards the tips.
+        In a skirt the level falls from velocity zero to both sides, and no level further out is higher. Where blade
+        lines fill their band, the level rises towards the tips.
         """
         return np.asarray(np.abs(from_whole(frequency)) < self._skirt_half, np.bool_)
 
     def in_band(self, frequency: NDArray[np.floating]) -> NDArray[np.bool_]:
-        """True where the receiver lets noise through: past its filter there is less than anywhere within."""
+        """True where the receiver's filter passes noise: beyond, the level is lower than anywhere within."""
         return self.level_at(frequency) > STOP_SHARE
 
     def removed(self, frequency: NDArray[np.floating]) -> NDArray[np.bool_]:
-        """True where a line at this frequency [cycles a sample] was taken out."""
+        """True where a line at this frequency [cycles a sample] was taken out with a band."""
         out = np.zeros(np.shape(frequency), bool)
         for centre, half in self.blocked:
             out |= np.abs(from_whole(frequency - centre)) < half - 3.0 / self.pulses
         return out
 
     def level_of(self, rest: NDArray[np.complex128], *, evened: bool = False) -> Level:
-        """Local level of samples that lines were taken from, as a function of the frequency [cycles a sample].
+        """Local level of samples from which lines were subtracted, as a function of frequency [cycles a sample].
 
-        Evened, blocks whose levels differ by no more than chance have their common one.
+        With `evened`, block levels that differ by no more than chance are replaced by their mean, others drawn to it.
         """
         size = fft.next_fast_len(LEVEL_PADDING * self.pulses)
         power = squared(fft.fft(rest.astype(np.complex64), size)) * np.float32(1 / self.pulses)
@@ -198,10 +200,10 @@ class Periodogram:
         return lambda frequency: np.maximum(level(np.rint(frequency * size) % size), LEAST_LEVEL)
 
     def left(self, samples: NDArray[np.complex128], own_level: Level | None = None) -> "Periodogram":
-        """What is left of the same record, at the same local level.
+        """The same record with these samples, a residual, whitened by the same local level.
 
-        Where its own, from `level_of`, is given and lower, at that: lines that fill all there is between them have
-        lifted the record's.
+        The residual's `own_level`, from `level_of`, is used where it is given and lower: lines that fill the gaps
+        between them have lifted the record's level.
         """
         size = len(self.power)
         level = self.level
@@ -214,12 +216,12 @@ class Periodogram:
 
 
 def _blocked(bands: tuple[tuple[float, float], ...], pulses: int) -> tuple[tuple[float, float], ...]:
-    """Centre and half width [cycles a sample] of bands, given as `Periodogram` has them, with a margin."""
+    """Centre and half width [cycles a sample] of `StrongLines.bands`, widened by two bins to each side."""
     return tuple((turn, (half + 2) / pulses) for turn, half in bands)
 
 
 def _block(size: int, pulses: int) -> int:
-    """Bins of a neighbourhood in a transform of that size."""
+    """Bins that span `BLOCK_BINS` independent ones in a transform of that size."""
     return int(BLOCK_BINS * size / pulses)
 
 
@@ -233,7 +235,7 @@ def _taper(pulses: int) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=16)
 def _middle(pulses: int, size: int) -> NDArray[np.complex64]:
-    """Turns the phases of a spectrum to those in the middle of the record, and norms noise to the power 1."""
+    """Factors that refer the phases of a spectrum to the middle of the record and scale noise to power 1."""
     turn = (np.exp(1j * np.pi * (pulses - 1) * fft.fftfreq(size)) / np.sqrt(pulses)).astype(np.complex64)
     turn.setflags(write=False)
     return turn
@@ -246,7 +248,7 @@ def _spectrum(samples: NDArray[np.complex128], size: int, *, tapered: bool) -> N
 
 @lru_cache(maxsize=8)
 def _kept(size: int, blocked: tuple[tuple[float, float], ...], margin: float = 0.0) -> NDArray[np.bool_]:
-    """False in the bins of what was taken out, and so far beside [cycles a sample]."""
+    """False in the bins of bands taken out, each widened by `margin` to both sides [cycles a sample]."""
     keep = np.ones(size, bool)
     for centre, half in blocked:
         keep &= ~within(size, centre, half + margin)
@@ -255,17 +257,17 @@ def _kept(size: int, blocked: tuple[tuple[float, float], ...], margin: float = 0
 
 
 def local_level(power: NDArray[np.floating], keep: NDArray[np.bool_], block: int) -> NDArray[np.float64]:
-    """Smooth level of a spectrum in FFT order that lines do not lift: lower quartiles of blocks, joined by lines.
+    """Smooth level of a spectrum in FFT order, robust to lines: lower quartiles of blocks, their logs interpolated.
 
     Parameters
     ----------
     power : ndarray, shape (bins,)
-        Power spectrum over the noise floor: the level is never below a tenth of that, and is it where too little is
-        kept.
+        Power spectrum over the noise floor. The level is at least a tenth of the floor, and equals it if no block
+        keeps a third of its bins.
     keep : ndarray of bool, shape (bins,)
-        False where it was notched.
+        False in notched bins.
     block : int
-        Bins of a block.
+        Bins of a block, about.
     """
     return _level_at_bins(power, keep, block)(np.arange(len(power)))
 
@@ -274,7 +276,7 @@ def local_level(power: NDArray[np.floating], keep: NDArray[np.bool_], block: int
 def _blocks(size: int, block: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Bins of the blocks of a spectrum in FFT order, shape (blocks, bins), and their middles, rising.
 
-    Those of the one side are the mirror images of the other's, that a record's conjugate has its level mirrored.
+    Blocks of one side mirror those of the other, so that a conjugated record has the mirrored level.
     """
     half = (size - 1) // 2
     count = max(2, size // (2 * block))
@@ -291,7 +293,7 @@ def _blocks(size: int, block: int) -> tuple[NDArray[np.intp], NDArray[np.float64
 def _level_at_bins(
     power: NDArray[np.floating], keep: NDArray[np.bool_], block: int, *, evened: bool = False
 ) -> Callable[[NDArray], NDArray[np.float64]]:
-    """`local_level` as a function of the bin, from 0 to below their number; evened as in `Periodogram.level_of`."""
+    """`local_level` as a function of the bin, from 0 to size - 1; `evened` as in `Periodogram.level_of`."""
     size = len(power)
     inside, middles = _blocks(size, block)
     count, length = inside.shape
@@ -304,11 +306,11 @@ def _level_at_bins(
     if not len(known):
         return lambda bins: np.ones(np.shape(bins))
     logs = np.log(np.maximum(levels[known], 0.1))
-    if evened:  # by the share of their scatter that is chance
+    if evened:  # drawn to the mean by the share of their variance that is chance
         away = logs - logs.mean()
         logs = logs - BLOCK_BIAS - BLOCK_SCATTER / max(float(away.var()), BLOCK_SCATTER) * away
     middles = middles[known]
-    # the blocks at the ends once more around the circle: `interp` would turn every bin by its period
+    # the end blocks repeated around the circle: this spares `interp` its period, by which it would fold every bin
     middles = np.concatenate([middles[-1:] - size, middles, middles[:1] + size])
     logs = np.concatenate([logs[-1:], logs, logs[:1]])
     return lambda bins: np.exp(np.interp(bins, middles, logs))
@@ -364,7 +366,7 @@ def prepared(iq: NDArray[np.complex64], spectrum: Spectrum) -> Periodogram | Non
 
 
 def prepared_again(samples: NDArray[np.complex128], spectrum: Spectrum, ends_noise: float) -> Periodogram:
-    """`prepared` for what was made of the samples of such a record; of unit noise power, and how loud at its ends."""
+    """`prepared` for altered samples of a prepared record, in units of its noise; `ends_noise` as in `Periodogram`."""
     again = prepared((samples * np.sqrt(spectrum.floor)).astype(np.complex64), spectrum)
     assert again is not None  # a record that was prepared has a floor
     return replace(again, ends_noise=ends_noise)

@@ -1,8 +1,8 @@
 """Removal of the body line and the static background: a projection that leaves everything else as it was.
 
-A window as low in side lobes as the spectrum's doubles the noise bandwidth. To measure lines at the bound the samples
-must stay unwindowed, so what is strong and slow is taken out of them first, with the Slepian sequences that span all
-signals of so narrow a band.
+A window with side lobes as low as the spectrum's doubles the noise bandwidth. To measure lines at the Cramer-Rao bound
+the samples must stay unwindowed. Strong slow lines are therefore projected out first, with the Slepian sequences that
+span all signals of a narrow band.
 """
 
 from collections.abc import Iterable
@@ -16,13 +16,13 @@ from scipy import fft
 
 from ..lines import TAP, TAPS, kernel, line_products, middle_times, taps
 
-#: Sequences beyond the time-bandwidth product: what the band leaks past it falls under -100 dB.
+#: Sequences beyond the time-bandwidth product: what they leave of the band's signals is below -100 dB.
 EXTRA_SEQUENCES = 11
 
-#: Of what the sequences of several bands hold together, directions of less than this share count for none.
+#: Eigenvalues of the Gram matrix of several bands' sequences below this share of the largest count as zero.
 LEAST_SHARE = 1e-9
 
-#: Values of a table that are made at a time: what lies between takes little memory, whatever the dwell.
+#: Table values computed at a time: intermediate arrays stay small, whatever the dwell.
 _AT_ONCE = 1 << 22
 
 
@@ -37,16 +37,16 @@ def parts(columns: NDArray[np.complexfloating]) -> NDArray[np.float64]:
 
 
 def whole(both: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """The way back from `parts`, shape (rows, columns)."""
+    """Complex columns from their `parts`, shape (rows, columns)."""
     return np.ascontiguousarray(both).view(np.complex128)
 
 
 @lru_cache(maxsize=4)
 def slepian(pulses: int, half_bins: float) -> NDArray[np.float64]:
-    """Orthonormal sequences that hold the signals within so many bins of frequency 0, shape (sequences, pulses).
+    """Orthonormal sequences that span the signals within `half_bins` of frequency 0, shape (sequences, pulses).
 
-    They read the same from both ends, but for the sign of every second one, the best concentrated first: half of each
-    tells the whole, and takes a quarter of the time.
+    The best concentrated come first. They are even and odd about the middle in turn, so that one half of each is
+    computed, in a quarter of the time.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def slepian(pulses: int, half_bins: float) -> NDArray[np.float64]:
     count, half = min(pulses, int(np.ceil(2 * half_bins)) + EXTRA_SEQUENCES), pulses // 2
     n = np.arange(half + 1)
     diagonal = ((pulses - 1 - 2 * n) / 2) ** 2 * np.cos(2 * np.pi * half_bins / pulses)
-    off = n[1:] * (pulses - n[1:]) / 2  # the last joins both halves, or the first one to the middle
+    off = n[1:] * (pulses - n[1:]) / 2  # the last couples both halves, or the first half to the middle pulse
     out = np.zeros((count, pulses))
     for odd in (False, True):
         own = out[int(odd) :: 2]
@@ -93,7 +93,7 @@ def remove_bands(samples: NDArray[np.complex128], bands: Iterable[tuple[float, f
     Returns
     -------
     ndarray of complex128, same shape
-        What is left; a line more than a few bins off the bands is unchanged.
+        What is left. A line 8 bins off a band loses a tenth of its power, one 30 bins off 2 %, most at the ends.
     """
     bands = tuple(bands)
     pulses = samples.shape[-1]
@@ -102,7 +102,7 @@ def remove_bands(samples: NDArray[np.complex128], bands: Iterable[tuple[float, f
     bases = [slepian(pulses, float(half)) for _, half in bands]
     seen = [times(basis, out * turn.conj()) for basis, turn in zip(bases, turns, strict=True)]
     if len(bands) > 1:
-        # jointly: taken out one after the other, each band would keep what the first took of the second's strong line
+        # jointly: one after the other, what the first band took of the second's strong line would remain
         factor = np.concatenate([np.where(_odd(basis), 1j, 1) for basis in bases])[:, None]
         together = factor * times(_gram_inverse(pulses, bands), factor.conj() * np.concatenate(seen))
         seen = np.split(together, np.cumsum([len(basis) for basis in bases])[:-1])
@@ -113,10 +113,10 @@ def remove_bands(samples: NDArray[np.complex128], bands: Iterable[tuple[float, f
 
 @lru_cache(maxsize=4)
 def band_basis(pulses: int, bands: tuple[tuple[float, float], ...]) -> NDArray[np.complex128]:
-    """What `remove_bands` takes out of a record, as orthonormal sequences, shape (sequences, pulses)."""
+    """Orthonormal sequences that span what `remove_bands` takes out of a record, shape (sequences, pulses)."""
     rows = [slepian(pulses, float(half)) * _turn(pulses, centre) for centre, half in bands]
     out = np.concatenate([np.zeros((0, pulses), np.complex128), *rows])
-    if len(rows) > 1:  # without what bands that lie in one another hold both
+    if len(rows) > 1:  # without the directions that overlapping bands hold twice
         value, vector = np.linalg.eigh(out @ out.conj().T)
         kept = value > LEAST_SHARE * value[-1]
         out = (vector[:, kept].conj().T / np.sqrt(value[kept])[:, None]) @ out
@@ -133,15 +133,15 @@ def _turn(pulses: int, frequency: float) -> NDArray[np.complex128]:
 
 
 def _odd(basis: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """True for the sequences of `slepian` that change sign in the middle."""
+    """True for the sequences of `slepian` that are odd about the middle."""
     return np.arange(len(basis)) % 2 == 1
 
 
 @lru_cache(maxsize=2)
 def _held(pulses: int, half_bins: float) -> NDArray[np.float32]:
-    """Unit lines, and those times time, seen by the sequences, even and odd ones both real.
+    """Projections of unit lines, and of unit lines times time, onto the sequences, made real for even and odd ones.
 
-    Shape (bins, 2, sequences): the bins of `lines.kernel` from -1/2 to 1/2 and some over, to be read with its bell.
+    Shape (bins, 2, sequences): the bins of `lines.kernel` from -1/2 to 1/2 and a few more, to be interpolated by it.
     """
     size, shape = kernel(pulses)
     place = np.arange(-(size // 2) - TAPS, size // 2 + TAPS)
@@ -162,19 +162,19 @@ def _held(pulses: int, half_bins: float) -> NDArray[np.float32]:
 
 @dataclass(frozen=True)
 class LineProducts:
-    """Mean products of unit lines that narrow bands were taken from.
+    """Mean products of unit lines after removal of narrow bands.
 
-    A line some bins off a band loses a little of its middle. The fit of lines to what is left must know it, or it takes
-    the loss for a change of frequency.
+    A line some bins off a band loses a little, most at the ends of the record. The fit of lines to what is left must
+    know that, or it takes the loss for a change of frequency.
 
     Parameters
     ----------
     plain, first, second : ndarray, shape (lines, lines)
-        As from `lines.line_products`: `plain` of what is left, the other two of the whole lines.
+        As from `lines.line_products`: `plain` of the lines after removal, the other two of the whole lines.
     held, held_timed : ndarray, shape (lines, sequences)
-        What the bands hold of each line, and of it times time.
+        Projections of each line, and of each line times time, onto the bands' sequences.
     joint, joint_timed : ndarray, same shape
-        The same of bands that lie in one another, each sequence's own share.
+        The same times the inverse Gram matrix of all sequences: the share of each where bands overlap.
     """
 
     plain: NDArray[np.float64]
@@ -185,20 +185,20 @@ class LineProducts:
     joint: NDArray[np.floating]
     joint_timed: NDArray[np.floating]
 
-    # what the bands take from the other two is of low rank: it is taken from a few columns rather than from all lines
+    # what the bands take from `first` and `second` is of low rank: it is subtracted column by column
 
     def with_time(self, columns: NDArray[np.complexfloating]) -> NDArray[np.complex128]:
-        """Products with time of each line with sums of lines of these amplitudes, shape (lines, columns)."""
+        """Products of each line with sums of lines times time, of these amplitudes, shape (lines, columns)."""
         both = parts(columns)
         return whole(self.first @ both - self.joint @ (self.held_timed.T @ both))
 
     def time_with(self, columns: NDArray[np.complexfloating]) -> NDArray[np.complex128]:
-        """The same of each line times time with sums of the plain lines."""
+        """Products of each line times time with sums of plain lines of these amplitudes."""
         both = parts(columns)
         return whole(-(self.first @ both) - self.held_timed @ (self.joint.T @ both))
 
     def with_time_squared(self, columns: NDArray[np.complexfloating]) -> NDArray[np.complex128]:
-        """Products of each line times time with sums of lines times time."""
+        """Products of each line times time with sums of lines times time, of these amplitudes."""
         both = parts(columns)
         return whole(self.second @ both - self.joint_timed @ (self.held_timed.T @ both))
 
@@ -206,7 +206,7 @@ class LineProducts:
 def notched_products(
     frequency: NDArray[np.floating], pulses: int, bands: tuple[tuple[float, float], ...]
 ) -> LineProducts:
-    """Products of unit lines as `remove_bands` leaves them.
+    """Mean products of unit lines after `remove_bands`.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def notched_products(
         away = frequency - centre
         turns = np.rint(away)
         first, weights = taps((away - turns) * size)
-        # time counts from the middle, half a sample off where the pulses are even
+        # time counts from the middle of the record: of an even number of pulses, a whole turn changes the sign
         weights *= (1 - 2 * (turns % 2) * (pulses % 2 == 0))[:, None]
         about = table.take(first[:, None] + (TAP + len(table) // 2), axis=0).reshape(*weights.shape, -1)
         held = (weights[:, None, :] @ about).reshape(-1, *table.shape[1:])
@@ -243,7 +243,7 @@ def notched_products(
 
 @lru_cache(maxsize=4)
 def _gram_inverse(pulses: int, bands: tuple[tuple[float, float], ...]) -> NDArray[np.float64]:
-    """Inverse of the products between the sequences of all bands, odd ones times j, which makes them real."""
+    """Pseudo-inverse of the Gram matrix of all bands' sequences; odd ones are taken times j, which makes it real."""
     bases = [slepian(pulses, half) for _, half in bands]
     ends = np.cumsum([0, *map(len, bases)])
     gram = np.eye(ends[-1])

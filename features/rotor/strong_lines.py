@@ -1,4 +1,4 @@
-"""What is strong and slow in a record: a background at rest and bodies, to be taken out and to count combs from."""
+"""Strong slow lines of a record, the static background and bodies: to be taken out and to count combs from."""
 
 from dataclasses import dataclass
 
@@ -9,16 +9,17 @@ from ..bodies import LINE_DB, line_among, other_body, slow_body, turns_of
 from ..notch import LOBE_BINS, NOTCH_MPS, Body, body_line
 from ..spectrum import Spectrum
 
-#: Noise alone seldom has so strong a bin [dB] in the notch about velocity zero; a background's skirt has.
+#: Noise alone seldom has a bin this strong in the notch about velocity zero; a background's skirt has [dB].
 SKIRT_DB = 9.0
 
-#: It shows right beside a hovering body's lobe, at so many bins; further out lie the first lines of rotors.
+#: The skirt is looked for up to this many bins from rest, right beside a hovering body's lobe; further out lie the
+#: first lines of rotors.
 SKIRT_BINS = LOBE_BINS + 2.5
 
 #: Half width taken out about the body line [m/s]. A body is steadier than the clutter about velocity zero.
 BODY_NOTCH_MPS = 0.5
 
-#: No wider band is taken out [bins], 3 m/s of 80 ms at 100 GHz: the sequences that span it fill memory.
+#: Largest half width taken out [bins], 3 m/s of 80 ms at 100 GHz: the sequences of a wider band fill memory.
 MOST_NOTCH_BINS = 160
 
 
@@ -29,9 +30,9 @@ class StrongLines:
     Parameters
     ----------
     bands : tuple of (float, float)
-        Centre [cycles a sample] and half width [bins] of what is to be taken out.
+        Centre [cycles a sample] and half width [bins] of each band to be taken out.
     centres : tuple of float
-        Where the body line may be [cycles a sample], strongest first: about these a comb is sought.
+        Possible body lines [cycles a sample], strongest first: combs are sought about these.
     centres_db : tuple of float
         Their levels over the floor [dB].
     """
@@ -58,7 +59,7 @@ def strong_lines(spectrum: Spectrum) -> StrongLines:
     if background:
         # what stands at rest may be the background; the body is then the strongest line that moves
         line = body
-        # the strongest line of all, if it is as slow as that, has its own level; if not, it is the one that moves
+        # the strongest line of all is kept as the one at rest if it is that slow; else it is the one that moves
         if abs(turns_of(spectrum, body)) * pulses <= rest_half:
             line = line_among(spectrum, offset > rest_half + 2 * spectrum.window.noise_bandwidth_bins, [0.0])
         else:
@@ -87,7 +88,7 @@ def _seen(spectrum: Spectrum, line: Body) -> tuple[float, float]:
 
 
 def _half_bins(spectrum: Spectrum, half_mps: float) -> float:
-    """Half width of what is taken out [bins], to half a bin."""
+    """Half width of a band to be taken out [bins], rounded up to half a bin."""
     bin_mps = spectrum.prf_hz / spectrum.pulses * spectrum.wavelength_m / 2
     widest = min(spectrum.pulses / 16, MOST_NOTCH_BINS)  # a slow radar must keep something to look at
     return float(np.ceil(2 * min(max(half_mps / bin_mps, 1.0), widest)) / 2)
@@ -103,9 +104,9 @@ def _hovers(spectrum: Spectrum, body: Body, offset: NDArray[np.float64], rest_ha
     offset : ndarray, shape (bins,)
         Distance of each bin from velocity zero [bins].
     rest_half : float
-        Half width of what would be taken out there [bins].
+        Half width of the band that would be taken out at rest [bins].
     """
-    # a skirt falls with the offset: what stands further out alone is a rotor's line
+    # a skirt falls with the offset: what stands only further out is a rotor's line
     skirt = (offset <= min(rest_half, SKIRT_BINS)) & (np.abs(np.arange(spectrum.bins) - body.index) > LOBE_BINS + 1)
     return (
         abs(turns_of(spectrum, body)) * spectrum.pulses <= rest_half

@@ -1,32 +1,33 @@
-"""How many blades a rotor has, where they are not quite alike: its strong lines are then that many orders apart."""
+"""The number of blades of a rotor whose blades are not quite alike: strong lines are then that many orders apart."""
 
 from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
-#: Unlike blades show in the weak lines: so many deviations of noise over its mean.
+#: Unlike blades show if the mean power of the weak lines is this many standard deviations over that of noise.
 WEAK_DEVIATIONS = 3.0
 
-#: A rotor has up to so many blades, if its number is not known.
+#: Largest number of blades tried if the number is not known.
 MOST_BLADES = 6
 
-#: Every k-th line stronger than the others by this factor in power: unequal blades, k to a turn.
+#: If every k-th line is stronger than the others by this factor in power, a rotor has k unequal blades.
 UNEQUAL_FACTOR = 4.0
 
-#: Among the outer half of the lines alone, they must be by this.
+#: The least factor among the outer half of the lines alone.
 OUTER_FACTOR = 2.5
 
-#: Several rotors' lines run into one another there. Of combs of so many orders the inner half alone tells as well, by
-#: this: of blades that reflect at their tips the lines of one parity may be stronger, but not over so many orders.
+#: In the outer half, lines of several rotors run into one another. Of combs of MANY_ORDERS or more the inner half alone
+#: tells as well, by INNER_FACTOR: of blades that reflect at their tips the lines of one parity may be stronger, but not
+#: over that many orders.
 MANY_ORDERS, INNER_FACTOR = 30, 8.0
 
-#: And so much must speak for two kinds of lines [nats]: near the noise every other one is strong by chance.
+#: Least evidence of two kinds of lines [nats]: near the noise every other line is strong by chance.
 UNEQUAL_NATS = 8.0
 
 
 def blade_numbers(blades: int | None) -> range:
-    """Numbers of blades, from two on, that lines of unlike strength may show: the one given, or any up to the most."""
+    """Numbers of blades, from two on, that lines of unlike strength may show: the one given, or up to MOST_BLADES."""
     return range(2, MOST_BLADES + 1) if blades is None else range(max(blades, 2), blades + 1)
 
 
@@ -44,27 +45,27 @@ def strong_multiple(
     tried : iterable of int
         Multiples that are tried.
     factor : float
-        By which the strong ones are stronger in power.
+        By which the strong lines exceed the others in power.
     """
     multiples, away = np.array(tuple(tried), np.intp), np.abs(orders)
     if not len(multiples) or not len(orders):
         return 1
     outer = away > np.median(away)
-    parts, least = np.ones((1, len(orders)), bool), np.array([factor])  # which lines tell it, and by what
+    parts, least = np.ones((1, len(orders)), bool), np.array([factor])  # sets of lines, and the factor each needs
     if away.max() >= MANY_ORDERS:
         parts, least = np.stack([parts[0], ~outer]), np.array([factor, INNER_FACTOR])
     is_strong = orders % multiples[:, None] == 0
     number, total = (is_strong.astype(float) @ (parts * each).T for each in (1.0, power))
     weak_number, weak_total = parts.sum(axis=1) - number, parts @ power - total
     ratio = _contrast(total / np.maximum(number, 1), weak_total / np.maximum(weak_number, 1))
-    # the outermost lines are edges; four of each kind tell them apart
+    # four lines of each kind at least: the outermost ones are the edges of the band
     tells = (np.minimum(number, weak_number) >= 4) & (ratio > least)
     best, best_ratio = 1, factor
     for place, part in np.argwhere(tells):
-        if ratio[place, part] <= best_ratio * (1 + 1e-9):  # or of the very same lines
+        if ratio[place, part] <= best_ratio * (1 + 1e-9):  # no better, or the very same lines
             continue
         strong, weak = parts[part] & is_strong[place], parts[part] & ~is_strong[place]
-        # several rotors' lines lie in one another at the low orders and may cancel at some; further out they part
+        # at the low orders lines of several rotors overlap and may cancel; further out they part
         far = power[outer & strong], power[outer & weak]
         if min(map(len, far)) and _contrast(far[0].mean(), far[1].mean()) <= OUTER_FACTOR:
             continue
@@ -74,16 +75,16 @@ def strong_multiple(
 
 
 def weak_lines_show(orders: NDArray[np.intp], power: NDArray[np.float64], number: int) -> bool:
-    """Whether the lines between every so many-th are more than noise."""
+    """Whether the lines between every `number`-th are more than noise."""
     weak = power[orders % number != 0]
     return bool(len(weak) and weak.mean() > 1 + WEAK_DEVIATIONS / np.sqrt(len(weak)))
 
 
 def lines_a_turn(orders: NDArray[np.intp], power: NDArray[np.float64], blades: int | None, most: int) -> int:
-    """Every how many-th line is strong, `most` or fewer: 1, the blades given, or what else their comb may show.
+    """Every how many-th line is strong, up to `most`: 1, the number of blades given, or what else their comb may show.
 
-    Of blades that are given every second of four may be alike; and where a fraction of their comb was found, the lines
-    between are noise.
+    Of four blades given, every second may be alike: then every second line is strong. If the comb found is a fraction
+    of theirs, the lines between are noise.
     """
 
     def strong(numbers: range) -> int:
@@ -99,9 +100,9 @@ def lines_a_turn(orders: NDArray[np.intp], power: NDArray[np.float64], blades: i
 
 
 def _fewest_alike(orders: NDArray[np.intp], power: NDArray[np.float64], number: int) -> int:
-    """Every how many-th line is strong, where those of so many are: that, or a part of it at which all are as strong.
+    """`number`, or its smallest divisor at whose multiples all lines are about as strong as at those of `number`.
 
-    The search may take every second line of six unlike blades for all there are: every third of these is strong.
+    The search may find only every second line of six unlike blades: of these, every third is strong.
     """
     for part in range(number // 2, 1, -1):
         strong = orders % number == 0
@@ -112,12 +113,12 @@ def _fewest_alike(orders: NDArray[np.intp], power: NDArray[np.float64], number: 
 
 
 def two_means_nats(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """Log likelihood ratio of two means of exponentials against one, of powers of two kinds of lines."""
+    """Log likelihood ratio of two means against one, for exponentially distributed powers of two kinds of lines."""
     means = (max(float(each.mean()), 1e-9) for each in (np.concatenate([one, other]), one, other))
     both, first, second = (float(np.log(mean)) for mean in means)
     return (len(one) + len(other)) * both - len(one) * first - len(other) * second
 
 
 def _contrast(strong: NDArray[np.floating], weak: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Ratios of two mean powers without their noise."""
+    """Ratio of mean powers [noise power], the noise subtracted from each."""
     return np.asarray(np.maximum(strong - 1, 0) / np.maximum(weak - 1, 0.1), np.float64)

@@ -1,8 +1,8 @@
-"""A comb that was counted from a body's line of some width: its middle lies beside that line's top.
+"""A comb that was counted from the top of a wide body line: its true centre lies beside that top.
 
-A body of several echoes that turns slowly has a line up to some bins wide, of which the top is not the mean. Counted
-from there the lines on one side are met by a spacing that is a little off, and those on the other are missed: what is
-found is half a comb, and its middle no body's.
+A slowly turning body of several echoes has a line up to some bins wide, whose top is not its mean. Counted from the
+top, a comb of slightly wrong spacing meets the lines of one side and misses those of the other: half a comb is found,
+and its middle is not the body.
 """
 
 import numpy as np
@@ -12,22 +12,22 @@ from .comb_search import FINE_STEPS, Candidate, factors_about
 from .folding import outermost_orders
 from .periodogram import Periodogram
 
-#: How far beside the line's top the middle of a comb is sought [bins], and in what steps. Of four points within 0.15 m
-#: that turned by 0.2 rad/s it lay up to 0.5 beside at 24 and 35 GHz, of a line 1.5 bins wide up to 1.2.
+#: How far from the line's top the centre of a comb is sought, and in what steps [bins]. For four points within 0.15 m
+#: turning at 0.2 rad/s it lay up to 0.5 bins off at 24 and 35 GHz, for a line 1.5 bins wide up to 1.2.
 BESIDE_BINS, STEP_BINS = 1.5, 0.25
 
-#: Half a comb's spacing is off by some bins at the PRF: so many to each side are tried, twice where that is not enough.
+#: The spacing of half a comb is wrong by some bins at the PRF: OFF_BINS are tried to each side, up to PASSES times.
 OFF_BINS, PASSES = 2, 2
 
-#: A comb is sought beside the line where its shorter side has less than this share of the orders of the longer one.
+#: A comb is sought beside the line if its shorter side has no more than this share of the longer one's orders.
 EVEN_SHARE = 0.6
 
-#: So much more must speak for it there [nats]: chance makes up to four of as many as are tried.
+#: A comb beside the line must score this much more [nats]: the best of as many trials gains up to four by chance.
 MORE_NATS = 8.0
 
 
 def beside_line(data: Periodogram, found: Candidate) -> Candidate:
-    """The comb about a place near the line that it was counted from, where more speaks for that; else the same.
+    """The comb counted from a place near its line, where that scores enough more; else the same comb.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def beside_line(data: Periodogram, found: Candidate) -> Candidate:
 
 
 def _moved(data: Periodogram, found: Candidate) -> Candidate:
-    """The loudest comb about places near the one that a comb counts from; the same where none is much louder."""
+    """The best comb counted from a place near a comb's centre; the same comb if none scores `MORE_NATS` more."""
     centres = found.centre + np.arange(-BESIDE_BINS, BESIDE_BINS + STEP_BINS / 2, STEP_BINS) / data.pulses
     steps = factors_about(data.pulses, 2 * FINE_STEPS * OFF_BINS, 2 * FINE_STEPS)
     tried = np.tile(found.spacing * steps, (len(centres), 1))
@@ -60,5 +60,5 @@ def _moved(data: Periodogram, found: Candidate) -> Candidate:
 
 
 def is_beside(data: Periodogram, comb: Candidate, line: float) -> bool:
-    """Whether a line [cycles a sample] is so near to where a comb counts from that this may be sought beside it."""
+    """Whether a line [cycles a sample], not the background's, is near enough to a comb's centre to be its wide line."""
     return abs(line) >= data.rest_half and abs(line - comb.centre) * data.pulses <= BESIDE_BINS
