@@ -22,7 +22,7 @@ from .spectrum import doppler_spectrum
 #: No rotor has more blades; eight is the most that fly.
 MOST_BLADES_GIVEN = 64
 
-#: What is larger than pi/2 was given in degrees, and not just beyond it, from so much on.
+#: A beta_rad of this or more was probably meant in degrees; between pi/2 and this it is just out of range [rad].
 LEAST_DEGREES = 2.0
 
 
@@ -40,10 +40,9 @@ def measure(
     Parameters
     ----------
     iq : array_like of complex, shape (..., pulses)
-        Slow-time samples of one range cell, any gain. Of one channel, I without Q, that holds noise, what both sides of
-        the spectrum share is measured, and no band. Pulses that were lost, which are exactly 0, are filled in by what
-        those beside them tell of them; of a record that more of these in a row break than that is done for, the longest
-        stretch is measured.
+        Slow-time samples of one range cell, any gain. A single noisy channel, I without Q, gives what both sides of the
+        spectrum share, and no band. Lost pulses, which are exactly 0, are predicted from those beside them; a record
+        with a gap too long for that is measured over its longest unbroken stretch.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz], within `CARRIER_RANGE_HZ` and `PRF_RANGE_HZ`.
     blades : int, optional
@@ -51,9 +50,9 @@ def measure(
     beta_rad : float, optional
         Angle between the line of sight and the rotor plane [rad], 0 <= beta < pi/2.
     on_record : callable, optional
-        Called after each record with the number of those done: one of 3000 pulses takes some hundredths of a second,
-        and up to two where several rotors change or are not told apart; at 77 GHz half a second to five, and up to ten
-        of eight rotors; one of 65 536 pulses a quarter of a minute.
+        Called after each record with the number of those done. A record of 3000 pulses takes some hundredths of a
+        second, up to two seconds where several rotors change or are unresolved; at 77 GHz half a second to five, up to
+        ten with eight rotors. One of 65 536 pulses takes a quarter of a minute.
 
     Returns
     -------
@@ -81,7 +80,7 @@ def measure(
     given, stretches = mended(finite_complex(iq, least=2))
     samples = _heard(given)
     shape = samples.shape[:-1]
-    some = samples if samples.size else np.zeros((1, *samples.shape[-1:]), np.complex64)  # of none, fields of no length
+    some = samples if samples.size else np.zeros((1, *samples.shape[-1:]), np.complex64)  # an empty batch needs a dummy
     spectrum = doppler_spectrum(some, carrier_hz=carrier_hz, prf_hz=prf_hz)
     rows = []
     keep_freed()
@@ -106,11 +105,11 @@ def measure(
 
 
 def _heard(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
-    """Records (..., pulses) without clicks, which lift the floor under all lines; those of one channel analytic."""
+    """Records (..., pulses) without clicks, which lift the floor under all lines; one-channel ones made analytic."""
     flat = iq.reshape(-1, iq.shape[-1])
     return made_analytic(clicks_filled(flat, largest_part(flat)).reshape(iq.shape))
 
 
 def _is_number(value: object) -> bool:
-    """Whether a value is a finite number, and no truth value."""
+    """Whether a value is a finite number, and no bool."""
     return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)

@@ -31,33 +31,33 @@ from .spectrum import Spectrum, doppler_spectrum
 #: Threshold of the paper's bandwidth rule over the noise [dB]: it took 20 on measured data, 30 on simulated.
 PAPER_THRESHOLD_DB = 20.0
 
-#: A fitted edge that may be so far out [cycles a sample] by so many of its deviations may be none.
+#: No band is given if the edge plus EDGE_DEVIATIONS standard deviations reaches FURTHEST_EDGE [cycles a sample].
 FURTHEST_EDGE, EDGE_DEVIATIONS = 0.48, 3.0
 
-#: Fitted lines that tell the edge of several rotors to no more than this share of it leave it to all about the orders.
+#: If fitted lines give the edge of several rotors no better than to this share, all power about the orders is used too.
 UNSURE_SHARE = 0.03
 
-#: An edge that is known to no more than this share of itself is none.
+#: Relative standard deviation above which an edge is not reported.
 LOST_SHARE = 0.3
 
-#: Why there is no band where one channel was made analytic: the lines on both sides of the body lie in one another.
+#: Why there is no band where one channel was made analytic: the lines of both sides of the body overlap.
 ONE_CHANNEL = "no band: one side of the spectrum is empty, one channel has both folded onto the other: record I and Q"
 
-#: Other radars whose pulses are filled in, one after the other, at most.
+#: Most other radars whose pulses are replaced, one after the other.
 MOST_RADARS = 2
 
-#: Where rates differ by more, the growth of their lines' width does not show it.
+#: Largest relative spread of rates that shows in the growth of their lines' width.
 WIDEST_INDEX = 0.04
 
 
 def unmeasured(reason: str) -> dict[str, Any]:
-    """A value for each array of `Measurements` of a record of which nothing is told, and why."""
+    """A value for each array of `Measurements` of a record that gives none, and why."""
     out: dict[str, Any] = {field.name: np.nan for field in fields(Measurements)}
     out |= dict.fromkeys(EACH_ROTOR, np.full(MAX_ROTORS, np.nan))
     return out | {"rotors_resolved": False, "gear_reason": "no comb", "band_reason": "", "reason": reason}
 
 
-#: A comb that may hold several rotors is off the rate of any by so much of a bin at its outermost order, rms.
+#: Error of the rate of a comb that may hold several rotors, as shift of its outermost line [bins], rms.
 HIDDEN_BINS = 0.12
 
 
@@ -99,14 +99,14 @@ def measure_record(
         why = slower_than_rotors(family.data, family.comb.fit, *edge) or too_few_flashes(family) or _of_supply(family)
     if family is None or why:
         return out | {"reason": why} | _named(BODY, body_velocity(data, spectrum, None))
-    if data.one_channel:  # about a body whose sides lie in one another nothing is even: its own line tells
+    if data.one_channel:  # if both sides of the body overlap, no comb has a true centre: the body's line is used
         velocity = body_velocity(data, spectrum, None, blades=True)
     else:
         middle = family.rotors.fits[0] if len(family.rotors.rates) > 1 else family.comb.fit
         steady, open_std = family.rotors.resolved, family.comb.body_std
         if family.meeting_std is not None:
             steady, middle = True, replace(middle, centre_std=max(middle.centre_std, family.meeting_std))
-        # of rotors not told apart lines lie all around the circle: any of them may be the middle
+        # lines of unresolved rotors lie all over the span: any of them may be the middle
         if not (family.is_told_apart or family.comb.body_has_line) and (family.fills_span or middle.is_folded):
             open_std = np.inf
         velocity = body_velocity(family.data, spectrum, middle, steady=steady, open_std=open_std)
@@ -123,9 +123,9 @@ def measure_record(
 def _found(
     iq: NDArray[np.complex64], data: Periodogram, spectrum: Spectrum, blades: int | None
 ) -> tuple[NDArray[np.complex64], Periodogram, Spectrum, Family | None, str]:
-    """The line family of a record, or why there is none; where it is of another radar's pulses, without these.
+    """The line family of a record, or why there is none; pulses of another radar that make it up are replaced.
 
-    The samples, the record made ready and its spectrum are those that it was found in.
+    The samples, the prepared record and its spectrum are those that the family was found in.
     """
     family, why = find_family(data, spectrum, blades)
     for _ in range(MOST_RADARS):
@@ -139,7 +139,7 @@ def _found(
         rate_hz = spectrum.prf_hz * (len(places) - 1) / (places[-1] - places[0])
         no_rotor = f"no rotor: single pulses {rate_hz:.1f} times a second, as of another radar"
         without = prepared(iq, spectrum)
-        if without is None:  # they were all there is
+        if without is None:  # there was nothing else
             return iq, data, pulsed, None, no_rotor
         data = without
         family, _ = find_family(data, spectrum, blades)
@@ -160,7 +160,7 @@ def _named(names: tuple[str, ...], values: Iterable[Any]) -> dict[str, Any]:
 
 
 def _edge(family: Family, blades: int | None) -> tuple[float, float]:
-    """Edge of all rotors' lines and its standard deviation [cycles a sample], as what tells it surest has it."""
+    """Edge of all rotors' lines and its standard deviation [cycles a sample], from the surest source."""
     data, comb, rotors = family.data, family.comb, family.rotors
     if rotors.resolved and rotors.row_edge is not None:
         return rotors.row_edge
@@ -168,7 +168,7 @@ def _edge(family: Family, blades: int | None) -> tuple[float, float]:
     edge, std = edge_of_lines(data, rotors.fits, rotors.rest, 1, blades) if several else (family.edge, family.edge_std)
     if not rotors.resolved:
         return surer_edge((edge, std), edge_around(data, comb, rotors, blades, (edge, std)))
-    if several and not std < UNSURE_SHARE * edge:  # the lines of rates just resolved hardly part within it
+    if several and not std < UNSURE_SHARE * edge:  # lines of barely resolved rates hardly separate there
         around = edge_around(data, comb, rotors, blades, (edge, std))
         return around if np.isinf(edge) else surer_edge((edge, std), around)
     return edge, std
@@ -181,13 +181,13 @@ def _turning(family: Family) -> dict[str, Any]:
     chopping, std = comb.chopping * prf_hz, comb.chopping_std * prf_hz
     if count > 1:  # one comb fitted to several follows the strongest; the chopping frequency is that of the mean rotor
         chopping = float(rotors.rates.mean()) * prf_hz
-        # of two rotors nearer than the dwell tells apart one alone was counted
+        # of two unresolved rotors only one was counted
         std = float(np.hypot(np.sqrt((rotors.stds**2).sum()) / count, hidden_shift(rotors.fits))) * prf_hz
     spread, order, stds = max(rotors.spread, rotors.unseen), comb.last // comb.per_turn, rotors.stds
     if not rotors.resolved:  # the mean lies anywhere within what the unresolved rates span
         std = float(np.hypot(std, spread * prf_hz / np.sqrt(12)))
     pulled = HIDDEN_BINS / (max(order, 1) * data.pulses)
-    if not rotors.resolved or data.one_channel:  # what lies between the lines, as those of the other side do, pulls
+    if not rotors.resolved or data.one_channel:  # power between the lines, as of the other side's, biases rates
         stds = np.hypot(stds, pulled)
     if data.one_channel:
         std = float(np.hypot(std, pulled * prf_hz))
@@ -236,7 +236,7 @@ def _band(family: Family, edge: tuple[float, float], beta_rad: float | None, pas
     Parameters
     ----------
     family : Family
-        What the lines come to.
+        The line family.
     edge : (float, float)
         From `_edge`.
     beta_rad
@@ -248,7 +248,7 @@ def _band(family: Family, edge: tuple[float, float], beta_rad: float | None, pas
     mps = data.span_mps
     furthest, why = FURTHEST_EDGE * span / SPAN, ""
     not_told = family.comb.fit.is_folded and not family.is_told_apart
-    # of rotors not told apart lines that come back may pass for all there are; what lies past these must show
+    # folded lines of unresolved rotors may pass for the whole family: what lies past the edge must be seen
     no_end = past.flashes or not (past.seen or family.is_told_apart)
     if data.one_channel:
         why = ONE_CHANNEL
@@ -262,7 +262,7 @@ def _band(family: Family, edge: tuple[float, float], beta_rad: float | None, pas
         why = "no band: where the lines end is lost in the noise: a longer dwell may show it"
     if why:
         away = std = np.nan
-    # counted from a line beside the body's, the family is so much the wider on one side
+    # if orders were counted from a line beside the body's, the family is that much wider on one side
     std = float(np.hypot(std, family.comb.body_std))
     cosine = 1.0 if beta_rad is None else float(np.cos(beta_rad))
     tip, tip_std = away * mps / cosine, std * mps / cosine
@@ -284,7 +284,7 @@ def _band(family: Family, edge: tuple[float, float], beta_rad: float | None, pas
 def _blade(family: Family, found: dict[str, Any], blades: int | None) -> dict[str, Any]:
     """Rotation rate and blade length, where the number of blades is given or seen."""
     comb, rates = family.comb, family.rotors.rates
-    # unequal blades tell their number; between the lines of several rotors the weak ones may be something else
+    # unequal blades show their number; between lines of several rotors, weak ones may be something else
     told = comb.blades_sure and len(rates) == 1 and family.is_told_apart
     known = comb.blades if blades is None and told else blades
     if known is None or (known > 1 and family.may_be_turn):
@@ -300,7 +300,7 @@ def _blade(family: Family, found: dict[str, Any], blades: int | None) -> dict[st
 
 
 def _index(family: Family, spectrum: Spectrum, body: Body, mask: NDArray[np.bool_], chopping_hz: float) -> float:
-    """Smearing index: from rates that are told apart where they differ too much for their lines' width to show it."""
+    """Smearing index: of resolved rates where they differ too much for their lines' width to show it."""
     rates, data = family.rotors.rates, family.data
     told = float(rates.std() / rates.mean()) if family.rotors.resolved else 0.0
     if told > WIDEST_INDEX:

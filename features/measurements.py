@@ -26,32 +26,32 @@ class Measurements:
     body_velocity_mps, body_velocity_mps_std : ndarray
         Radial velocity of the body [m/s], positive when the range grows.
     chopping_hz, chopping_hz_std : ndarray
-        Chopping frequency, blades x rotation rate [Hz]; of several rotors, that of their mean rate, which a rotor so
-        strong that it may be two moves by its deviation. Where the rate changes within the dwell, that of the even
-        turn that comes nearest. Of a helicopter it is the main rotor's, or the tail's where the dwell holds too few
-        flashes of the main one.
+        Chopping frequency, blades x rotation rate [Hz]; of several rotors, that of their mean rate, whose deviation
+        allows for a rotor so strong that it may be two. Where the rate changes within the dwell, that of the nearest
+        constant rate. Of a helicopter it is the main rotor's, or the tail's where the dwell holds too few flashes of
+        the main one.
     chopping_drift_hz_per_s, chopping_drift_hz_per_s_std : ndarray
-        Its even change within the dwell [Hz/s]; of several rotors that of their mean, NaN where they are not resolved.
-        Neither velocity nor an even acceleration of the body passes for it.
+        Its linear drift within the dwell [Hz/s]; of several rotors that of their mean, NaN where they are not resolved.
+        Neither velocity nor a constant acceleration of the body passes for it.
     comb_order : ndarray
-        Outermost order of chopping lines that speaks for the comb [1].
+        Outermost order of chopping lines with evidence for the comb [1].
     comb_snr_db : ndarray
-        Power of the comb's lines over the noise, a sample [dB].
+        Power of the comb's lines over that of the noise, per sample [dB].
     rotor_rates_hz, rotor_rates_hz_std : ndarray, shape (..., MAX_ROTORS)
         Chopping frequency of each single rotor, rising [Hz], padded with NaN; where they are not resolved, that of
-        combs that may hold several, which the deviation allows for.
+        combs that may hold several rotors, which the deviation allows for.
     rotor_drifts_hz_per_s, rotor_drifts_hz_per_s_std : ndarray, shape (..., MAX_ROTORS)
-        Even change of each within the dwell [Hz/s], padded in the same way; NaN where they are not resolved.
+        Linear drift of each within the dwell [Hz/s], padded in the same way; NaN where they are not resolved.
     rotor_count : ndarray
-        Rotors told apart; NaN without a comb.
+        Rotors resolved; NaN without a comb.
     rotors_resolved : ndarray of bool
-        False where rates lie nearer than the dwell tells apart, or changed jerkily within it: of steady ones the count
+        False where rates lie closer than the dwell resolves, or changed irregularly within it: of steady ones the count
         is then a lower bound.
     rotor_spread_hz : ndarray
         Range of the rotors' chopping frequencies [Hz], also where they are not resolved; 0 where there is one rate.
     smearing_index : ndarray
-        Relative spread of the rotor rates from the growth of the line width with the order, and above 0.04, where
-        lines widen no more, from the rates of rotors that are told apart [1].
+        Relative spread of the rotor rates from the growth of the line width with the order; above 0.04, where lines
+        widen no more, from the rates of resolved rotors [1].
     bandwidth_hz, bandwidth_hz_std : ndarray
         Doppler bandwidth f_max - f_min from the fitted edge of the line family [Hz] (the paper's eq. 26); of a
         helicopter, like tip speed and blade, that of the rotor whose chopping frequency is given.
@@ -62,8 +62,8 @@ class Measurements:
     notch_residual_db : ndarray
         Mean power outside the notches over the noise floor [dB].
     rotation_hz, rotation_hz_std : ndarray
-        Rotation rate [Hz]; NaN where the number of blades is neither given nor seen in unequal lines or in flashes that
-        follow one another evenly, or where these may be two rotors'.
+        Rotation rate [Hz]; NaN where the number of blades is neither given nor seen in unequal lines or in evenly
+        spaced flashes, or where these flashes may be two rotors'.
     blade_length_m, blade_length_m_std : ndarray
         Blade length [m]; a lower bound where beta is not given. NaN where the rotation rate is.
     length_is_lower_bound : bool
@@ -122,7 +122,7 @@ class Measurements:
 
     @classmethod
     def joined(cls, runs: Sequence[Self]) -> Self:
-        """Those of one batch and more, measured with the same beta, as of one: along their first axis."""
+        """Measurements of several batches, taken with the same beta, joined along their first axis."""
         columns: dict[str, Any] = {"length_is_lower_bound": runs[0].length_is_lower_bound}
         for name in (field.name for field in fields(cls) if field.name not in columns):
             columns[name] = np.concatenate([getattr(run, name) for run in runs])
@@ -139,7 +139,7 @@ class Measurements:
         Returns
         -------
         list of dict
-            One entry where the rotation rate is known, one a blade count where it is not, none without a comb.
+            One entry where the rotation rate is known, one per blade count where it is not, none without a comb.
         """
         chopping = float(self.chopping_hz[index])
         if not np.isfinite(chopping):

@@ -1,7 +1,7 @@
-"""Several rotors whose rates change within the dwell, each in its own way: told apart.
+"""Several rotors whose rates change within the dwell, each in its own way: resolved.
 
-What `drift` does for one rotor, to read the record at the times at which it turns evenly, narrows the lines of that one
-alone. So each is sought among rates and changes at once, and all are fitted to the record as it is.
+Resampling the record for one rotor, as `drift` does, narrows the lines of that rotor alone. So each is sought over
+rates and changes at once, and all are fitted to the record as it is.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,35 +20,36 @@ from .slow_lines import remove_bands
 from .turning import DEGREES, FIRST_DEGREES, Resampling, even_change, late_by, margin_of
 from .unresolved import LEFT_WANDERING, left_over, power_about
 
-#: Rotors are sought that change by up to this over the dwell, relative, in steps that put the outermost lines at its
-#: ends out by half of so many radians; so many steps to each side at most.
+#: Relative changes over the dwell are tried up to FURTHEST_CHANGE, in MOST_STEPS steps to each side at most. A step
+#: moves the outermost lines at the ends of the dwell by STEP_RAD, so that they are at most half of that off.
 FURTHEST_CHANGE, STEP_RAD, MOST_STEPS = 0.03, 1.6, 12
 
-#: And over so many periods of the chopping frequency at most: rates change in more ways in more of them.
+#: Changing rotors are sought only over fewer chopping periods than this: over more, rates change in more ways.
 MOST_PERIODS = 100.0
 
-#: Gauss-Newton steps at most as a rotor comes in, of even changes alone, and once all are found.
+#: Most Gauss-Newton steps as a rotor is added, with linear changes alone, and once all are found.
 COMING_STEPS, ALL_STEPS = 3, 8
 
-#: Steady rotors are fitted in so many steps at most. What changing ones leave less than these, over the noise of a
-#: sample, is no change up to so much for each number that tells of one: by chance it is half. (Four like rotors that
-#: change by up to 0.3 % leave 33 and more at 0 dB, 44 to 180 at 10, where 20 are asked; steady ones -6 to 0.)
+#: STEADY_STEPS: most steps of a fit with steady rates. STEADY_FALL: rates are steady unless the changing fit lowers the
+#: residual energy by more than this for each parameter of change, in noise powers of a sample; chance gives half. (Four
+#: like rotors that change by up to 0.3 % lower it by 33 and more at 0 dB, 44 to 180 at 10, where 20 are asked; steady
+#: ones by -6 to 0.)
 STEADY_STEPS, STEADY_FALL = 30, 1.0
 
-#: Lines are looked for so many times further than those of steady rotors: smeared ones hide how far they reach.
+#: Lines are sought this many times further out than for steady rotors: smeared lines hide their reach.
 FURTHER = 1.5
 
 
 def may_be_sought(data: Periodogram, nominal: float, reach: int) -> bool:
-    """True where changing rotors about a rate [cycles a sample] and of that reach are not too much to seek and fit."""
+    """True where changing rotors about a rate [cycles a sample], of that reach, are within the cost limits."""
     return 4 * reach <= most_lines(data.pulses) and nominal * data.pulses < MOST_PERIODS
 
 
 def as_steady(data: Periodogram, apart: Rotors) -> Rotors | None:
-    """Rotors told apart as changing ones, fitted as steady ones; None where they do change.
+    """Rotors resolved as changing ones, fitted with steady rates; None where the rates do change.
 
-    Steady rotors that were not all found, or not fitted to the end, leave as much as if they changed. Where lines take
-    up most of the record, changes that are none then bend the rates by many deviations.
+    Steady rotors not all found, or not fitted to convergence, leave as large a residual as changing ones. Where lines
+    take up most of the record, spurious changes then bias the rates by many standard deviations.
 
     Parameters
     ----------
@@ -72,44 +73,45 @@ def as_steady(data: Periodogram, apart: Rotors) -> Rotors | None:
 
 
 class ChangingSeparation(Separation):
-    """Rotors found so far, each of a rate that changes.
+    """Rotors found so far, each with a changing rate.
 
-    All are like the comb found: what the fit of another leaves may be one of a far rate and some change as well.
+    All are sought near the rate of the comb found: residue of another's fit may also look like a far rate with some
+    change.
     """
 
     def __init__(self, data: Periodogram, comb: Comb, centre: float, reach: int) -> None:
         super().__init__(data, comb, centre, reach)
         self.seeks_apart = False
         self.furthest = min(FURTHER * self.furthest, 0.5)
-        self._read: dict[float, Periodogram] = {}  # what is left, by the change at which it was read
-        # by how much later each of the changes that are tried has turned as far
+        self._read: dict[float, Periodogram] = {}  # resampled residuals, by the change taken out
+        # for each change tried, the delays at which a record is read to take it out
         self._late = {change: late_by(even_change(change, data.pulses), data.pulses) for change in self._changes()}
         self._left: Resampling | None = None
 
     @property
     def is_hopeless(self) -> bool:
-        """Of rates that change smoothly hardly anything is left by now; what wanders is seldom told, for all that."""
+        """Whether rates wander, which are seldom resolved: smooth changes leave hardly any residual by now."""
         if self.fitted_out or not self.fits:
             return False
         about = power_about(self.data, self.rest.samples, self.fits[0].centre)
         return left_over(about, self.fits, self.reach * self.nominal).share > LEFT_WANDERING
 
     def in_turn(self, sought: list[Sought]) -> Iterator[Sought]:
-        """These."""
+        """The candidates."""
         return iter(sought)
 
     def _strongest(self, rates: NDArray[np.float64], *, is_apart: bool = False) -> Sought:
         return max((self._by(change, rates, is_apart=is_apart) for change in self._late), key=lambda s: s.evidence)
 
     def _changes(self) -> list[float]:
-        """Changes over the dwell that are tried, relative."""
-        turns = self.nominal * self.reach * self.data.pulses  # an even change puts the ends out by an eighth of these
+        """Relative changes over the dwell that are tried."""
+        turns = self.nominal * self.reach * self.data.pulses  # a linear change c shifts the ends by c / 8 of these
         step = STEP_RAD * 8 / (2 * np.pi * turns)
         count = min(int(FURTHEST_CHANGE / step), MOST_STEPS)
         return [float(change) for change in step * np.arange(-count, count + 1)]
 
     def _by(self, change: float, rates: NDArray[np.float64], *, is_apart: bool) -> Sought:
-        """The loudest in what is left, read as a rotor of that change turns evenly."""
+        """The strongest candidate in the residual, resampled for a rotor of that change."""
         held = self._read_at(change) if change else self.rest
         return replace(self._loudest_in(held, rates, is_apart=is_apart), change=change)
 
@@ -128,7 +130,7 @@ class ChangingSeparation(Separation):
         self._read, self._left = {}, None
 
     def _is_the_comb(self, rate: float) -> bool:
-        return False  # that was fitted as if it did not change
+        return False  # its fit assumes a steady rate
 
     def _may_fit(self, reaches: list[int]) -> bool:
         return super()._may_fit(reaches) and 2 * sum(reaches) <= most_lines(self.data.pulses)
@@ -137,7 +139,7 @@ class ChangingSeparation(Separation):
         return self.reaches  # lines that are smeared end elsewhere for each
 
     def _further(self) -> list[int]:
-        """Outermost orders with some more, if those may be fitted: weak ones are held back."""
+        """Outermost orders extended by `FURTHER`, if so many may be fitted: weak lines are shrunk."""
         more = [
             min(int(FURTHER * reach), int(0.45 / rate)) for reach, rate in zip(self.reaches, self.rates, strict=True)
         ]
@@ -146,7 +148,7 @@ class ChangingSeparation(Separation):
     def _fitted(
         self, further: Sought | None, steps: int
     ) -> tuple[Sequence[ChangingFit], NDArray[np.complex128]] | None:
-        """As of `Separation`, but of its own numbers of steps."""
+        """As in `Separation`, with step limits of its own in place of `steps`."""
         reaches = self.reaches if further else self._further()
         starts = [
             Start(fit.spacing, reach, fit.ahead)

@@ -1,7 +1,7 @@
-"""Combs whose rates change within the dwell, each in its own way: fitted to the record as it is, all together.
+"""Joint fit of combs whose rates change within the dwell, each in its own way, to the record as it is.
 
-A line turns with its rotor, whatever way that turns. Inner products of such lines have no closed form: each step forms
-them.
+The phase of a line follows its rotor's turn. Inner products of such lines have no closed form and are formed at each
+step.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,8 @@ from .slow_lines import band_basis, remove_bands
 from .turning import inverse_of, other_rate, own_polynomials
 from .turning_lines import TurningLines
 
-#: A step takes lines^2 x pulses multiplications and holds several times lines x pulses samples, no more than these.
+#: A step takes lines^2 x pulses multiplications (MOST_PRODUCTS), and holds several times lines x pulses samples
+#: (MOST_SAMPLES limits that product).
 MOST_PRODUCTS, MOST_SAMPLES = 3_000_000_000, 8_000_000
 
 
@@ -37,7 +38,7 @@ class Start:
     reach : int
         Outermost order to both sides.
     ahead : ndarray, shape (degrees,)
-        How far ahead of one that turns evenly it is, by polynomials of `DEGREES` [samples].
+        Time ahead of a constant-rate rotor: coefficients of the polynomials of `DEGREES` [samples].
     """
 
     rate: float
@@ -47,13 +48,13 @@ class Start:
 
 @dataclass(frozen=True)
 class ChangingFit(CombFit):
-    """A comb of lines that turn with a rotor whose rate changes.
+    """A comb of lines that follow a rotor whose rate changes.
 
     Parameters
     ----------
     ahead, ahead_std : ndarray of float64, shape (degrees,)
-        How far ahead of one that turns evenly it is, by polynomials of `DEGREES`, and standard deviations [samples];
-        infinite where it was taken to be 0.
+        Time ahead of a constant-rate rotor: coefficients of the polynomials of `DEGREES`, and standard deviations
+        [samples], infinite for those that were not fitted.
     """
 
     ahead: NDArray[np.float64]
@@ -63,7 +64,7 @@ class ChangingFit(CombFit):
 def _factored(
     products: NDArray[np.complex128], held_back: NDArray[np.float64]
 ) -> tuple[tuple[NDArray[np.complex128], bool], NDArray[np.float64]] | None:
-    """Cholesky factor of products with what holds amplitudes back added, and that, larger where it had to be."""
+    """Cholesky factor of products with a ridge added to their diagonal, and that ridge, raised if it must be."""
     from scipy.linalg import LinAlgError, cho_factor
 
     diagonal = products.diagonal().copy()
@@ -77,7 +78,7 @@ def _factored(
 
 
 class _Turning:
-    """Rotors about a body, as their fit goes on: rates, how far ahead they are, and the lines that turn with them."""
+    """State of the fit of rotors about a body: rates, `ahead` polynomials, and the lines that follow them."""
 
     def __init__(self, data: Periodogram, starts: Sequence[Start], centre: float, degrees: int) -> None:
         self.pulses, self.count, self.degrees = data.pulses, len(starts), degrees
@@ -94,30 +95,30 @@ class _Turning:
 
     @property
     def frequency(self) -> NDArray[np.float64]:
-        """Of each line on average [cycles a sample]."""
+        """Mean frequency of each line [cycles a sample]."""
         return np.asarray(self.centre + self.rates[self.comb] * self.order, np.float64)
 
     def lines(self) -> TurningLines:
-        """All of them."""
+        """All lines."""
         body = self.centre * self.time + self.pull * self.shapes[1]
         return TurningLines(body, list(zip(self.rates, self.ahead, strict=True)), self.comb, self.order)
 
     def gained(self, lines: TurningLines, counted: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """What a record gains by another velocity or an acceleration of the body and by each polynomial of each rotor.
+        """Derivatives of a record by the body's velocity and acceleration and by each polynomial of each rotor.
 
-        Shape (2 + rotors x degrees, pulses), where lines have such amplitudes.
+        Shape (2 + rotors x degrees, pulses), for lines of the amplitudes `counted`.
         """
         leads = np.where(self.comb == np.arange(self.count)[:, None], counted * self.order * self.rates[self.comb], 0)
         turned = 2j * np.pi * lines.sums(np.concatenate([counted[None], leads]))
         return np.concatenate([turned[:1] * self.shapes[:2], *(one * self.shapes for one in turned[1:])])
 
     def take(self, step: NDArray[np.float64]) -> None:
-        """Go on by a step in what `gained` names."""
+        """Take a step in the parameters of `gained`."""
         self.centre += float(np.clip(2 * step[0] / self.pulses, -0.5 / self.pulses, 0.5 / self.pulses))
         self.pull += float(np.clip(step[1], -0.5, 0.5))
         limit = self._furthest[:, None]
         self.ahead[:, : self.degrees] += np.clip(step[2:].reshape(self.count, self.degrees), -limit, limit)
-        # its first polynomial is another rate
+        # the first polynomial is a rate offset
         faster = 1 + np.array([other_rate(first, self.pulses) for first in self.ahead[:, 0]])
         self.rates, self.ahead = self.rates * faster, self.ahead / faster[:, None]
         self.ahead[:, 0] = 0
@@ -148,9 +149,9 @@ def fit_changing(
     steps: int,
     level_about: Level,
 ) -> tuple[list[ChangingFit], NDArray[np.complex128]] | None:
-    """Fit combs whose rates change, by Gauss-Newton steps on how far ahead each is and on the body they are about.
+    """Fit combs whose rates change, by Gauss-Newton steps on the `ahead` of each and on the body's motion.
 
-    That may accelerate. As `fit_combs` does it: amplitudes are Gaussian of the power seen about their lines, and
+    The body may accelerate. As in `fit_combs`, amplitudes are Gaussian with the power seen about their lines, and
     eliminated.
 
     Parameters
@@ -158,21 +159,21 @@ def fit_changing(
     data : Periodogram
         The record.
     starts : sequence of Start
-        Where each begins.
+        Start of each comb.
     centre : float
         Start of the centre [cycles a sample].
     degrees : int
-        The first so many of `DEGREES` are fitted.
+        How many of `DEGREES` are fitted, from the first.
     steps : int
         Steps at most, >= 1.
     level_about : callable
-        Local level without what is known of the combs already.
+        Local level without the combs known already.
 
     Returns
     -------
     (list of ChangingFit, ndarray of complex128 of shape (pulses,)) or None
-        A fit for each and the samples that they leave. None where a comb has fewer than three usable lines, or lines
-        lie in one another too closely.
+        A fit for each and the residual samples. None where a comb has fewer than three usable lines, or lines overlap
+        too closely.
     """
     from scipy.linalg import cho_solve  # here, because predicting needs no such import
 
@@ -210,6 +211,6 @@ def fit_changing(
         if number and np.all(np.abs(step) < ENOUGH * std):
             break
         level = data.level_of(rest)
-    # the noise is what the last step leaves, not what the one before it left
+    # the noise is taken from the residual of the last step, not of the one before
     left = float(np.average(np.maximum(data.level_of(rest)(frequency), least), weights=counts))
     return turning.fits(std * np.sqrt(left / mean_noise * data.ends_noise), amplitudes, snr), rest

@@ -1,4 +1,4 @@
-"""Combs fitted line by line, several at once: spacings and centre below the bin, with the variance the bound gives."""
+"""Combs fitted line by line, several jointly: spacings and centre to a fraction of a bin, with the bound's variance."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,26 +11,27 @@ from .folding import comes_back, outermost_orders
 from .periodogram import LEAST_LEVEL, Level, Periodogram
 from .slow_lines import LineProducts, notched_products, parts, remove_bands, times, whole
 
-#: Gauss-Newton steps at most. They end after one below so many standard deviations: the next would be a tenth of it.
+#: STEPS: most Gauss-Newton steps. They end after a step below ENOUGH standard deviations: the next would be a tenth of
+#: it.
 STEPS = 8
 ENOUGH = 0.1
 
 #: Orders to each side over which line powers are averaged to weigh the lines.
 SMOOTHED_ORDERS = 2
 
-#: Added to one over the lines' snr: a line that lies half in a band taken out has little left to be fitted by.
+#: Added to one over the lines' snr: a line half inside a band that was taken out has little power left to fit.
 LEAST_RIDGE = 1e-6
 
-#: Added besides where that is not enough.
+#: Added besides where the Cholesky factor fails.
 NOTCH_RIDGE = 1e-2
 
-#: Well above this snr the amplitude of a line by itself is not held back: what that leaves would pull at others.
+#: Well above this snr the amplitude of an isolated line is not shrunk: what that leaves would bias other lines.
 CLEAR_SNR = 30.0
 
 #: Lines nearer than this share the power seen there [bins].
 ONE_BINS = 1.0
 
-#: Lines beyond the outermost that speak for the comb, fitted with it: what they hold must not leak into the others.
+#: Orders fitted beyond the outermost with evidence for the comb: what they hold must not leak into the others.
 MARGIN_ORDERS = 3
 
 
@@ -47,7 +48,7 @@ class CombFit:
     orders : ndarray of int, shape (lines,)
         Orders of the lines that take part.
     amplitudes : ndarray of complex128, shape (lines,)
-        Their amplitudes, held back as far as noise makes them, in units of the noise's rms a sample.
+        Their amplitudes, shrunk as far as noise requires, in units of the noise's rms a sample.
     snr : ndarray of float64, shape (lines,)
         Power of each line over the local noise of a bin, smoothed over neighbouring orders [1].
     """
@@ -77,19 +78,19 @@ class CombFit:
         return np.asarray(self.centre + self.spacing * self.orders, np.float64)
 
     def seen_beside(self, rest: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Amplitudes of its lines, not held back, in a record of which combs leave this, shape (lines,)."""
+        """Amplitudes of its lines, not shrunk, given the residual of all combs in the record, shape (lines,)."""
         return self.amplitudes + LinesSeen(rest[None]).means(self.frequencies)[0]
 
 
 def over_orders(
     comb: NDArray[np.intp], order: NDArray[np.intp], used: NDArray[np.bool_]
 ) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """Means over neighbouring orders of the same comb that are used; combs one after the other, orders rising."""
+    """Means over used neighbouring orders of the same comb; combs one after the other, orders rising."""
     place = order + comb * (2 * np.abs(order).max() + 4 * SMOOTHED_ORDERS)
     known = place[used]
     first = np.searchsorted(known, place - SMOOTHED_ORDERS)
     last = np.searchsorted(known, place + SMOOTHED_ORDERS, side="right")
-    alone = first == last  # then the next one to either side
+    alone = first == last  # then the next used ones to either side
     first, last = np.maximum(first - alone, 0), np.minimum(last + alone, len(known))
 
     def smooth(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -100,7 +101,7 @@ def over_orders(
 
 
 def orders_within(data: Periodogram, centre: float, spacing: float, reach: tuple[int, int]) -> NDArray[np.intp]:
-    """Orders of the lines that are fitted: some past the outermost that speak, and none that were taken out."""
+    """Orders of the lines to fit: `MARGIN_ORDERS` past the outermost, and none that were taken out."""
     (low, high), widest = reach, int(0.49 / spacing)
     if comes_back(max(high, -low), spacing):
         widest = int(outermost_orders(data, spacing))
@@ -115,17 +116,18 @@ def lines_at_one_place(frequency: NDArray[np.float64], pulses: int) -> NDArray[n
 
 
 def ridges(snr: NDArray[np.float64], together: NDArray[np.intp], used: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """What holds amplitudes back, added to the lines' products with themselves.
+    """Ridge that shrinks the amplitudes, added to the lines' products with themselves.
 
     Parameters
     ----------
     snr : ndarray, shape (lines,)
         Power of each over the noise of a bin.
     together : ndarray, shape (lines,)
-        From `lines_at_one_place`. Those that lie in one another are held back however strong they are: let go, they
-        come out as large ones that cancel.
+        From `lines_at_one_place`. Overlapping lines are shrunk however strong they are: otherwise they come out as
+        large ones that cancel.
     used : ndarray of bool, shape (lines,)
-        The others too are: of one half in a band taken out so little is left that anything would explain it.
+        Lines not used are shrunk too: so little is left of one half inside a band taken out that anything would explain
+        it.
     """
     let_go = np.where(used & (together == 1), 1 + (snr / CLEAR_SNR) ** 2, 1.0)
     return np.asarray(1 / (snr * let_go) + LEAST_RIDGE, np.float64)
@@ -148,9 +150,10 @@ def _fisher(
     products: LineProducts,
     pulses: int,
 ) -> NDArray[np.float64]:
-    """Fisher matrix of centre and spacings with the amplitudes eliminated, these over the rms of the noise about them.
+    """Fisher matrix of centre and spacings with the amplitudes eliminated.
 
-    The other arguments are those of `fit_combs`: the products of the lines, and the plain ones factored.
+    `weighed` are the amplitudes over the rms of the noise about them. The other arguments are those of `fit_combs`: the
+    products of the lines, and the factor of the plain ones.
     """
     from scipy.linalg import lapack
 
@@ -175,8 +178,8 @@ def fit_combs(
 ) -> tuple[list[CombFit], NDArray[np.complex128]] | None:
     """Refine combs about one centre, jointly, by Gauss-Newton steps on the frequencies of their lines.
 
-    Lines are complex Gaussian amplitudes of the power seen about them, in noise; given the frequencies their means are
-    a linear estimate, so that no line leaks into its neighbours. The steps and the variances come from the Fisher
+    Amplitudes of lines are complex Gaussian with the power seen about them, in noise; given the frequencies their means
+    are a linear estimate, so that no line leaks into its neighbours. The steps and the variances come from the Fisher
     matrix of centre and spacings with the amplitudes eliminated, at the estimated amplitudes: for one comb the
     Cramer-Rao bound for unknown body frequency, with each line's snr replaced by snr^2 / (1 + snr).
 
@@ -193,15 +196,15 @@ def fit_combs(
     steps : int
         Steps at most, >= 1.
     level_about : callable, optional
-        Local level without what is known of the combs already: the first step takes the level about the lines from it.
+        Local level without the combs known already: the first step takes the level about the lines from it.
     own_centres : bool
         Each comb has a centre of its own, all start at the one given.
 
     Returns
     -------
     (list of CombFit, ndarray of complex128 of shape (pulses,)) or None
-        A fit for each spacing and the samples that the lines leave. None where a comb has fewer than three usable
-        lines, or they lie in one another too closely.
+        A fit for each spacing and the residual samples. None where a comb has fewer than three usable lines, or lines
+        overlap too closely.
     """
     from scipy.linalg import lapack  # here, because predicting needs no such import
 
@@ -230,7 +233,7 @@ def fit_combs(
     design[np.arange(len(order)), centres + comb] = order
     smooth = over_orders(comb, order, used)
     limit = np.array([0.5] * centres + [0.5 / max(1, np.abs(own).max()) for own in orders]) / pulses
-    # several combs' lines take so much of the noise out with them that what they leave says little of it
+    # lines of several combs take out so much of the noise that their residual says little of it
     least = LEAST_LEVEL if count == 1 else 1.0
     snr = np.full(len(order), np.inf)
     level = data.level_at(frequency) if level_about is None else np.maximum(level_about(frequency), least)
@@ -241,13 +244,13 @@ def fit_combs(
     for number in range(steps):
         seen, moment = data.lines.at(frequency)
         products = notched_products(frequency, pulses, data.strong.bands)
-        # lines that lie in one another may come out as large ones that cancel: together they hold no more than is seen
+        # overlapping lines may come out as large ones that cancel: together they hold no more than is seen
         most = smooth(np.abs(seen) ** 2 * pulses / level) - 1
         together = lines_at_one_place(frequency, pulses)
         snr = np.minimum(snr, np.maximum(most / together, 1e-3))
         held_back = ridges(snr, together, used)
         factor, failed = _factored(products.plain, held_back)
-        if failed:  # what is tabulated of the notch is a little off where nearly all was taken out
+        if failed:  # the notch's table is slightly off where nearly all was taken out
             factor, failed = _factored(products.plain, held_back + NOTCH_RIDGE)
         if failed:
             return None
@@ -264,12 +267,10 @@ def fit_combs(
         frequency = frequencies()
         if number == steps - 1 or (number and np.all(step**2 * np.diag(fisher) < ENOUGH**2)):
             break
-        # what the lines leak lifts the level between them: as they are fitted, it is taken from what they leave
+        # leakage of the lines lifts the level between them: once fitted, it is taken from their residual
         level = np.maximum(data.level_of(left_by(frequency, amplitudes))(frequency), least)
     variance = np.diag(np.linalg.inv(fisher))
-    std = np.sqrt(
-        np.where(variance > 0, variance, np.inf) * data.ends_noise
-    )  # what tells nothing of one rounds below 0
+    std = np.sqrt(np.where(variance > 0, variance, np.inf) * data.ends_noise)  # rounding may make unknown ones negative
     out = []
     for number in range(count):
         own, middle = (comb == number) & used, number if own_centres else 0
@@ -284,5 +285,5 @@ def fit_combs(
                 snr[own],
             )
         )
-    # an amplitude changes little with the last step
+    # the amplitudes change little with the last step
     return out, left_by(frequency, amplitudes)

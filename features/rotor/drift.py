@@ -1,8 +1,9 @@
-"""A rotor whose rate changes within the dwell: by how much, and the record as if it had turned evenly.
+"""A rotor whose rate changes within the dwell: by how much, and the record resampled to a constant rate.
 
-Such a rotor's lines widen with their order and fill what lies between them, as those of several rotors do. Read at the
-times at which an even rotor has turned as far, counted about the body's line, they are narrow again, all at once. Hover
-is full of it: in the measured recordings a multirotor's rates change by one or two parts in a hundred within 80 ms.
+Such a rotor's lines widen with their order and fill the gaps between them, as those of several rotors do. If the record
+is read at the times at which a rotor of constant rate has turned as far, with the body's line kept, all lines are
+narrow again. Hover is full of such changes: in the measured recordings a multirotor's rates change by one or two parts
+in a hundred within 80 ms.
 """
 
 from collections.abc import Sequence
@@ -33,33 +34,33 @@ from .turning import (
     polynomials,
 )
 
-#: Lines are seen in so many parts of the dwell, or parts of so many samples where those are longer: within one of them
-#: hardly a line turns out of phase.
+#: Lines are followed over PARTS parts of the dwell, in long dwells over more parts of LONGEST_PART samples: within a
+#: part hardly any line drifts out of phase.
 PARTS, LONGEST_PART = 64, 48
 
-#: The change is sought by the inner orders first, on which an even one that large has about this effect [rad], and then
-#: by so many times more of them, up to all.
+#: The change is first fitted to the inner orders, LEAST_ORDERS at least, on which a linear change of MOST_CHANGE has an
+#: effect of FIRST_RAD [rad]; then each time to MORE_ORDERS times as many, up to all.
 FIRST_RAD, MORE_ORDERS, LEAST_ORDERS = 1.0, 1.3, 4
 
-#: Steps at all orders, at most; and by each line over the dwell a change is sure by so many standard deviations.
+#: LAST_STEPS: most steps at all orders. ROUGHLY_SURE: standard deviations that make the change of this first fit sure.
 LAST_STEPS, ROUGHLY_SURE = 6, 3.0
 
-#: Steps of the fit of all lines after that, at most, out to so many times the edge, which smeared lines hide.
+#: Most steps of the joint fit of all lines after that, out to FURTHER times the edge, which smeared lines hide.
 FITTED_STEPS, FURTHER = 8, 2.0
 
 
 @dataclass(frozen=True)
 class Straightened:
-    """A record as if its rotor had turned evenly.
+    """A record resampled as if its rotor had a constant rate.
 
     Parameters
     ----------
     samples : ndarray of complex128, shape (pulses,)
-        Its samples, those of `Periodogram` read at other times; the body's line is what it was.
+        Samples of `Periodogram` read at other times; the body's line is unchanged.
     record : Periodogram
         The record as it is.
     fit : ChangingFit
-        The rotor's lines in that, every blade's.
+        The rotor's lines in that, of all blades.
     """
 
     samples: NDArray[np.complex128]
@@ -68,7 +69,7 @@ class Straightened:
 
 
 def _continued(samples: NDArray[np.complex128], fit: ChangingFit) -> NDArray[np.complex128]:
-    """A record with margins in which its comb goes on and fades out: it repeats without a step between its ends."""
+    """A record with margins in which its comb continues and fades out, so that it repeats without a step."""
     pulses = len(samples)
     margin = margin_of(pulses)
     away = np.arange(1, margin + 1)
@@ -80,10 +81,10 @@ def _continued(samples: NDArray[np.complex128], fit: ChangingFit) -> NDArray[np.
 
 
 def straightened(data: Periodogram, comb: Comb, edge: float, *, least_gain: float) -> Straightened | None:
-    """Take out of a record what its rotor's rate changed by.
+    """Resample a record so that its rotor has a constant rate.
 
-    By Gauss-Newton steps on the phases of the comb's lines over the dwell: first of each line by itself, from the inner
-    orders outwards, then of all together.
+    The change is fitted by Gauss-Newton steps on the phases of the comb's lines over the dwell: first with each line by
+    itself, from the inner orders outwards, then with all jointly.
 
     Parameters
     ----------
@@ -94,12 +95,13 @@ def straightened(data: Periodogram, comb: Comb, edge: float, *, least_gain: floa
     edge : float
         Edge of the line family [cycles a sample from the body].
     least_gain : float
-        What each line by itself must at least tell of the rate once the change is taken out, over what it told before.
+        Least factor by which taking out the change must raise the lines' information on the rate, in the first of these
+        fits.
 
     Returns
     -------
     Straightened or None
-        None where no change is sure, or it is larger than `MOST_CHANGE`.
+        None where no change is sure, or it exceeds `MOST_CHANGE`.
     """
     pulses, rate, centre = data.pulses, comb.chopping, comb.fit.centre
     furthest = max(int(0.45 / rate), 1)
@@ -122,15 +124,15 @@ def straightened(data: Periodogram, comb: Comb, edge: float, *, least_gain: floa
 
 
 def _each_by_itself(data: Periodogram, rate: float, centre: float, reach: int) -> tuple[NDArray[np.float64], float]:
-    """How far ahead of an even rotor one is, by each line over the dwell, and what the lines then tell over before.
+    """Time ahead of a constant-rate rotor, from each line by itself, and the gain in information on the rate.
 
-    That is 0 where no change is sure, or it is larger than `MOST_CHANGE`.
+    The gain is 0 where no change is sure, or it exceeds `MOST_CHANGE`.
     """
     pulses = data.pulses
     orders = np.concatenate([np.arange(-reach, 0), np.arange(1, reach + 1)])
     orders = orders[data.usable(centre + rate * orders)]
     seen, time = _over_time(data.samples, centre + rate * orders)
-    # towards the ends parts count less, or each line's neighbours would leak into it
+    # parts count less towards the ends, or each line's neighbours would leak into it
     taper = np.cos(np.pi * time / pulses) ** 2
     taper /= taper.sum()
     shapes = polynomials(time, pulses)
@@ -139,7 +141,7 @@ def _each_by_itself(data: Periodogram, rate: float, centre: float, reach: int) -
     noise = data.level_at(centre + rate * orders) / pulses * len(time) * float((taper**2).sum())
     lead = 2 * np.pi * rate * orders
     ahead = np.zeros(len(DEGREES))
-    # an even change of the whole puts the ends ahead by an eighth of it
+    # a linear change c over the dwell puts its ends ahead by c / 8 of it
     order = int(np.clip(8 * FIRST_RAD / (2 * np.pi * MOST_CHANGE * rate * pulses), min(LEAST_ORDERS, reach), reach))
     last = 0
     before = float((lead**2 * _excess(seen @ taper, noise)).sum())
@@ -168,14 +170,14 @@ def _each_by_itself(data: Periodogram, rate: float, centre: float, reach: int) -
 
 
 def _excess(amplitude: NDArray[np.complex128], noise: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Power of lines over that of noise, without it, at least 0."""
+    """Power of lines over that of noise, less 1, at least 0."""
     return np.maximum(squared(amplitude) / noise - 1, 0)
 
 
 def _over_time(
     samples: NDArray[np.complex128], frequency: NDArray[np.float64]
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
-    """What unit lines see in each part of a dwell, shape (lines, parts), and the parts' middles [samples]."""
+    """Amplitude of each line in each part of a dwell, shape (lines, parts), and the parts' middles [samples]."""
     pulses = len(samples)
     length = min(max(pulses // PARTS, 1), LONGEST_PART)
     cut = samples[: pulses // length * length].reshape(-1, length)
@@ -188,7 +190,7 @@ def _over_time(
 def ahead_left(
     data: Periodogram, fits: Sequence[CombFit], rest: NDArray[np.complex128]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How far ahead of even rotors those of combs are, by what their lines leave.
+    """Time by which rotors are ahead of constant-rate ones, from the residual of their combs.
 
     Parameters
     ----------
@@ -197,13 +199,14 @@ def ahead_left(
     fits : sequence of CombFit
         The combs, of one centre.
     rest : ndarray of complex128, shape (pulses,)
-        Samples that they leave.
+        Residual of the combs.
 
     Returns
     -------
     ahead, std : ndarray, shape (combs, degrees)
-        By the first two of `DEGREES`, and standard deviations at the fitted amplitudes [samples], whatever velocity and
-        even acceleration the body has: one Gauss-Newton step, near to the truth where the change leaves lines narrow.
+        Coefficients of the first two of `DEGREES`, and standard deviations at the fitted amplitudes [samples], for any
+        velocity and constant acceleration of the body: one Gauss-Newton step, close where the change leaves lines
+        narrow.
     """
     pulses, frequency = data.pulses, np.concatenate([fit.frequencies for fit in fits])
     amplitudes = np.concatenate([fit.amplitudes for fit in fits])
@@ -213,9 +216,9 @@ def ahead_left(
         sum_of_lines(pulses, fit.frequencies, 1j * lead * fit.amplitudes) for fit, lead in zip(fits, leads, strict=True)
     ]
     still = sum_of_lines(pulses, frequency, 2j * np.pi * amplitudes)
-    # what the record gains by each polynomial of each rotor, and by another velocity or an acceleration of the body
+    # derivatives of the record by each polynomial of each rotor, and by the body's velocity and acceleration
     gained = remove_bands(np.concatenate([*(shapes * one for one in turned), shapes * still]), data.strong.bands)
-    # what other amplitudes would make of it does not count
+    # what other amplitudes would explain is projected out
     seen = LinesSeen(np.concatenate([gained, rest[None]])).means(frequency).T
     products = notched_products(frequency, pulses, data.strong.bands).plain
     snr = np.concatenate([fit.snr for fit in fits])

@@ -1,4 +1,4 @@
-"""Single samples that stand out of a record at a fixed distance: another radar's pulses, whose comb has no edge."""
+"""Single samples that stand out of a record at a fixed interval: another radar's pulses, whose comb has no edge."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,31 +6,32 @@ from numpy.typing import NDArray
 from ..lines import squared
 from .periodogram import Periodogram
 
-#: A comb's spacing may be that of its every second, third or fourth line, or its lines stand between those of pulses.
+#: Pulse periods tried, in 1 / spacing: a comb may be every second to fourth of their lines, or have others between
+#: them.
 PERIODS = (1 / 6, 1 / 5, 1 / 4, 1 / 3, 1 / 2, 1, 2, 3, 4)
 
-#: Periods hold so many samples and come so often, at least: a sample and its neighbours must be told from the others.
+#: Least samples in a period, and least pulses: a pulse and its neighbours must be told from the other samples.
 LEAST_PERIOD, LEAST_PULSES = 8, 4
 
-#: Pulses stand so many times over the noise, and some so many times over both samples beside; on the shortest of
-#: several periods they stand as high as this share of what they do on any.
+#: Pulses exceed LEAST_HEIGHT times the noise, and some of them ALONE times both neighbours. Of several periods the
+#: shortest is taken whose pulses are SAME_SHARE as high as those of any.
 LEAST_HEIGHT, ALONE, SAME_SHARE = 8.0, 3.0, 0.7
 
-#: What stands out beside a pulse is less than this share of it. A blade's flash whose band is the whole span falls
-#: between two samples as often as on one and leaves 0.17 beside it, in twice the span 0.05.
+#: Excess power beside a pulse is less than this share of it. A blade's flash whose band is the whole span falls between
+#: two samples as often as on one and leaves 0.17 beside it, in twice the span 0.05.
 BESIDE_SHARE = 0.08
 
-#: Only where the unambiguous span holds so much [m/s]: in less, the flashes of usual tips are as short as pulses. What
-#: comes after a whole number of samples, its distances together fewer than so many samples off that, may be flashes
-#: that fall on a sample each: only where the span holds more, which hardly any tip fills.
+#: Pulses are sought only in unambiguous spans of LEAST_SPAN_MPS [m/s] and more: in less, flashes of usual tips are as
+#: short. Pulses whose intervals are off a whole number of samples by fewer than SHIFTS samples in all may be flashes
+#: that fall on a sample each: only from WHOLE_SPAN_MPS on [m/s], which hardly any tip fills, are they pulses.
 LEAST_SPAN_MPS, WHOLE_SPAN_MPS, SHIFTS = 300.0, 400.0, 2
 
 
 def even_pulses(data: Periodogram, spacing: float) -> NDArray[np.intp]:
-    """Find the samples of pulses that a comb is of; none where it may be a rotor's.
+    """Find the samples of the pulses that make up a comb; none where it may be a rotor's.
 
-    A pulse is one sample, whatever its distance to the next, and both beside it are as quiet as any; a rotor's flash
-    lasts as long as its band is narrow.
+    A pulse is one sample with quiet neighbours, whatever the interval to the next; a rotor's flash lasts the longer the
+    narrower its band.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def even_pulses(data: Periodogram, spacing: float) -> NDArray[np.intp]:
     Returns
     -------
     ndarray of int, shape (pulses found,)
-        Their places, rising.
+        Their indices, rising.
     """
     none = np.zeros(0, np.intp)
     if data.span_mps < LEAST_SPAN_MPS:
@@ -62,13 +63,13 @@ def even_pulses(data: Periodogram, spacing: float) -> NDArray[np.intp]:
         apart = np.diff(places)
         if data.span_mps < WHOLE_SPAN_MPS and np.abs(apart - np.median(apart)).sum() < SHIFTS:
             return none
-        # the louder one of two that are noise has 1.5 times its mean
+        # the louder of two noise samples has 1.5 times the mean
         return places if float(beside[places - 1].mean()) - 1.5 * noise < BESIDE_SHARE * height else none
     return none
 
 
 def _loudest(power: NDArray[np.float64], period: float) -> NDArray[np.intp]:
-    """The samples, a period apart to half of one, that hold the most power; none at either end of the record."""
+    """The samples, about a period apart, that hold the most power; none at either end of the record."""
     starts = np.arange(2, 2 * period) / 2
     times = np.arange(int((len(power) - 3 - starts[-1]) / period) + 1) * period
     nearest = np.rint(starts[:, None] + times).astype(np.intp)

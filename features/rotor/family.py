@@ -27,47 +27,48 @@ from .unlike_blades import blade_numbers
 from .unresolved import judged, left_over, not_all, power_about
 from .weak_lines import by_rotation, with_all_lines, without_weak_lines
 
-#: What the lines tell of the rate grows by so much once its change is taken out, where several rotors were found that
-#: are one; and where these were told apart.
+#: Where several rotors were found, one common rate change is tried if taking it out raises the lines' information on
+#: the rate by this factor: SEVERAL_GAIN if they are unresolved, BELIEVED_GAIN if resolved.
 SEVERAL_GAIN, BELIEVED_GAIN = 1.0, 1.5
 
-#: A gain over the dwell is that of all lines where it explains so much of what one comb leaves, and of what all rotors
-#: found leave, which two nearer than the dwell tells apart come to 0.05 of. It is taken out so many times, each.
+#: A common gain is accepted where it explains this share of the residual of one comb (ONE_GAIN_SHARE), or of all rotors
+#: found (GAIN_SHARE; two unresolved rotors mimic 0.05). Each is applied GAIN_STEPS times at most.
 ONE_GAIN_SHARE, GAIN_SHARE, GAIN_STEPS = 0.3, 0.08, 2
 
-#: Lines that swell and fall pass for two rotors whose outermost lines are so near to one another, at most [bins].
+#: Lines of varying gain pass for two rotors whose outermost lines lie no further apart than this [bins].
 TWIN_BINS = 1.5
 
 #: Gauss-Newton steps at most for both combs of a helicopter, whose change is known from one of them.
 GEARED_STEPS = 4
 
-#: Rates that change leave so much where they are fitted as steady ones, in its deviations, or so much less than what
-#: is beyond, where their lines go on: steady ones near the noise leave 0 to 3, and below this none was ever told.
+#: Changing rates are sought only if the residual within the band of the steady fit differs from the noise beyond it by
+#: this many standard deviations, up or down. Steady rotors near the noise leave 0 to 3; below this no changing rotors
+#: were ever resolved.
 CHANGE_LEAVES = 2.0
 
-#: Where the edge of the lines fitted and that of all about the orders differ by so many deviations, the fit of outer
-#: lines went astray.
+#: If the edge of the fitted lines and that of all power about the orders differ by more than this many standard
+#: deviations, the fit of outer lines went astray.
 EDGE_DEVIATIONS = 4.0
 
-#: A comb whose spacing is off by more than this, relative, from any multiple of another's is no part of that.
+#: Relative distance from multiples and fractions of another comb's spacing above which a comb is not part of that one.
 FAR_OFF = 0.003
 
-#: A comb of several rotors is counted anew so often, at most.
+#: How often, at most, the orders of a comb of several rotors are counted anew.
 RECOUNTS = 2
 
-#: A rate that may be twice to five times what it seems is told to so many times itself.
+#: Spread given to a chopping frequency that may be 2 to 5 times the value found, as a multiple of that value.
 UNTOLD_SPREAD = 4.0
 
 
 @dataclass(frozen=True)
 class Family:
-    """What the lines of a record come to.
+    """The line family found in a record.
 
     Parameters
     ----------
     data : Periodogram
-        The record that they were found in: as if the rotor had turned evenly, where that explains more of it, and
-        without a second comb.
+        The record that it was found in: resampled as if the rotor had a constant rate, where that explains more of it,
+        and without a second comb.
     comb : Comb
         The comb; a helicopter's first one.
     edge, edge_std : float
@@ -81,13 +82,13 @@ class Family:
     gear_reason : str
         Why there is no second comb; empty where there is one.
     ahead : (ndarray, ndarray) or None
-        How far ahead of an even rotor each is, by as many polynomials of `DEGREES` as were fitted, two at least, and
-        standard deviations, shape (rotors, degrees) [samples]; None where they are not told apart.
+        Time by which each rotor is ahead of one of constant rate: coefficients of the polynomials of `DEGREES` that
+        were fitted, two at least, and standard deviations, shape (rotors, degrees) [samples]; None where unresolved.
     may_be_turn : bool
         True where the chopping frequency may be the rotation rate of unlike blades.
     meeting_std : float or None
-        Where the combs of several rotors surely meet, standard deviation of that place, which is the body's [cycles a
-        sample].
+        Standard deviation of the place where the combs of several rotors meet, which is the body's, if that is sure
+        [cycles a sample].
     """
 
     data: Periodogram
@@ -104,19 +105,19 @@ class Family:
 
     @property
     def is_told_apart(self) -> bool:
-        """True where nothing is left that the rotors found do not explain."""
+        """True where the rotors found are all resolved, or a helicopter's two combs are found."""
         return self.gear is not None or self.rotors.resolved
 
     @property
     def drifts(self) -> NDArray[np.float64]:
-        """Even relative change of each rotor's rate, and standard deviations, shape (2, rotors) [1 / sample]."""
+        """Linear relative drift of each rotor's rate, and standard deviations, shape (2, rotors) [1 / sample]."""
         if self.ahead is None:
             return np.full((2, len(self.rotors.rates)), np.nan)
         return np.array([[bend(own, self.data.pulses) for own in values] for values in self.ahead])
 
 
 def told_from_multiples(family: Family) -> Family:
-    """A lone rotor's family, called not told apart where its comb may as well be that of a multiple of its rate."""
+    """The family, marked unresolved where a lone rotor's comb may as well be that of a multiple of its rate."""
     comb, rotors = family.comb, family.rotors
     if family.gear is not None or len(rotors.rates) > 1:
         return family
@@ -126,14 +127,14 @@ def told_from_multiples(family: Family) -> Family:
 
 
 def by_turns(family: Family, blades: int | None) -> Family:
-    """A lone rotor's family, its comb counted in turns where its blades flash one after another: it is that of a turn.
+    """The family; a lone rotor's comb is taken as that of a turn where its blades flash one after another.
 
     Parameters
     ----------
     family : Family
         From `find_family`.
     blades : int, optional
-        Of a rotor: those that are alike flash together.
+        Blades of a rotor: like ones flash together.
     """
     comb, rotors = family.comb, family.rotors
     if family.gear is not None or len(rotors.rates) > 1 or comb.blades > 1 or family.data.one_channel:
@@ -143,7 +144,7 @@ def by_turns(family: Family, blades: int | None) -> Family:
         return family
     edge, std = family.edge, family.edge_std
     number, is_sure = flashes_in_period(comb.fit, numbers, min(edge, 0.5) / comb.fit.spacing)
-    if blades is not None and (number > 1 or not rotors.resolved):  # it was sought for blades that are alike
+    if blades is not None and (number > 1 or not rotors.resolved):  # that edge was fitted for like blades
         edge, std = edge_of_lines(family.data, [comb.fit], comb.rest, 1, None)
         number, is_sure = flashes_in_period(comb.fit, numbers, min(edge, 0.5) / comb.fit.spacing)
     if number == 1 or not is_sure:
@@ -157,15 +158,16 @@ def by_turns(family: Family, blades: int | None) -> Family:
 def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None) -> tuple[Family | None, str]:
     """Find the line family of a record.
 
-    A gain over the dwell that all lines share is divided out: what it makes of them passes for more rotors. It is told
-    from the first comb where that is nearly alone, from all rotors found, and from those whose rates change.
+    A gain over the dwell that all lines share is divided out: its effect on the lines passes for more rotors. It is
+    estimated from the first comb where that is nearly alone, from all rotors found, and from the comb of a resampled
+    record.
 
     Parameters
     ----------
     data : Periodogram
         From `prepared`.
     spectrum : Spectrum
-        What that was prepared with.
+        Spectrum it was prepared with.
     blades : int, optional
         Of a rotor.
 
@@ -189,7 +191,7 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
 
 
 def _evened_by_one(even: Evened, blades: int | None) -> tuple[Evened, tuple[Comb | None, str]]:
-    """A record evened by its first comb, as often as the gain explains much of what that leaves; and the comb."""
+    """A record with its first comb's gain divided out while that explains much of the residual; and the comb."""
     found = find_comb(even.record, blades)
     for _ in range(GAIN_STEPS):
         comb = found[0]
@@ -202,7 +204,7 @@ def _evened_by_one(even: Evened, blades: int | None) -> tuple[Evened, tuple[Comb
 
 
 def _evened_by_rotors(even: Evened, family: Family, blades: int | None) -> tuple[Evened, Family] | None:
-    """A record evened by all its rotors, and what is then found in it; None where they have no gain."""
+    """A record with the gain of all rotors divided out, and its family; None where they have no gain."""
     out = None
     for _ in range(GAIN_STEPS):
         further = even.further(family.data, family.rotors.rest, family.comb.chopping, GAIN_SHARE)
@@ -218,7 +220,7 @@ def _evened_by_rotors(even: Evened, family: Family, blades: int | None) -> tuple
 
 
 def _not_twins(family: Family) -> list[CombFit]:
-    """Combs of a family, where not told apart the strongest of those as near to one another as a gain splits lines."""
+    """Combs of a family; if unresolved, only the strongest of combs as close together as a gain splits lines."""
     fits = sorted(family.rotors.fits, key=lambda fit: -energy(fit.amplitudes))
     if family.is_told_apart:
         return fits
@@ -231,10 +233,10 @@ def _not_twins(family: Family) -> list[CombFit]:
 
 
 def _turned(data: Periodogram, spectrum: Spectrum, family: Family, blades: int | None) -> Family:
-    """A family of rates that were taken to be steady, or another where they are not.
+    """The family of steady rates given, or one of changing rates where they change.
 
-    Where one changes for sure, or rotors are not told apart, the record may be one of a rotor that turns evenly, read
-    at other times; if not that, of several that change, each in its own way.
+    If a rate surely changes or rotors are unresolved, the record is resampled as that of one rotor of constant rate. If
+    that does not explain it, several rotors are sought whose rates change each in its own way.
     """
     if family.ahead is not None and not is_sure(*family.ahead):
         return family
@@ -254,34 +256,34 @@ def _turned(data: Periodogram, spectrum: Spectrum, family: Family, blades: int |
     even, other = evened(comb)
     if even is None:
         return _changing(data, family, edge)
-    if _is_one(other) and other.comb.blades > comb.blades:  # narrow, its lines show weak ones that pulled at its rate
+    if _is_one(other) and other.comb.blades > comb.blades:  # narrow lines show weak ones that biased the rate
         comb = by_rotation(replace(family.comb, blades=other.comb.blades))
         finer = evened(comb)
         if finer[0] is not None and _is_one(finer[1]):
             even, other = finer
-    # what was straightened may be the tail's comb; but several rotors may pass for that one and a slower one as well
+    # the comb resampled may be the tail's; but several rotors may also pass for a tail and a slower main rotor
     slower = other is not None and other.gear is not None and other.comb.chopping < (1 - FAR_OFF) * comb.chopping
     if _is_one(other) and not slower:
         return other
     apart = _changing(data, family, edge)
-    # and several that are so but for a change that they share are believed where nothing better is found
+    # several rotors that only share one change are accepted where nothing better is found
     if family.is_told_apart or apart.is_told_apart or other is None or not other.is_told_apart:
         return apart
     return other
 
 
 def _is_one(family: Family | None) -> TypeGuard[Family]:
-    """True where a family is that of one rotor, or of a helicopter, and nothing is left."""
+    """True where a family is that of one resolved rotor, or of a helicopter."""
     return family is not None and family.is_told_apart and len(family.rotors.rates) == 1
 
 
 def _changing(data: Periodogram, family: Family, edge: float) -> Family:
-    """A family of several rotors whose rates change; the one given where none do, or that does not tell them apart.
+    """The family as several rotors of changing rates; the one given where none change or they stay unresolved.
 
-    Rotors that were told apart as steady ones, and are not, must be told apart as such that change. Where one side of
-    the body lies in the other, lines cross and speak for anything; so do those that come back from the other end of the
-    span, which are not sought. Nor are any where steady ones come to a single comb: one record in a hundred of several
-    that change smoothly; and of rates that wander, sought for a third of all the time, one in 276 was ever told.
+    Rotors resolved as steady whose rates change must be resolved as changing ones, else they are marked unresolved.
+    One-channel records are not searched, as lines of both sides cross and support anything; nor are folded lines, for
+    the same reason. Nor are records whose steady fit has a single comb: these are one in a hundred of several smoothly
+    changing rotors, and searching wandering rates took a third of all time and resolved one in 276.
     """
     known, comb = family.rotors, family.comb
     if family.gear is not None or len(known.rates) == 1:
@@ -319,9 +321,9 @@ def _changing(data: Periodogram, family: Family, edge: float) -> Family:
 
 
 def _known_as(fit: CombFit, changing: ChangingFit) -> CombFit:
-    """A comb of lines found in a record that was straightened, its rate that of the fit to the record as it is."""
+    """A comb found in a resampled record, with the spacing from the fit to the record as it is."""
     lines = fit.spacing / changing.spacing
-    whole = round(lines) if lines > 1 else 1 / max(round(1 / lines), 1)  # it may be every so many-th line, or between
+    whole = round(lines) if lines > 1 else 1 / max(round(1 / lines), 1)  # it may skip lines, or have more between
     std = max(changing.spacing_std / changing.spacing, fit.spacing_std / fit.spacing) * fit.spacing
     off = abs(whole / lines - 1) > FAR_OFF
     return replace(fit, spacing=fit.spacing if off else whole * changing.spacing, spacing_std=std)
@@ -335,9 +337,9 @@ def _as_it_is(
     *,
     recounts: int = RECOUNTS,
 ) -> tuple[Family | None, str]:
-    """`find_family` of rotors that turn evenly, or were made to, with the comb found, or why there is none.
+    """`find_family` for steady rates or a resampled record, given the comb found, or why there is none.
 
-    Where several rotors' combs meet about another of its lines, it is counted from that.
+    Where the combs of several rotors meet at another line of the comb, orders are counted from that line.
     """
     comb, why = found
     if comb is None:
@@ -357,7 +359,7 @@ def _as_it_is(
             anew = _as_it_is(data, counted, blades, even, recounts=recounts - 1)
             if anew[0] is not None and energy(anew[0].rotors.rest) < energy(rotors.rest):
                 return anew
-    if gear is None and len(rotors.rates) == 1:  # of several the lines lie anywhere
+    if gear is None and len(rotors.rates) == 1:  # lines of several rotors lie anywhere
         without, alike = without_weak_lines(data, comb, blades)
         again = find_gear(without, alike, furthest, blades) if without is not data else None
         if again is not None and again[0] is None and len(again[1].rates) == 1:
@@ -371,7 +373,7 @@ def _as_it_is(
     if even is None:
         ahead = ahead_left(data, [comb.fit], comb.rest)
         return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead), ""
-    # the mean rate is told from how it changes
+    # the mean rate is that of the fit with its change
     changing = even.fit
     if gear is not None:
         gear, changing = _geared(gear, even, data.level_of(comb.rest))
@@ -382,9 +384,9 @@ def _as_it_is(
 
 
 def _geared(gear: Gear, even: Straightened, level_about: Level) -> tuple[Gear, ChangingFit]:
-    """Two combs of a straightened record as they are in the record itself.
+    """Two combs of a resampled record, fitted to the record as it is.
 
-    One turn drives both: where one was led astray, the other tells how far ahead they are.
+    One gear drives both: where their fitted changes differ for sure, each is tried for both, and the best fit is kept.
     """
     combs = (gear.first.fit, gear.second)
 

@@ -1,4 +1,4 @@
-"""Where the line families of one or several rotors end, from the lines that were fitted or from all about them."""
+"""Edge of the line family of one or several rotors, from the fitted lines or from all power about the orders."""
 
 from collections.abc import Sequence
 
@@ -13,71 +13,73 @@ from .periodogram import Periodogram
 from .rotor_band import LEAK_SHARE, fit_edge
 from .rotors import Rotors
 
-#: Rates nearer than this at an order [bins] have one line there.
+#: Rotors whose lines at an order lie nearer than this [bins] have one line there.
 MERGED_BINS = 1.0
 
-#: The edge of several rotors' fitted lines holds if that of all about them agrees within so many of its deviations. It
-#: may be chance that both agree: the first is known no better than this share of what they differ by, or of the
-#: deviation.
+#: The edge of unresolved rotors' fitted lines is kept if that of all power about the orders agrees within
+#: AGREED_DEVIATIONS of the latter's. Agreement may be chance: the kept edge's standard deviation includes APART_SHARE
+#: of their difference, at least CHANCE_SHARE of the other's deviation.
 AGREED_DEVIATIONS, APART_SHARE, CHANCE_SHARE = 2.0, 0.7, 0.25
 
-#: All about the orders holds those lines too: where it ends before this share of their edge, known to that share of it,
-#: it says nothing of that. (A background's skirt may be so strong that what a rotor has past it is none beside it.)
+#: Power about the orders includes the fitted lines. If its edge is below ASTRAY_SHARE of theirs, which is known to
+#: ASTRAY_SURE of itself, it is ignored. (A background's skirt may be so strong that a rotor's lines past it are nothing
+#: beside it.)
 ASTRAY_SHARE, ASTRAY_SURE = 0.6, 0.02
 
-#: Share of the power of several rotors' family that does not count past its edge: what their inner lines leave between
-#: them lifts the level that the outer ones are read against.
+#: Share of the power of several rotors' family that is ignored past its edge: residue of their inner lines lifts the
+#: level that the outer ones are compared with.
 SEVERAL_LEAK = 0.005
 
-#: Rotors whose chopping frequencies differ by more than this have blades of another number or length, and their lines
-#: end at another order: the band is that of those which reach further.
+#: Rotors with less than this share of the fastest one's chopping frequency have blades of another number or length, and
+#: an edge at another order: the band is that of those which reach further.
 LIKE_SHARE = 0.75
 
-#: Of the sums of all about an order: variance over the square, beyond what the fit finds by itself, where the rotors'
-#: lines lie in one another, and what an edge is off by at least [lines].
+#: For sums of power about an order. AROUND_SCATTER: variance over the square, beyond what the fit finds by itself,
+#: where the rotors' lines overlap. AROUND_LINES: least standard deviation of an edge [lines].
 AROUND_SCATTER, AROUND_LINES = 0.2, 0.035
 
-#: The orders mix at the edge where the tips of the fastest and of the slowest rotor lie more than twice so far apart
-#: [lines].
+#: Orders mix at the edge where the tips of the rotors, spread evenly from the slowest to the fastest, have more than
+#: this standard deviation [lines].
 MIXED_LINES = 0.25
 
-#: With fewer orders seen below an edge the level is not known from which a family falls there.
+#: With fewer orders seen below an edge, the level from which the family falls there is unknown.
 LEVEL_ORDERS = 4
 
-#: Lines of unlike orders nearer than this [bins] cover one another.
+#: Lines of two rotors at different orders, nearer than this [bins], cover one another.
 COVERED_BINS = 1.5
 
-#: Lines stronger by this than the one on the other side and than most of so many beside it are another target's.
+#: A line FOREIGN_FACTOR times stronger than its counterpart on the other side and than the median within FOREIGN_ORDERS
+#: is another target's.
 FOREIGN_FACTOR, FOREIGN_ORDERS = 10.0, 8
 
-#: Lines are looked for so far from the body [cycles a sample], or further where those past the span are told from the
-#: others. A family that still stands there at this share of its mean power, by so many deviations of the noise, has no
-#: edge to be seen: what lies beyond has been folded back between its lines.
+#: Lines are sought out to SPAN from the body [cycles a sample], further where folded ones are told from the others. A
+#: family that has SPAN_SHARE of its mean power there, by SPAN_DEVIATIONS of the noise, has no visible edge: its further
+#: lines are folded back between the others.
 SPAN, SPAN_SHARE, SPAN_DEVIATIONS = 0.49, 0.05, 4.0
 
-#: The orders beyond this share of the span are those asked whether it ends there.
+#: Orders beyond this share of the span show whether lines fill it.
 SPAN_OUTER = 0.9
 
-#: Of the sums of all about an order, this share lies beyond the edge: the noise is no more than they have. So many
-#: deviations below its mean lies the lowest such share of what is noise alone.
+#: At least this share of the orders is taken to lie beyond the edge: that quantile of the power about the orders bounds
+#: the noise. For noise alone it lies NOISE_BELOW standard deviations below the mean.
 NOISE_ORDERS, NOISE_BELOW = 0.1, 1.28
 
-#: From so many times the edge on there is noise alone. Where its nearer and its further half differ by more than this
-#: and three deviations [nats], and by more than the share of the family's power that leaks there, the receiver's band
-#: is not flat.
+#: Beyond NOISE_FROM times the edge there is noise alone. If its nearer and its further half differ by more than
+#: UNEVEN_NATS plus three standard deviations [nats], and by more than UNEVEN_SHARE of the family's power, which leaks
+#: there, the receiver's band is not flat.
 NOISE_FROM, UNEVEN_NATS, UNEVEN_SHARE = 1.15, 0.1, 5e-4
 
-#: The noise shows between the lines of rotors not told apart where these are spread over less than this [orders].
+#: Noise shows between the lines of unresolved rotors where these are spread over less than this [orders].
 GAPS_SHOW = 0.4
 
-#: Rotors that are not told apart differ by about so much in their rates, relative.
+#: Least relative spread assumed of the rates of unresolved rotors.
 LEAST_SPREAD = 0.02
 
 
 def span_of(data: Periodogram, fits: Sequence[CombFit] = ()) -> float:
-    """How far from the body lines of a rotor are looked for [cycles a sample].
+    """How far from the body lines of a rotor are sought [cycles a sample].
 
-    `SPAN`, or further for one rotor whose fitted lines come back from the other end of it; up to the fastest tip's.
+    `SPAN`, or further for one rotor whose fitted lines are folded; at most the fastest tip's Doppler.
     """
     span = SPAN
     if len(fits) == 1 and fits[0].is_folded:
@@ -100,8 +102,8 @@ def edge_of_lines(
 ) -> tuple[float, float]:
     """Edge of the line family by the fitted lines, both sides together.
 
-    Each line's power is what is seen there with all other fitted lines taken out; an order's is the mean over both
-    sides and the single rotors, since their lines part at the outer orders.
+    Each line's power is measured with all other fitted lines subtracted; an order's is the mean over both sides and all
+    rotors, since their lines separate at the outer orders.
 
     Parameters
     ----------
@@ -121,8 +123,8 @@ def edge_of_lines(
     Returns
     -------
     edge, edge_std : float
-        The tip's Doppler frequency and its standard deviation [cycles a sample from the body]; 0 and infinity where
-        no lines part, infinity both where they fill the span.
+        The tip's Doppler frequency and its standard deviation [cycles a sample from the body]; 0 and infinity where no
+        lines are resolved, both infinite where they fill the span.
     """
     spacings = np.array([fit.spacing * per_turn for fit in fits])
     fastest = float(spacings.max())
@@ -153,7 +155,7 @@ def edge_of_lines(
     total = np.where(usable, power, 0.0).sum(axis=(0, 1))
     noise = np.where(usable, data.level_of(rest, evened=True)(frequency), 0.0).sum(axis=(0, 1))
     number = usable.sum(axis=(0, 1)).astype(float)
-    # where the single rotors' lines lie in one another they add up: those orders stand too high beside the outer ones
+    # where the rotors' lines overlap they add up: those orders are too strong beside the outer ones
     nearest = float(np.diff(np.sort(spacings)).min()) if len(fits) > 1 else 1.0
     seen = (number > 0) & (order * nearest * data.pulses >= MERGED_BINS)
     if not seen.any():
@@ -168,7 +170,7 @@ def edge_of_lines(
 
 
 def _unseen_about(seen: NDArray[np.intp], edge: float) -> int:
-    """How many orders that are not seen lie in one row about an edge, or below it: it may be anywhere among them."""
+    """Number of unseen orders in one row about an edge, or below it: it may be anywhere among them."""
     above = int(np.searchsorted(seen, edge))
     if above < LEVEL_ORDERS:
         return int(seen[0]) - 1
@@ -176,9 +178,9 @@ def _unseen_about(seen: NDArray[np.intp], edge: float) -> int:
 
 
 def _covered(spacings: NDArray[np.float64], order: NDArray[np.intp], pulses: int) -> NDArray[np.bool_]:
-    """True where another order of another rotor lies on a rotor's, shape (rotors, orders).
+    """True where a line of another order of another rotor covers a rotor's, shape (rotors, orders).
 
-    Past a slower rotor's edge it would pass for a line of its own, and what both hold is shared out between them.
+    Past a slower rotor's edge it would pass for that rotor's line, as the fit divides the power between both.
     """
     own, others = spacings[:, None, None], spacings[:, None]
     there = np.rint(order * own / others)
@@ -194,7 +196,7 @@ def _foreign(power: NDArray[np.float64], number: NDArray[np.floating]) -> NDArra
     power : ndarray, shape (2, orders)
         Power of the lines on each side of the body, summed.
     number : ndarray, same shape
-        Of the lines in each sum.
+        Number of lines in each sum.
     """
     known = number > 0
     mean = np.where(known, power / np.maximum(number, 1e-9), np.inf)
@@ -202,7 +204,7 @@ def _foreign(power: NDArray[np.float64], number: NDArray[np.floating]) -> NDArra
     near = np.sort(np.lib.stride_tricks.sliding_window_view(around, 2 * FOREIGN_ORDERS + 1, axis=-1), axis=-1)
     middle = np.isfinite(near).sum(axis=-1) // 2
     median = np.take_along_axis(near, middle[..., None], axis=-1)[..., 0]
-    # a rotor's lines are about as strong as their neighbours on one side, or as those on the other
+    # a rotor's line is about as strong as its neighbours, or as its counterpart on the other side
     return np.asarray(known & (mean > FOREIGN_FACTOR * np.maximum(median, mean[::-1])))
 
 
@@ -220,15 +222,15 @@ def _fills_span(
     away : ndarray, shape (orders,)
         Distance of each order from the body, rising [cycles a sample].
     total, noise : ndarray, shape (orders,)
-        Power of its lines with their noise, and of that alone, summed.
+        Summed power of its lines with noise, and of noise alone.
     bins : ndarray, shape (orders,)
-        In each sum.
+        Bins in each sum.
     span : float
         From `span_of`.
     """
     outer = (away > SPAN_OUTER * span) | (away == away[-1])
     excess, about = total - noise, float(noise[outer].sum())
-    # a sum of so few exponentials is often far above its mean: Wilson and Hilferty's cube root is nearly normal
+    # a sum of few exponentials is often far above its mean: Wilson and Hilferty's cube root is nearly normal
     number = about**2 / float((noise[outer] ** 2 / bins[outer]).sum())
     deviations = 3 * np.sqrt(number) * (np.cbrt(total[outer].sum() / about) - 1 + 1 / (9 * number))
     mean, outer_mean = float(excess.sum() / bins.sum()), float(excess[outer].sum() / bins[outer].sum())
@@ -244,10 +246,10 @@ def _amplitudes_at(fit: CombFit, orders: NDArray[np.intp]) -> NDArray[np.complex
 
 
 def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple[float, float]:
-    """Of unresolved rotors, the edge of the lines and its deviation, if it is the surer one; or that of all about them.
+    """Edge of unresolved rotors and its deviation: of the lines if that is surer, else of all power about the orders.
 
-    Rotors that were not told apart show in the second alone. It is known to its own deviation, whatever the first says;
-    the first no better than both agree, since lines of rotors that were not found may pass for some past the edge.
+    Only the second includes unresolved rotors. It keeps its own standard deviation. The first is known no better than
+    both agree, since lines of rotors not found may pass for lines past the edge.
 
     Parameters
     ----------
@@ -265,16 +267,16 @@ def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple
 
 
 def _uneven_past(order: NDArray[np.intp], mean: NDArray[np.float64], bins: NDArray[np.float64], edge: float) -> bool:
-    """True where what lies about the orders past an edge is no flat noise, by more than leaks there from within.
+    """True where the noise past an edge is not flat, by more than what leaks there from within.
 
     Parameters
     ----------
     order : ndarray of int, shape (orders,)
         Rising.
     mean, bins : ndarray, shape (orders,)
-        Mean power about each, and of how many bins.
+        Mean power about each order, and of how many bins.
     edge : float
-        Where a family is said to end [orders].
+        Edge of the family [orders].
     """
     past = np.flatnonzero(order > NOISE_FROM * edge)
     if len(past) < 2:
@@ -287,10 +289,10 @@ def _uneven_past(order: NDArray[np.intp], mean: NDArray[np.float64], bins: NDArr
 
 
 def _noise_about(smear: NDArray[np.float64], level: NDArray[np.float64], flat: float) -> NDArray[np.float64]:
-    """Noise of a receiver whose band is not flat, about each order of rotors that are not told apart.
+    """Noise about each order of unresolved rotors, for a receiver whose band is not flat.
 
-    The local level tells it; but where the lines fill all that lies between the orders they lift that. There it is no
-    more than what leads from the last level that is sure to the lowest of all.
+    It is the local level where the lines leave gaps. Where they fill the gaps they lift that level: there the noise is
+    at most an interpolation from the last sure level to the lowest of all.
 
     Parameters
     ----------
@@ -312,7 +314,7 @@ def _noise_about(smear: NDArray[np.float64], level: NDArray[np.float64], flat: f
 def edge_around(
     data: Periodogram, comb: Comb, rotors: Rotors, blades: int | None, lines: tuple[float, float]
 ) -> tuple[float, float]:
-    """Edge of the line family by all that lies about each order: rotors that are not told apart count too.
+    """Edge of the line family from all power about each order, so that unresolved rotors count too.
 
     Parameters
     ----------
@@ -321,11 +323,11 @@ def edge_around(
     comb : Comb
         The comb found in it.
     rotors : Rotors
-        What was told apart of it.
+        The rotors found in it.
     blades : int, optional
         Of a rotor.
     lines : (float, float)
-        From `edge_of_lines`, infinite too: where noise and lines may be taken for one another, it tells which is which.
+        From `edge_of_lines`, infinite too: decides where noise and lines may be taken for one another.
 
     Returns
     -------
@@ -350,15 +352,15 @@ def edge_around(
     if not seen.any():
         return 0.0, np.inf
     count = number[seen]
-    # what lies between the lines lifts the local level, and lines that fill most of the span the floor; the lowest
-    # means of so many exponentials are those of Wilson and Hilferty's cube
+    # power between the lines lifts the local level, and lines that fill most of the span the floor; `lowest` is that
+    # quantile for the mean of so many exponentials, by Wilson and Hilferty's cube
     lowest = (1 - 1 / (9 * count) - NOISE_BELOW / (3 * np.sqrt(count))) ** 3
     mean = total[seen] / count
     flat = min(float(np.quantile(mean / lowest, NOISE_ORDERS)), 1.0)
     noise = np.full(len(count), flat)
     if _fills_span(np.asarray(order[seen] * nominal, np.float64), total[seen], noise * count, count, span):
         return np.inf, np.inf
-    # once the lines part, what they have of one another falls with the square of their distance
+    # once the lines separate, their mutual leakage falls with the square of their distance
     scatter = np.asarray(AROUND_SCATTER / (1 + (2 * order[seen] * rotors.spread * pulses) ** 2), np.float64)
     relative = spread / nominal
 
@@ -380,7 +382,7 @@ def edge_around(
     if _uneven_past(order[seen], mean, count, edge):
         level = np.where(usable, data.level_at(frequency), 0.0).sum(axis=-1) * pulses / size
         other = fitted(_noise_about(order[seen] * relative, (level * own).sum(axis=0)[seen] / count, flat))
-        # strong lines near one another lift the level between them as a receiver's band does: the lines tell, if any
+        # strong lines close together lift the level between them as an uneven band does: the fitted lines decide
         one, another = (
             abs(tried * fastest - lines[0]) / np.hypot(its_std * fastest, lines[1]) if np.isfinite(lines[0]) else np.inf
             for tried, its_std in ((edge, std), other)
@@ -390,8 +392,8 @@ def edge_around(
             edge, std = other
             if not (another < AGREED_DEVIATIONS and one > 2 * AGREED_DEVIATIONS):
                 std = float(np.hypot(std, CHANCE_SHARE * apart))
-    # where the orders mix at the edge, the tips of the fastest and of the slowest are all that is told apart
+    # where orders mix at the edge, it is known only to lie between the tips of the slowest and the fastest
     mixed = edge * relative / np.sqrt(12)
-    # and the fastest of rotors that were not found turns by so much faster than any that was
+    # rotors not found may turn faster than the fastest found: the edge is uncertain by that
     hidden = edge * max(spread - float(np.ptp(rotors.rates)), 0.0) / nominal / 2
     return edge * fastest, float(np.hypot(std, mixed if mixed > MIXED_LINES else max(hidden, AROUND_LINES))) * fastest

@@ -1,9 +1,9 @@
-"""How often a lone rotor flashes in a period of its comb: unlike blades once each in a turn, like ones together.
+"""How often a lone rotor flashes in a period of its comb: once for like blades, once a blade for unlike ones.
 
-Blades as strong as one another, some rad apart in phase, have lines of one strength at every multiple of the rotation
-rate, so that no power tells that rate from the chopping frequency. But of blade m of N the line of order n has the
-phase -2 pi n m / N besides its own: on each side of the body they flash one after another, an N-th of the turn apart,
-each as strong as its blade.
+Blades of equal strength, some rad apart in phase, have equally strong lines at every multiple of the rotation rate, so
+that line power does not tell that rate from the chopping frequency. But line n of blade m of N has the extra phase -2
+pi n m / N: on each side of the body the blades flash one after another, an N-th of the turn apart, each as strong as
+its blade.
 """
 
 from collections.abc import Iterable
@@ -15,23 +15,23 @@ from scipy import fft
 from ..lines import squared
 from .comb_fit import CombFit
 
-#: Each side must have so many lines, of blades that reflect at their tips more: few of those add up anywhere. Flashes
-#: are read at so many places for each.
+#: Least lines a side, LEAST_OF_TIPS for blades that reflect at their tips: few of those add up anywhere. Flashes are
+#: read at FLASH_PADDING places for each line.
 LEAST_LINES, LEAST_OF_TIPS, FLASH_PADDING = 12, 24, 16
 
-#: What is so far from a flash is no part of it [1 / lines].
+#: Power further than this from a flash is no part of it [1 / lines].
 FLASH_WIDTH = 2.5
 
-#: Flashes hold this share of the power that is no noise, each has so much of the strongest one's, and none between so
-#: much of the weakest. Like blades, which flash once, have 0.08 in another place at -15 dB; those of some points along
-#: them hold up to 0.4 in four places.
+#: Flashes hold LEAST_SHARE of the power that is not noise, each has LEAST_FLASH of the strongest one's, and nothing
+#: between them exceeds MOST_RIVAL of the weakest. Like blades, which flash once, have 0.08 in another place at -15 dB;
+#: those of some points along them hold up to 0.4 in four places.
 LEAST_SHARE, LEAST_FLASH, MOST_RIVAL = 0.6, 0.1, 0.6
 
-#: At places evenly apart each holds this share of what it has at most nearby: two rotors of one rate, whose flashes are
+#: At its evenly spaced place each flash has this share of its maximum nearby: two rotors of one rate, whose flashes are
 #: apart by chance, do in one of a hundred records.
 LEAST_EVEN = 0.95
 
-#: With less, down to these, they may be either.
+#: With less, down to these, the number is unsure.
 UNSURE_SHARE, UNSURE_EVEN = 0.45, 0.7
 
 
@@ -45,8 +45,8 @@ def flashes_in_period(fit: CombFit, numbers: Iterable[int], tip: float) -> tuple
     numbers : iterable of int
         Numbers that are tried.
     tip : float
-        Order of the edge: blades may reflect along their length, or at their tips alone. These are seen twice at every
-        speed below the tip's, unless their lines are taken for the J_n(tip) that they are (the paper's eq. 24).
+        Order of the edge: blades may reflect along their length, or at their tips alone. Tips pass every speed below
+        their own twice, unless their lines are weighted by their J_n(tip) (the paper's eq. 24).
     """
     from scipy.special import jv  # here, because predicting needs no such import
 
@@ -72,14 +72,14 @@ def flashes_in_period(fit: CombFit, numbers: Iterable[int], tip: float) -> tuple
 def _evenly(
     order: NDArray[np.intp], amplitudes: NDArray[np.complex128], shape: NDArray[np.float64], number: int
 ) -> tuple[float, float]:
-    """Share of the power in so many flashes of one side, evenly apart, and how evenly; 0 where they are no flashes.
+    """Share of one side's power in `number` evenly spaced flashes, and how even they are; 0 where there are none.
 
     Parameters
     ----------
     order, amplitudes, shape : ndarray, shape (lines,)
-        The lines, and what each is of blades of one kind.
+        The lines, and the weight of each for one kind of blade.
     number : int
-        Of flashes.
+        How many flashes.
     """
     lines = np.zeros(order.max() + 1, np.complex128)
     lines[order] = amplitudes * shape

@@ -1,8 +1,8 @@
-"""The gain that all lines of a record share over the dwell: a beam that sweeps past, a range cell that is left, fading.
+"""The gain that all lines of a record share over the dwell: a beam sweeping past, a target leaving its cell, fading.
 
-Lines that swell and fall are wider than steady ones, all alike, and what a fit of steady ones leaves of them passes for
-more rotors. The gain is told from the lines fitted, as a factor on their sum, and divided out: lines are then what they
-would be, and noise is louder where they were weak.
+Lines of varying gain are wider than steady ones, all alike, and the residual of a steady fit passes for more rotors.
+The gain is estimated as a factor on the sum of the fitted lines, and divided out. Lines are then steady, and noise is
+louder where the gain was low.
 """
 
 from collections.abc import Sequence
@@ -17,28 +17,29 @@ from ..spectrum import Spectrum
 from .comb_fit import CombFit, fit_combs
 from .periodogram import Periodogram, prepared_again
 
-#: The gain is a sum of Legendre polynomials in time up to this degree, and to this share of the flashes in the dwell.
+#: The gain is a sum of Legendre polynomials in time, up to DEGREE and up to FLASH_SHARE of the number of flashes in the
+#: dwell.
 DEGREE, FLASH_SHARE = 8, 0.75
 
-#: What the lines explain more by it is no chance from so many nats on.
+#: Least increase in log likelihood for a gain that is not chance [nats].
 LEAST_NATS = 15.0
 
-#: Nowhere is it taken to be below this share of the root of its mean square.
+#: The gain is nowhere taken to be below this share of its root mean square.
 LEAST_GAIN = 0.1
 
-#: Combs are fitted so many times at most as their gain becomes known.
+#: Fits of the combs at most, each after a better estimate of their gain.
 FITTED_STEPS = 4
 
 
 def gain_left(data: Periodogram, rest: NDArray[np.complex128], chopping: float) -> tuple[NDArray[np.float64], float]:
-    """Gain over the dwell that lines still have, and how much of what they leave it explains.
+    """Gain over the dwell that lines still have, and the share of their residual that it explains.
 
     Parameters
     ----------
     data : Periodogram
         The record.
     rest : ndarray of complex128, shape (pulses,)
-        What the lines fitted leave of its samples.
+        Residual of the lines fitted to its samples.
     chopping : float
         Chopping frequency [cycles a sample].
 
@@ -47,7 +48,7 @@ def gain_left(data: Periodogram, rest: NDArray[np.complex128], chopping: float) 
     gain : ndarray of float64, shape (pulses,)
         Its mean, weighed by the power of the lines, is 1.
     share : float
-        Share of the power left, without the noise, that it explains, 0 to 1; 0 where it may be chance.
+        Share of the residual power, less noise, that the gain explains, 0 to 1; 0 where it may be chance.
     """
     pulses = data.pulses
     degree = min(DEGREE, int(FLASH_SHARE * chopping * pulses))
@@ -65,18 +66,18 @@ def gain_left(data: Periodogram, rest: NDArray[np.complex128], chopping: float) 
 
 @dataclass(frozen=True)
 class Evened:
-    """A record as if its lines had been as strong all the time, as far as their gain is known.
+    """A record with the gain of its lines, as far as known, divided out.
 
     Parameters
     ----------
     whole : Periodogram
         The record as it is.
     spectrum : Spectrum
-        What that was prepared with.
+        Spectrum it was prepared with.
     gain : ndarray of float64, shape (pulses,)
-        What its lines have.
+        Gain of its lines.
     record : Periodogram
-        The record with that divided out.
+        The record with that gain divided out.
     """
 
     whole: Periodogram
@@ -90,7 +91,7 @@ class Evened:
         return cls(data, spectrum, np.ones(data.pulses), data)
 
     def by(self, gain: NDArray[np.float64]) -> Self:
-        """With a gain that its lines have besides divided out."""
+        """The same with a further gain of its lines divided out."""
         gain = self.gain * gain
         noise = np.maximum(gain / np.sqrt((gain**2).mean()), LEAST_GAIN) ** -2.0
         noise /= noise.mean()
@@ -102,12 +103,12 @@ class Evened:
     def further(
         self, data: Periodogram, rest: NDArray[np.complex128], chopping: float, least_share: float
     ) -> Self | None:
-        """By what lines in it, or in what was made of it, leave; None where a gain explains less than a share of it."""
+        """The same with the gain seen in a residual divided out; None where that explains less than a share of it."""
         gain, share = gain_left(data, rest, chopping)
         return self.by(gain) if share >= least_share else None
 
     def fitted_to(self, fits: Sequence[CombFit], least_share: float) -> Self:
-        """The same once combs are fitted to it, as often as that tells more of their gain."""
+        """The same after repeated fits of combs, while each shows more of their gain."""
         even = self
         for _ in range(FITTED_STEPS):
             spacings = [fit.spacing for fit in fits]

@@ -1,9 +1,9 @@
 """Main and tail rotor of a helicopter: a second comb about the same body line, a gear ratio away from the first.
 
-The first comb is fitted and taken out, and its places no longer count; what the lines left over repeat at is the second
-one. Other things leave lines between those of a comb too: unequal blades, further rotors of nearly the same rate, a
-rate that changed. None of these repeats at a gear ratio without repeating as well at a fraction or a multiple of it, so
-a second comb must beat all of these.
+The first comb is fitted and subtracted, and bins near its lines no longer count; the lines left over give the second
+one. Unequal blades, further rotors of nearly the same rate, or a rate that changed leave lines between those of a comb
+too. None of these repeats at a gear ratio without repeating as well at a fraction or a multiple of it, so a second comb
+must beat its own fractions and multiples.
 """
 
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ from .slow_lines import remove_bands
 from .unlike_blades import strong_multiple
 from .unresolved import judged
 
-#: Ratio of tail to main chopping frequency: 4.73 in the paper, 4 to 6 in general, and some room.
+#: Ratio of tail to main chopping frequency: 4.73 in the paper, 4 to 6 in general, with some margin.
 GEAR_RANGE = (2.5, float(MOST_GEAR))
 
 #: Score a second comb must exceed [nats]. Checked by tests/benchmarks/measurement_tables.py.
@@ -40,21 +40,22 @@ FRACTION_SHARE = 0.12
 #: Places this near to a line of the first comb do not count [bins].
 SHADOW_BINS = 1.3
 
-#: Lines of the two combs nearer than this are one [bins].
+#: Lines of the two combs nearer than this coincide [bins].
 MEETING_BINS = 1.5
 
-#: Tips of main and tail rotor are about as fast: lines of either reach no further than so many times the other's edge.
+#: Main and tail rotor have about equal tip speeds: the second comb's lines are sought out to this multiple of the first
+#: one's edge.
 FURTHEST_TIP = 2.0
 
-#: By so much in power are lines of the second comb stronger that alone are its chopping frequency apart. Points at the
-#: tips of three blades make every second line five times stronger.
+#: Least power of the second comb's strong lines over its weak ones for the strong ones alone to give its chopping
+#: frequency. Points at the tips of three blades make every second line five times stronger.
 UNLIKE_FACTOR = 7.0
 
-#: So many times the score of a second comb that of one about another strong line must exceed to be another body's: of
-#: most drones in one cell it is 1.7 times and more, about a strong line of a tail itself 0.98 at most.
+#: A comb about another strong line is another body's if its score exceeds the second comb's by this factor: for most
+#: drones in one cell by 1.7 and more, about a strong line of a tail itself by 0.98 at most.
 FOREIGN_SHARE = 1.2
 
-#: Candidates looked at closely.
+#: Candidates that are refined.
 CLOSER = 4
 
 SEVERAL = "no second comb: several rotors of nearly one rate, or of a changing one"
@@ -67,14 +68,14 @@ class Gear:
     Parameters
     ----------
     first : Comb
-        The comb that was found first, fitted again without the second.
+        The comb that was found first, fitted again jointly with the second.
     second : CombFit
-        The other one.
+        The second comb.
     alone : Periodogram
         The record without the second comb.
     per_turn : int
-        Every how many-th line of the other one is strong and tells its chopping frequency: unlike blades have lines at
-        every multiple of their rotation rate, and what else the first comb leaves may lie at a fraction of both.
+        Every how many-th line of the second comb is strong and gives its chopping frequency: unlike blades have lines
+        at every multiple of their rotation rate, and other residue of the first comb may lie at a fraction of both.
     """
 
     first: Comb
@@ -104,9 +105,9 @@ class Gear:
 def find_gear(data: Periodogram, comb: Comb, edge: float, blades: int | None) -> tuple[Gear | None, Rotors, str]:
     """Find a second comb a gear ratio from the first, and the single rotors of the first.
 
-    Several rotors of nearly one rate leave so many lines that some of them pass for a second comb. Where such explain
-    the record, none is sought; where they do not, they are separated again without the second comb's lines: a
-    helicopter leaves a single one.
+    Several rotors of nearly one rate have so many lines that some pass for a second comb. If such rotors explain the
+    record, no second comb is sought. Otherwise rotors are separated again without the second comb's lines: a helicopter
+    then leaves a single one.
 
     Parameters
     ----------
@@ -141,7 +142,7 @@ def find_gear(data: Periodogram, comb: Comb, edge: float, blades: int | None) ->
 
 
 def _second_comb(data: Periodogram, comb: Comb, furthest: float) -> tuple[Gear | None, str]:
-    """The second comb of a record, of lines up to so far from the body [cycles a sample], or why there is none."""
+    """The second comb of a record, of lines out to `furthest` from the body [cycles a sample], or why there is none."""
     if comb.fit.spacing * data.pulses < 2 * SHADOW_BINS + 1:
         return None, "dwell too short: a second comb could not be told from the first one's lines"
     rest, hidden = _left_over(data, comb)
@@ -164,14 +165,14 @@ def _second_comb(data: Periodogram, comb: Comb, furthest: float) -> tuple[Gear |
     gear = Gear(replace(comb, fit=first, rest=samples), second, data.left(data.samples - lines))
     if not GEAR_RANGE[0] <= gear.ratio <= GEAR_RANGE[1]:
         return None, "no second comb: its fit left the range of gear ratios"
-    # a whole ratio: every line of the one falls on one of the other, and unequal blades do the same
+    # integer ratio: every line of one comb falls on one of the other, as with unequal blades
     (main, _), (tail, _) = gear.rates
     off = abs(gear.ratio - round(gear.ratio)) * main
     outer = max(-best.low, best.high) * best.spacing
     if off * outer / tail * data.pulses < MEETING_BINS:
         return None, f"no second comb: {gear.ratio:.3f} to 1 is a whole ratio, as of unequal blades"
     gear = replace(gear, per_turn=_lines_per_turn(second.orders, powers_over_noise(data, second, samples)))
-    if gear.ratio < GEAR_RANGE[0]:  # more than the highest may be: tails have up to four blades for each of the main
+    if gear.ratio < GEAR_RANGE[0]:  # above the range is possible: tails have up to four blades for each main one
         return None, f"no second comb: its strong lines are {gear.ratio:.3f} to 1, which is no gear's"
     return gear, ""
 
@@ -186,7 +187,7 @@ def _lines_per_turn(orders: NDArray[np.intp], power: NDArray[np.float64]) -> int
 
 
 def _left_over(data: Periodogram, comb: Comb) -> tuple[Periodogram, NDArray[np.bool_]]:
-    """The record without a comb over its own local level, and the bins hidden: strong lines leaked into the old one."""
+    """The residual of a comb over its own local level, as strong lines leak into the old one; and the bins hidden."""
     rest = data.left(comb.rest)
     hidden = _hidden(rest, comb.fit)
     power = rest.power * rest.level
@@ -195,7 +196,7 @@ def _left_over(data: Periodogram, comb: Comb) -> tuple[Periodogram, NDArray[np.b
 
 
 def _hidden(rest: Periodogram, first: CombFit) -> NDArray[np.bool_]:
-    """True in the bins that the first comb or what was taken out hides."""
+    """True in the bins hidden by lines of the first comb or by what was taken out."""
     bins = np.arange(len(rest.power)) / len(rest.power)
     orders = from_whole(bins - first.centre) / first.spacing
     near = np.abs(from_whole(orders)) * first.spacing * rest.pulses < SHADOW_BINS
@@ -231,7 +232,7 @@ def _rival(rest: Periodogram, evidence: Evidence, hidden: NDArray[np.bool_], bes
 def _loudest(
     rest: Periodogram, evidence: Evidence, first: Comb, limits: tuple[float, float], furthest: float
 ) -> Candidate | None:
-    """The comb a gear ratio from the first that speaks loudest."""
+    """The comb at a gear ratio from the first that has the highest score."""
     low, high = GEAR_RANGE
     chopping, centre = first.chopping, first.fit.centre
     spacings = np.concatenate(
@@ -244,7 +245,7 @@ def _loudest(
 
 
 def _foreign(rest: Periodogram, evidence: Evidence, first: Comb, limits: tuple[float, float], furthest: float) -> float:
-    """What speaks for a comb of any spacing about a strong line that is none of the first comb's [nats]."""
+    """Highest score of a comb of any spacing about a strong line that is none of the first comb's [nats]."""
     fit, spacings, most = first.fit, _geometric(*limits, rest.pulses), 0.0
     for centre in rest.strong.centres if len(spacings) else ():
         off = (centre - fit.centre) / fit.spacing
@@ -256,7 +257,7 @@ def _foreign(rest: Periodogram, evidence: Evidence, first: Comb, limits: tuple[f
 def _loudest_of(
     spacings: NDArray[np.float64], rest: Periodogram, evidence: Evidence, centre: float, furthest: float
 ) -> Candidate:
-    """The comb about a centre, of spacings that rise or of those near them, that speaks loudest."""
+    """The comb about a centre, of rising spacings or ones near them, that has the highest score."""
     loudest = spacings[np.argsort(_even_heights(evidence, spacings, centre, furthest))[: -CLOSER - 1 : -1]]
     return _closest(rest, evidence, loudest, centre)
 
@@ -264,7 +265,7 @@ def _loudest_of(
 def _even_heights(
     evidence: Evidence, spacings: NDArray[np.float64], centre: float, furthest: float
 ) -> NDArray[np.float32]:
-    """Best evidence of each spacing, rising, with both sides equally far; at least 0."""
+    """Highest evidence at each of rising spacings, both sides reaching equally far; at least 0."""
     size = evidence.rows.shape[-1]
     # both sides at once: the spectrum folded about the centre
     middle, away = round(centre * size), np.arange(size // 2 + 1)
@@ -278,14 +279,14 @@ def _even_heights(
 
 
 def _geometric(low: float, high: float, pulses: int) -> NDArray[np.float64]:
-    """Spacings in steps of a bin at the end of the span."""
+    """Spacings in steps that move a line at the end of the span by a bin."""
     if low >= high:
         return np.empty(0)
     return np.geomspace(low, high, int(np.log(high / low) * pulses / 2) + 2)
 
 
 def _closest(rest: Periodogram, evidence: Evidence, spacings: NDArray[np.float64], centre: float) -> Candidate:
-    """The best of spacings and of those near them."""
+    """The comb of the highest score at spacings or near them."""
     tried = np.outer(spacings, factors_about(rest.pulses, 2 * FINE_STEPS, FINE_STEPS)).ravel()
     best = tried[[heights(evidence, tried, np.full(len(tried), centre)).argmax()]]
     (height,), (low,), (high,) = score(evidence, best, np.array([centre]))

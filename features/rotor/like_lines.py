@@ -1,9 +1,8 @@
-"""How far the lines of several rotors told apart are those of like rotors.
+"""How far the lines of several resolved rotors are those of like rotors.
 
-Of like blades the lines of two rotors differ, on either side of the body, by a factor and by equal steps in phase from
-order to order, whatever the blades are: by when they flash. Those of two rotors that one comb holds, of rates nearer
-than the dwell tells apart, are a sum of two such: half of it, about, is like another's. That shows in few lines too,
-which do not part a second flash from the first.
+Lines of two rotors of like blades differ, on each side of the body, by a factor and by equal phase steps from order to
+order, which tell when they flash. A merged comb of two unresolved rotors is a sum of two such sets: only about half of
+its power matches another comb. This shows in few lines too, which do not resolve a second flash.
 """
 
 from collections.abc import Sequence
@@ -18,7 +17,7 @@ from .flash_count import FLASH_PADDING
 
 
 def like_shares(fits: Sequence[CombFit], edge: float) -> NDArray[np.float64]:
-    """Share of the power of each comb's lines that is as another's, or as of blades that reflect along their length.
+    """Share of each comb's line power that matches another comb, or blades that reflect along their length.
 
     Parameters
     ----------
@@ -30,10 +29,10 @@ def like_shares(fits: Sequence[CombFit], edge: float) -> NDArray[np.float64]:
     Returns
     -------
     ndarray of float64, shape (combs,)
-        About 1 for like rotors: noise, which all combs hold, is allowed for. 0 without lines.
+        About 1 for like rotors, as noise, which all combs hold, is allowed for. 0 without lines.
     """
     lines, signal = _by_order(fits, edge)
-    # rotors that turn the other way have what these have before they come straight on, after it
+    # rotors that turn the other way have the two sides of the body exchanged
     shapes = np.concatenate([np.ones_like(lines[:1]), lines, lines[:, ::-1]])
     certain = np.concatenate([np.ones_like(signal[:1]), signal, signal[:, ::-1]])
     shares = np.zeros(len(fits))
@@ -48,7 +47,7 @@ def like_shares(fits: Sequence[CombFit], edge: float) -> NDArray[np.float64]:
 
 
 def _by_order(fits: Sequence[CombFit], edge: float) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
-    """Combs' lines on both sides of the body, and which share of their power is no noise's, by their orders.
+    """Combs' lines on both sides of the body, and the share of their power that is not noise, by order.
 
     Returns
     -------
@@ -62,6 +61,6 @@ def _by_order(fits: Sequence[CombFit], edge: float) -> tuple[NDArray[np.complex1
             own = (sign * fit.orders > 0) & (sign * fit.orders * fit.spacing <= edge)
             order = np.abs(fit.orders[own])
             lines[number, side, order] = fit.amplitudes[own]
-            # these are held back as far as noise makes them
+            # the fit shrinks these by that factor
             signal[number, side, order] = fit.snr[own] / (1 + fit.snr[own])
     return lines, signal

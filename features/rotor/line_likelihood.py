@@ -1,4 +1,4 @@
-"""How likely the powers of lines are, if their family has this shape, whatever its level and however it bends."""
+"""Likelihood of line powers for a family of given shape, at the likeliest level and bends."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,25 +7,25 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-#: No blade reflects quite evenly: where a line is strong, at so large a share of the tip's order, tells how that place
-#: on the blade reflects. The logarithm of the powers follows these powers of the distance from the tip, each by a
-#: factor of this standard deviation, or next to nothing. (Chords that taper to half at the tip are off by 2 % with none
-#: of it, and then by less than 1 %.)
+#: No blade reflects quite evenly: a line at some share of the tip's order shows how the blade reflects at that share of
+#: its length. The logarithm of the powers gets terms in the powers BENDS of the distance from the tip, each with a
+#: factor of prior standard deviation BEND_STD, or PLAIN_BEND for next to none. (Edges of chords that taper to half at
+#: the tip are off by 2 % without these terms, by less than 1 % with them.)
 BENDS, BEND_STD, PLAIN_BEND = (0.5, 1.0, 2.0), 1.0, 0.05
 
 #: Gauss-Newton steps of the level and its bends, none of them larger than this [nepers of power].
 LEVEL_STEPS, LONGEST_STEP = 2, 3.0
 
-#: In place of sums that may be 0.
+#: Replaces sums that may be 0.
 LEAST_SUM = 1e-30
 
-#: What single precision leaves of a direction that the others explain: no pivot is a smaller share of its diagonal.
+#: Least pivot over its diagonal element: what single precision leaves of a direction that the others explain.
 LEAST_PIVOT = 1e-6
 
 
 @dataclass(frozen=True)
 class OrderPowers:
-    """What was seen at the orders of a line family.
+    """Powers seen at the orders of a line family.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class OrderPowers:
     bins : ndarray, shape (lines,)
         Independent bins in each mean.
     scatter : ndarray, shape (lines,)
-        What is known beforehand of how unlike the model the powers are: variance over the mean's square.
+        Known variance of the powers about the model, over the mean's square.
     """
 
     order: NDArray[np.intp]
@@ -47,12 +47,12 @@ class OrderPowers:
 
     @property
     def loud(self) -> float:
-        """Level of the lines that stand out, the mean over their power."""
+        """Level of the lines that stand out: mean excess over the noise, weighted by itself."""
         excess = np.maximum(self.power - self.noise, 0.0)
         return float((excess**2).sum() / max(excess.sum(), 1e-9))
 
     def upto(self, furthest: float) -> Self:
-        """Those up to an order, the first at least: that nothing is there speaks too."""
+        """Those up to an order, the first at least: empty orders are evidence too."""
         near = self.order <= max(furthest, self.order[0])
         return type(self)(self.order[near], self.power[near], self.noise[near], self.bins[near], self.scatter[near])
 
@@ -66,40 +66,40 @@ def log_likelihood(
     shares: NDArray[np.float64],
     leaks: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Log likelihood of line powers in noise, the family's level and bends the likeliest.
+    """Log likelihood of line powers in noise, at the likeliest level and bends of the family.
 
-    A mean of |line + noise|^2 as a gamma law of the same mean and variance: exact for noise alone.
+    A mean of |line + noise|^2 is taken as a gamma variate of the same mean and variance: exact for noise alone.
 
     Parameters
     ----------
     lines : OrderPowers
         What was seen.
     shape : ndarray, shape (lines, families)
-        Powers of each family's lines, side by side in memory, as what is done to each line is the same for all.
+        Line powers of each family; the families lie side by side in memory, as all lines are treated alike.
     away : ndarray, shape (lines,)
-        How far from the tip each line speaks of, 0 at the tip to 1 at the hub.
+        Distance from the tip that each line stands for, 0 at the tip to 1 at the hub.
     start : ndarray, shape (len(BENDS),)
         Bends to begin from.
     bend_std : float
-        How far each may go.
+        Prior deviation of each.
     shares : ndarray, shape (shares,)
-        How unlike the model the powers may be, beyond their `scatter`: variance over the mean's square.
+        Variances of the powers about the model, beyond their `scatter`, over the mean's square.
     leaks : ndarray, shape (leaks,)
-        Powers that do not count, each tried with each of the shares.
+        Leakage powers, each tried with each of the shares.
 
     Returns
     -------
     nats : ndarray, shape (leaks, shares, families)
-        But for a constant.
+        Up to a constant.
     bends : ndarray, shape (len(BENDS),)
-        The likeliest of all.
+        Those of the likeliest.
     """
-    unit = 1 / float(lines.power.max() + leaks.max())  # no square of a power leaves single precision
+    unit = 1 / float(lines.power.max() + leaks.max())  # keeps squared powers within single precision
     power, noise, bins = lines.power * unit, lines.noise * unit, lines.bins
     leak, share = np.repeat(leaks * unit, len(shares)), np.tile(shares, len(leaks))
     bends = np.stack([away**exponent for exponent in (0.0, *BENDS)], axis=1)
     each = (len(power), len(leak), shape.shape[1])
-    # exponentials take a fifth of the time in single precision, and what these are off by is none here
+    # exponentials take a fifth of the time in single precision, whose errors do not matter here
     single = [
         values.astype(np.float32)
         for values in (
@@ -111,7 +111,7 @@ def log_likelihood(
         )
     ]
     excess, family, by_line, beat, own = single
-    # past the edge of a narrow family there may be no line at all: its level is then anyone's guess
+    # a narrow family may have no line at the orders seen: its level is then arbitrary
     like = family * np.exp(bends[:, 1:] @ start).astype(np.float32)[:, None, None]
     level = np.maximum((excess * like).sum(axis=0) / np.maximum((like**2).sum(axis=0), LEAST_SUM), 1e-6 * unit)
     bent = np.empty((bends.shape[1], each[1] * each[2]))
@@ -124,7 +124,7 @@ def log_likelihood(
     mean = line + (noise[:, None] + leak)[..., None].astype(np.float32)
     number = mean**2
     number /= _variance(line, by_line, beat, own)
-    # of numbers this large what the ratio leaves of 1 counts: its logarithm in double precision
+    # with numbers this large small deviations of the ratio from 1 count: its logarithm in double precision
     ratio = (power[:, None] + leak)[..., None] / mean
     nats = np.log(ratio)
     nats -= ratio
@@ -144,15 +144,15 @@ def _stepped(
     each: tuple[int, int, int],
     single: Sequence[NDArray[np.float32]],
 ) -> NDArray[np.float64]:
-    """Step level and bends, in place, to the likeliest of each family; logarithms of their informations' determinants.
+    """Step level and bends, in place, to each family's likeliest; the log determinants of their informations.
 
-    The entries of `single` are in single precision: at the likeliest a step that is off by 1e-6 is none.
+    The entries of `single` are in single precision: near the likeliest, an error of 1e-6 in a step does not matter.
     """
     excess, family, by_line, beat, own = single
     places = [(row, column) for row in range(len(bent)) for column in range(row + 1)]
     pairs = np.stack([bends[:, row] * bends[:, column] for row, column in places]).astype(np.float32)
     along = bends.astype(np.float32)
-    # a level of any size is as likely, what is left of its logarithm counts as if it were known to one
+    # the level has a flat prior; its information counts as if its logarithm were known to 1
     known = np.array([1.0, *[bend_std**-2] * (len(bent) - 1)])
     held = known * (np.arange(len(bent)) > 0)
     left = np.zeros(bent.shape[1])
@@ -187,7 +187,7 @@ def solved(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Solutions of many small positive definite systems, and the logarithms of their determinants, by Cholesky.
 
-    The entries of the lower triangles stand by (row, column), those of each over the systems; likewise the vectors.
+    `matrix` has the lower triangles by (row, column), each entry over all systems; `vector` likewise by row.
     """
     size = len(vector)
     root: dict[tuple[int, int], NDArray[np.float64]] = {}

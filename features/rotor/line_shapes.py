@@ -1,7 +1,7 @@
 """How strong the lines of a rotor are, order by order, for blades that reflect in several ways.
 
 The line of rotation order n of a blade whose reflectivity is g(u), u = 0..1 from the hub to the tip, has the amplitude
-of the n-th Fourier coefficient of the integral of g(u) exp(j Gamma u cos(theta)): for all of it at the tip J_n(Gamma),
+of the n-th Fourier coefficient of the integral of g(u) exp(j Gamma u cos(theta)): with g at the tip alone J_n(Gamma),
 the paper's eq. (24). Gamma, the phase deviation at the tip (eq. 16), is the tip's Doppler frequency in rotation rates.
 """
 
@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-#: How likely beforehand blades are that reflect evenly, points at their tips, a model of the literature rather than a
-#: blade, blades that begin anywhere between these shares of their length, and even ones with a point at the tip, of so
-#: large a share of the amplitude of the whole blade at rest and of a phase whose cosine is 0 or, to either side, this.
+#: PROFILES: prior probabilities of blades that reflect evenly; at their tips alone, a model of the literature rather
+#: than a blade; from a beginning anywhere between the shares ROOTS of their length; and evenly with a point at the tip,
+#: of TIP_AMPLITUDE of the whole blade's amplitude at rest and a phase of cosine 0, TIP_COSINE or -TIP_COSINE.
 PROFILES, ROOTS, TIP_AMPLITUDE, TIP_COSINE = (0.5, 0.05, 0.35, 0.04, 0.03, 0.03), (0.03, 0.6), 0.2, 0.87
 
-#: Lines this weak beside a blade at rest, 60 dB under any that counts, are none: single precision leaves a third of it,
-#: and beyond so large a phase deviation [rad] more with its root.
+#: Lines below LEAST_AMPLITUDE of a blade at rest, 60 dB under any that counts, are set to 0: single precision errs by a
+#: third of it, and beyond a phase deviation of EXACT_TO [rad] by more with its root.
 LEAST_AMPLITUDE, EXACT_TO = 1e-6, 300.0
 
-#: In place of 0 [rad].
+#: Replaces 0 [rad].
 NEAR_ZERO = 1e-4
 
-#: What lies about an order reaches to the middle between its neighbours: as good as so far more to either side [1].
+#: Power about an order counts to midway between its neighbours: effectively this far to either side [orders].
 WINDOW_ORDERS = 0.35
 
 
@@ -33,7 +33,7 @@ def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[
     gamma : ndarray, shape (tips,)
         Phase deviation at the tip [rad].
     blades : int
-        Equal blades: only every so many-th order has a line.
+        Number of equal blades: only its multiples have a line.
     count : int
         Lines wanted, orders `blades` to `count` x `blades`.
 
@@ -43,10 +43,10 @@ def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[
         Relative to a blade at rest.
     """
     widest = float(gamma.max())
-    # of an even number of blades only the real part is there, the same on both sides of a right angle
+    # for an even number of blades only the real part remains, the same on both sides of a right angle
     fold = 2 - blades % 2
     orders = blades // fold * np.arange(1, count + 1)
-    # orders past the middle of the transform stand for what lies beyond the tip, where nothing is
+    # long enough for the transform's aliases to fall beyond the tip, where there are no lines
     beyond = int(widest + 6 * widest ** (1 / 3)) // fold
     steps = fft.next_fast_len(max(count * blades // fold, (count * blades // fold + beyond) // 2) + 8, real=True)
     # single precision, 1e-7 of a blade at rest: lines weaker than 1e-3 of the family's do not count
@@ -61,10 +61,10 @@ def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[
         own = orders % 2 == odd if fold == 1 else slice(None)
         amplitudes[..., own] = fft.dct(part, 1)[..., orders[own]]
     amplitudes /= 2 * steps
-    # or rounding would be lines of a family that ends far below them
+    # else rounding errors would be lines past the edge of a family
     amplitudes *= np.abs(amplitudes) > LEAST_AMPLITUDE * np.sqrt(np.maximum(gamma / EXACT_TO, 1.0))[:, None]
     even, tip = amplitudes**2
-    # a blade that begins further out has no lines of inner orders but what both its ends leave of each other's ripple
+    # at orders inside its beginning a blade has no lines but the ripple of both its ends
     begins = np.clip((blades * np.arange(1, count + 1) / gamma[:, None] - ROOTS[0]) / (ROOTS[1] - ROOTS[0]), 0, 1)
     level = 1 / gamma[:, None]
     ends = (np.abs(amplitudes[0]) - level) ** 2 + level**3 / (np.pi * np.mean(ROOTS))
@@ -73,11 +73,10 @@ def line_powers(gamma: NDArray[np.float64], blades: int, count: int) -> NDArray[
 
 
 def spread_powers(gamma: NDArray[np.float64], blades: int, count: int, spread: float) -> NDArray[np.float64]:
-    """`line_powers` as they lie about each order where the rotors' rates differ by so much, relative.
+    """`line_powers` about each order where the rotors' rates are spread over `spread`, relative.
 
-    The line of order n of a rotor whose rate is r stands where that of order n r of the mean rate would. What lies
-    about an order is then the mean over those that come to lie there, each line's power spread evenly to the middle
-    between its neighbours.
+    Line n of a rotor at r times the mean rate lies at order n r of the mean rate. The power about an order is the mean
+    over the lines that fall there, each spread evenly to midway between its neighbours.
     """
     half = WINDOW_ORDERS + np.arange(1, count + 1) * spread / 2
     if half[-1] < 0.5:

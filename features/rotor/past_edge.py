@@ -1,8 +1,7 @@
-"""Whether blades still flash past where their lines are said to end: those then fill the span, and end nowhere in it.
+"""Whether blades still flash past the edge of their lines: the lines then fill the span and have no edge in it.
 
-Noise, a background and what strong lines leak have no rhythm. Lines of tips some times faster than the unambiguous
-velocity come back all over the span: between those that are told apart they pass for noise, but come and go with the
-blades.
+Noise, a background and leakage of strong lines have no rhythm. Lines of tips several times faster than the unambiguous
+velocity fold all over the span: between resolved lines they pass for noise, but pulse with the blades.
 """
 
 from collections.abc import Sequence
@@ -18,24 +17,24 @@ from .comb_fit import CombFit
 from .periodogram import PADDING, Periodogram
 from .slow_lines import remove_bands
 
-#: Past the edge is what lies further than so many of its deviations and this times the width of its roll-off,
-#: Gamma^(1/3) orders; and all the last of the span in any case, from here on [cycles a sample].
+#: Past the edge: further out by EDGE_DEVIATIONS of its standard deviations and ROLL_OFF widths of its roll-off,
+#: Gamma^(1/3) orders; and in any case all from LAST on [cycles a sample], the last of the span.
 EDGE_DEVIATIONS, ROLL_OFF, LAST = 3.0, 1.0, 0.46
 
-#: Bins past the edge, and within it, that tell.
+#: Least bins past the edge, and within it.
 LEAST_BINS = 50
 
-#: Rates so far apart have their flashes told apart [bins].
+#: Step of the flash rates tried [bins].
 RATE_BINS = 0.25
 
-#: Harmonics of the flashes that are added up, at most, and up to this frequency [cycles a sample]; not those that are
-#: about as far apart as the band is wide, or between its parts: they beat with so small a share of it.
+#: Up to HARMONICS harmonics of the flash rate are summed, at frequencies up to HIGHEST [cycles a sample]; none by which
+#: the band, if shifted, overlaps itself by less than LEAST_OVER: little of it beats there.
 HARMONICS, HIGHEST, LEAST_OVER = 8, 0.25, 0.1
 
-#: What lies past the edge flashes where noise does as much once in exp(this) records, and by this share of what lies
-#: within it. Of 169 tips of 0.3 to 1 times the unambiguous velocity that were told, at 0 to 20 dB, those of a share
-#: over 0.02 had 6.9 at most, those over 0.1 had 5.2. Of tips 1.8 to 3 times as fast as that, which had passed for 0.2
-#: to 0.8 times, all had 6.9 and more, most over 20, and shares of 0.13 up.
+#: Power past the edge flashes if noise does as much less than once in exp(LEAST_NATS) records, and the flashing part
+#: exceeds LEAST_SHARE of the power within the edge. Of 169 tips reported at 0.3 to 1 times the unambiguous velocity, at
+#: 0 to 20 dB, those of a share over 0.02 had 6.9 nats at most, those over 0.1 had 5.2. Of tips 1.8 to 3 times as fast
+#: as that, which had passed for 0.2 to 0.8 times, all had 6.9 and more, most over 20, and shares of 0.13 up.
 LEAST_NATS, LEAST_SHARE = 6.0, 0.1
 
 
@@ -46,9 +45,9 @@ class PastEdge:
     Parameters
     ----------
     seen : bool
-        Whether enough of the span lies there, and within it, to tell.
+        Whether enough of the span lies there, and within the edge, to tell.
     flashes : bool
-        Whether it flashes as the rotors do.
+        Whether its power flashes as the rotors do.
     """
 
     seen: bool
@@ -63,16 +62,16 @@ def past_edge_of(
     spread: float,
     edge: tuple[float, float],
 ) -> PastEdge:
-    """What lies past the edge of rotors' lines; nothing is seen there of one channel, or where it is past the span.
+    """What lies past the edge of rotors' lines; nothing is seen in one channel or if the edge is past the span.
 
     Parameters
     ----------
     data, samples, centre, edge
         As in `past_edge`.
     rates : sequence of float
-        Those known [cycles a sample].
+        Known rates [cycles a sample].
     spread : float
-        How far from these others may be [cycles a sample].
+        How far from these others may lie [cycles a sample].
     """
     if data.one_channel or not 0 < edge[0] < 0.5:
         return PastEdge(seen=False, flashes=False)
@@ -103,11 +102,12 @@ def past_edge(
     data : Periodogram
         The record.
     samples : ndarray of complex, shape (pulses,)
-        Its samples, any unit: where flashes passed for clicks and were cut out, noise is cut out in their rhythm too.
+        Its samples, any unit, if possible before clicks are cut out: cutting out flashes as clicks makes noise pulse
+        too.
     centre : float
-        Of the family [cycles a sample].
+        Centre of the family [cycles a sample].
     rates : ndarray, shape (rates,)
-        Of the flashes, as finely as the dwell tells them apart [cycles a sample].
+        Flash rates tried, as finely as the dwell resolves them [cycles a sample].
     edge : (float, float)
         The edge and its standard deviation [cycles a sample from the centre].
     """
@@ -130,29 +130,29 @@ def past_edge(
 def _rhythm(
     samples: NDArray[np.complex128], level: NDArray[np.float64], rates: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """How clearly, and by what share, the power of samples comes and goes at the one of some rates where it does most.
+    """How clearly, and how deeply, the power of samples pulses, at the one of some rates where it does most.
 
     Parameters
     ----------
     samples : ndarray of complex128, shape (pulses,)
-        Of nothing but a band.
+        Of a band alone.
     level : ndarray, shape (pulses,)
-        Of its noise, in FFT order, any unit.
+        Noise of that band, in FFT order, any unit.
     rates : ndarray, shape (rates,)
         [cycles a sample].
 
     Returns
     -------
     nats : float
-        The logarithm of the odds against noise in this band doing so at any of the rates.
+        The logarithm of the odds against noise of this band pulsing as much at any of the rates.
     depth : float
-        Root of the power of all harmonics over the mean's, beyond noise.
+        Root of the power of all harmonics, less noise, over that of the mean.
     """
     pulses, size = len(samples), fft.next_fast_len(PADDING * len(samples), real=True)
     window = np.hanning(pulses)
     power = squared(samples)
     lines = squared(fft.rfft((power - power.mean()) * window, size)) / max(float((power * window).sum()) ** 2, 1e-300)
-    # noise beats with itself where the band lies over itself, shifted
+    # noise beats with itself where the band overlaps its own shifted copy
     over = np.abs(fft.ifft(squared(fft.fft(level)))) / float(level.sum()) ** 2
     noise = over * pulses * float((window**2).sum()) / float(window.sum()) ** 2
     chances = np.log(max(len(rates) * RATE_BINS, 1.0))

@@ -1,9 +1,9 @@
-"""Blades that are rows of a few points: whether a comb's lines are one rotor's with such blades, and where they end.
+"""Blades that are rows of a few points: whether a comb's lines are those of one such rotor, and their edge.
 
-A point seen at every speed below its own flashes twice a period and side, and several do at any times, which passes for
-the flashes of several rotors. But of one rotor the line of order n on either side of the body is the same but for the
-turn it stands at, as it looks the same before and after its blades point at the radar; and that line is a sum of few
-J_Nn(Gamma), Gamma the phase deviation of each point and N the number of blades (the paper's eq. 24).
+A point passes every speed below its own twice a period and side, and several points flash at any times, which passes
+for the flashes of several rotors. But of one rotor lines n and -n are equal but for the angle of the rotor, as it looks
+the same before and after its blades point at the radar; and each is a sum of a few J_Nn(Gamma), with Gamma the phase
+deviation of each point and N the number of blades (the paper's eq. 24).
 """
 
 from collections.abc import Iterable
@@ -16,37 +16,39 @@ from scipy import fft
 from ..lines import energy, squared
 from .comb_fit import CombFit
 
-#: Points are taken for this many at most, and for no more than so many lines tell: each takes three numbers.
+#: At most MOST_POINTS points are fitted, with fewer parameters than there are lines: each has NUMBERS_OF_POINT.
 MOST_POINTS, NUMBERS_OF_POINT = 6, 3
 
-#: A point costs so many times the logarithm of how many numbers the lines are [nats]: 1.5 for its three numbers, as in
-#: any such choice (BIC), and as much for its place, which is sought among as many as there may be.
+#: Cost of a point, times the logarithm of the number of data [nats]: 1.5 for its three parameters, as in BIC, and as
+#: much for its place, which is sought among as many as there may be.
 COST = 3.0
 
-#: Each side must have so many lines.
+#: Least lines on each side.
 LEAST_LINES = 6
 
-#: Phase deviations are tried in such steps [rad], and refined in so many Gauss-Newton steps at most, none of them
-#: longer, until all are below this share of it.
+#: Phase deviations are tried in steps of STEP_GAMMA [rad], and refined in REFINED_STEPS Gauss-Newton steps at most,
+#: none of them longer, until all are below REFINED_ENOUGH of it.
 STEP_GAMMA, REFINED_STEPS, REFINED_ENOUGH = 0.5, 6, 0.01
 
-#: Of rows of points, so many leave less than this share of the lines' power: else it is none.
+#: If FIRST_POINTS points leave more than FIRST_LEFT of the lines' power, blades are no such row.
 FIRST_POINTS, FIRST_LEFT = 3, 0.6
 
-#: Two points that lie so near to one another that the lines do not tell them apart, by no more than this [rad], pass
-#: for one between them: the outermost is off by this share of that, at the root of the mean square.
+#: Two points that the lines do not resolve, each up to MOST_HIDDEN off their middle [rad], pass for one there: the
+#: outermost is off by HIDDEN_SHARE of that, rms.
 MOST_HIDDEN, HIDDEN_SHARE = 1.5, 0.15
 
-#: Lines that have more than this share of their power from noise would be explained by anything.
+#: Lines with more than this share of noise in their power are not fitted: anything would explain them.
 MOST_NOISE = 0.1
 
-#: Where more Bessel functions are asked for, blades of points are not sought: at high carriers there are thousands.
+#: Most values of Bessel functions: if more are needed, points are not sought, as high carriers have thousands of
+#: orders.
 MOST_CELLS = 4_000_000
 
-#: A point must add so much of its own to those known: two nearer than that come out as large ones that cancel.
+#: Least power of a point's lines that known points do not explain, over the largest of any place: two nearer points
+#: come out as large ones that cancel.
 LEAST_OWN = 0.02
 
-#: The turn is read from the lines at so many places for each.
+#: Places per line at which the rotor's angle is tried.
 PADDING = 16
 
 
@@ -79,16 +81,16 @@ def fit_points(fit: CombFit, per_turn: int, pulses: int, numbers: Iterable[int])
     fit : CombFit
         The comb.
     per_turn : int
-        Strong lines' spacing in lines of it.
+        Strong lines are this many spacings apart.
     pulses : int
-        Samples that they were fitted to.
+        Samples that it was fitted to.
     numbers : iterable of int
         Numbers of blades that are tried.
 
     Returns
     -------
     PointsFit or None
-        The best; None where too few lines are seen on both sides, or too many, or they hardly stand in the noise.
+        The best; None where too few or too many lines are seen on both sides, or they hardly exceed the noise.
     """
     own = (fit.orders > 0) & (fit.orders % per_turn == 0) & np.isin(-fit.orders, fit.orders)
     order, numbers = fit.orders[own] // per_turn, sorted(numbers)
@@ -101,21 +103,21 @@ def fit_points(fit: CombFit, per_turn: int, pulses: int, numbers: Iterable[int])
     gamma = np.arange(1.0, widest / STEP_GAMMA) * STEP_GAMMA
     bessel = bessel_functions(gamma, widest + 1)
     turn, apart = _turn(order, ahead, behind)
-    # held back as the amplitudes are, they have so much less of it
+    # the fit shrinks the amplitudes, and the noise in them by as much
     noise = float(((fit.snr[own] / (1 + fit.snr[own])) ** 2).mean()) / (2 * pulses)
     total = (energy(ahead) + energy(behind)) / 2
     if len(order) * noise > MOST_NOISE * total:
         return None
     rows: list[_Row] = []
     for number in numbers:
-        for half in (0, 1):  # the turn is known but for half of one
+        for half in (0, 1):  # the angle is known up to half a turn
             line = np.exp(-1j * order * (turn + np.pi * ((number % 2) + 2 * half)) / 2)
             lines = (ahead * line + (-1.0) ** (number * order) * behind * line.conj()) / 2
             near = gamma <= number * order[-1]
             rows += _rows_of_points(lines, bessel[number * order][:, near], gamma[near], number, order, noise)
     cost = np.array([row.cost for row in rows])
     best = rows[int(cost.argmin())]
-    # whether a weak point stands outside of others is no surer than this
+    # whether a weak point lies outside the others is no surer than this
     weight = np.exp(cost.min() - cost)
     edges, stds = np.array([(row.edge, row.edge_std) for row in rows]).T
     edge = float(np.average(edges, weights=weight))
@@ -126,7 +128,7 @@ def fit_points(fit: CombFit, per_turn: int, pulses: int, numbers: Iterable[int])
 
 @dataclass(frozen=True)
 class _Row:
-    """A row of points: what it costs [nats], what it leaves [power], its edge [chopping frequencies], numbers."""
+    """A row of points: its cost [nats], what it leaves [power], its edge [chopping frequencies], numbers."""
 
     cost: float
     left: float
@@ -149,13 +151,13 @@ def _rows_of_points(
     Parameters
     ----------
     lines : ndarray, shape (lines,)
-        Mean of both sides about the turn.
+        Mean of both sides, the angle taken out.
     bessel : ndarray, shape (lines, phase deviations)
-        What a point of each has of them.
+        Lines of a point of each.
     gamma : ndarray, shape (phase deviations,)
         [rad].
     blades : int
-        Their number.
+        Number of blades.
     order : ndarray of int, shape (lines,)
         Of the chopping lines.
     noise : float
@@ -169,12 +171,12 @@ def _rows_of_points(
         power = (own**2).sum(axis=0)
         gain = np.where(power > LEAST_OWN * power.max(), squared(own.T @ lines) / np.maximum(power, 1e-30), 0.0)
         row, left, information, bent = _refined(lines, np.append(row, gamma[gain.argmax()]), turns)
-        # of as many numbers, noise that the lines themselves tell but is no less than is known
+        # noise of each number: estimated from what is left, but no less than is known
         unsure = max(left / max(numbers - NUMBERS_OF_POINT * len(row), 1), noise / 2)
         price = COST * np.log(numbers)
         cost = left / (2 * unsure) + numbers / 2 * np.log(unsure) + price * len(row)
         edge = int(row.argmax())
-        # two points so far to either side of the outermost would be no worse, at a price that hides them
+        # two points this far to either side of the outermost would fit no better than the cost of one more
         hidden = min((8 * price * unsure / max(bent, 1e-30)) ** 0.25, MOST_HIDDEN)
         std = float(np.hypot(np.sqrt(unsure * np.linalg.pinv(information)[edge, edge]), HIDDEN_SHARE * hidden))
         rows.append(_Row(float(cost), left, float(row[edge]) / blades, std / blades, blades, len(row)))
@@ -186,19 +188,19 @@ def _rows_of_points(
 def _refined(
     lines: NDArray[np.complex128], row: NDArray[np.float64], order: NDArray[np.intp]
 ) -> tuple[NDArray[np.float64], float, NDArray[np.float64], float]:
-    """Points nearby that explain lines best, and what these come to.
+    """Refine points to those nearby that explain lines best.
 
     Returns
     -------
     row : ndarray, shape (points,)
         Phase deviations [rad].
     left : float
-        Power that they leave.
+        Power that is left.
     information : ndarray, shape (points, points)
-        On the phase deviations, in units of the noise's inverse.
+        Information on the phase deviations, in units of 1 / noise.
     bent : float
-        Power, but for what others explain, by which the lines of the outermost change with the square of its phase
-        deviation, as those of two that stand nearby do.
+        Power of the second derivative of the outermost point's lines by its phase deviation, less what others explain:
+        so do the lines of two nearby points differ from those of one.
     """
     best = (row, np.inf, np.eye(len(row)), 0.0)
     for _ in range(REFINED_STEPS):
@@ -228,7 +230,7 @@ def _refined(
 
 
 def bessel_functions(gamma: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """J_0 to J_count of these, shape (count + 1, arguments): as Fourier coefficients, a fiftieth of the time."""
+    """J_0 to J_count of `gamma`, shape (count + 1, arguments): as Fourier coefficients, a fiftieth of the time."""
     widest = float(gamma.max())
     size = fft.next_fast_len(int(max(count, widest) + 12 + 6 * widest ** (1 / 3)), real=True)
     phase = gamma[:, None] * np.cos(np.pi * np.arange(size + 1) / size)
@@ -239,7 +241,7 @@ def bessel_functions(gamma: NDArray[np.float64], count: int) -> NDArray[np.float
 def _turn(
     order: NDArray[np.intp], ahead: NDArray[np.complex128], behind: NDArray[np.complex128]
 ) -> tuple[float, float]:
-    """Twice the turn [rad a line] about which both sides are most alike, and the power in which they differ."""
+    """Twice the rotor's angle [rad a line] at which both sides agree best, and the power in which they differ."""
     both = np.zeros(order[-1] + 1, np.complex128)
     both[order] = ahead * behind.conj()
     size = PADDING * len(both)

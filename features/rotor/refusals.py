@@ -1,4 +1,4 @@
-"""Why a line family is no rotor's, or tells no number."""
+"""Why a line family is no rotor's, or gives no values."""
 
 from typing import TYPE_CHECKING
 
@@ -11,15 +11,16 @@ from .periodogram import Periodogram
 if TYPE_CHECKING:
     from .family import Family
 
-#: In a short dwell rotors that are not told apart show by so many flashes or orders what they have in common.
+#: In a short dwell, unresolved rotors show their mean rate only with more than LEAST_FLASHES flashes or MANY_ORDERS
+#: orders.
 LEAST_FLASHES, MANY_ORDERS = 5.5, 60
 
-#: Lines that reach so far from a body, in shares of its own speed, are a wheel's: spokes end a little within the rim.
+#: Edges between these shares of the body's speed are a wheel's: spokes end a little within the rim.
 WHEEL = (0.8, OVER_BODY)
 
 
 def slower_than_rotors(data: Periodogram, fit: CombFit, edge: float, edge_std: float) -> str:
-    """Why a line family of this comb and edge [cycles a sample] is no rotor's; empty where it may be one's."""
+    """Why a comb of this edge [cycles a sample] is too slow for a rotor; empty where it may be a rotor's."""
     edge_mps, edge_std_mps = (value * data.span_mps for value in (edge, edge_std))
     if not edge_mps + edge_std_mps < LEAST_REACH_MPS:
         return ""
@@ -31,7 +32,7 @@ def as_wheels(data: Periodogram, edge: float, velocity_mps: float) -> str:
     """Why a line family of this edge [cycles a sample] about a body is a wheel's; empty where it may be a rotor's.
 
     Seen from the body a wheel's rim is as fast as the body. A rotor's tips are 2.5 times as fast as it flies and more;
-    only of a propeller that flies at the radar, within a narrow range of angles, they seem to be as fast.
+    only those of a propeller that flies at the radar, within a narrow range of angles, appear to be as slow.
     """
     edge_mps = edge * data.span_mps
     if WHEEL[0] * abs(velocity_mps) < edge_mps < WHEEL[1] * abs(velocity_mps):
@@ -40,9 +41,9 @@ def as_wheels(data: Periodogram, edge: float, velocity_mps: float) -> str:
 
 
 def too_few_flashes(family: "Family") -> str:
-    """Why rotors that are not told apart give no number, in so short a dwell; empty where they do.
+    """Why unresolved rotors give no values in so short a dwell; empty where they do.
 
-    Their lines, some bins apart, run into one another, and what that leaves may be strong at any spacing.
+    Their lines, a few bins apart, run into one another, and what results may be strong at any spacing.
     """
     data, chopping = family.data, family.comb.chopping
     shows = chopping * data.pulses > LEAST_FLASHES or family.comb.last > MANY_ORDERS

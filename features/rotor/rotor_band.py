@@ -1,4 +1,4 @@
-"""Where the line family of a rotor ends: the tip's order fitted to all lines, instead of a threshold and a count."""
+"""Edge of a rotor's line family: the tip's order fitted to all lines, instead of a threshold and a count."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -9,61 +9,62 @@ from numpy.typing import NDArray
 from .line_likelihood import BEND_STD, BENDS, PLAIN_BEND, OrderPowers, log_likelihood
 from .line_shapes import PROFILES, spread_powers
 
-#: Blades that a fit to an unknown number of them tries, and how likely they are beforehand.
+#: Numbers of blades that are tried where theirs is unknown, and their prior probabilities.
 BLADES = {1: 0.1, 2: 0.6, 3: 0.2, 4: 0.1}
 
-#: Lines so far below the family's level do not count: a share of its power, added to noise and lines alike. There is
-#: what strong lines leak, and what blades unlike the ideal ones put past the tip.
+#: Leakage: a share of the family's power, added to noise and lines alike, so that weaker lines do not count. It covers
+#: what strong lines leak and what non-ideal blades have past the tip.
 LEAK_SHARE = 0.002
 
-#: As likely they leak no more than this share of it, or of that once more; which, shows where it is more than so large
-#: a share of the noise.
+#: A leakage of LEAST_LEAK times that, and of as much less again, is tried as equally likely, while the one before
+#: exceeds LEAK_SEEN of the noise; MOST_LEAKS in all.
 LEAST_LEAK, LEAK_SEEN, MOST_LEAKS = 0.01, 0.1, 3
 
-#: How unlike the model the powers of the lines may be: variances over the mean's square. The lines decide.
+#: Variances of line powers about the model, over the mean's square, that are tried: the lines decide.
 SHARES = tuple(1e-6 * 4.0**step for step in range(11))
 
-#: The first search tries every so many-th of these, the others those about what is left. Shares are all alike that the
-#: noise outweighs by so much.
+#: The first search tries every FIRST_SHARES-th of these, later ones those within SHARES_ABOUT of the likely ones.
+#: Shares below OUTWEIGHED of the noise's are not told apart.
 FIRST_SHARES, SHARES_ABOUT, OUTWEIGHED = 5, 2, 0.1
 
-#: Each of these is so likely beforehand beside the one before it.
+#: Prior probability of each of these over that of the one before it.
 SHARE_FALL = 0.6
 
-#: Widths of the roll-off, Gamma^(1/3) orders, past the tip that lines are followed.
+#: Lines are used out to this many widths of the roll-off, Gamma^(1/3) orders, past the tip.
 REACH = 3.0
 
-#: Step of the first search [lines], and of more blades than are tried [rad of phase deviation], in which the lines'
+#: Step of the first search [lines]; for more blades than BLADES has, STEP_GAMMA [rad of phase deviation], as the lines'
 #: ripple repeats every pi.
 STEP, STEP_GAMMA = 0.2, 0.4
 
-#: The first search goes so far about all lines that may be the last [lines], and so many widths of the roll-off, over
-#: which strong lines still show; which these are the coarse search has as likely as this [nats]. It takes so many steps
-#: at most, and goes no nearer to the body than this.
+#: The first search covers all lines that may be the last, within COARSE_NATS of the likeliest in the coarse search
+#: [nats], and beyond these HALF_RANGE [lines] or HALF_WIDTHS of the roll-off, over which strong lines still show. It
+#: takes MOST_STEPS steps at most, none nearer to the body than LEAST_EDGE [lines].
 HALF_RANGE, HALF_WIDTHS, COARSE_NATS, MOST_STEPS, LEAST_EDGE = 2.5, 1.5, 6.0, 100, 0.7
 
-#: Searches, each about what is left of the one before in so many steps, until the deviation is so many of these.
+#: At most SEARCHES searches, each over what the one before left in FINE steps, until the standard deviation exceeds
+#: FINE_ENOUGH of these.
 SEARCHES, FINE, FINE_ENOUGH = 6, 30, 1.5
 
-#: Hypotheses less likely than this are left out.
+#: Hypotheses less probable than this are dropped.
 NEGLIGIBLE = 1e-3
 
-#: The coarse search has no model of the roll-off: what lies so far below the level is not seen there.
+#: Leakage of the coarse search, which has no model of the roll-off: weaker lines do not count there.
 COARSE_LEAK_SHARE = 0.03
 
 
 @dataclass(frozen=True)
 class _Hypotheses:
-    """What is tried beside each edge: every combination of these.
+    """What is tried with each edge: every combination of these.
 
     Parameters
     ----------
     blades : tuple of int
         Numbers of them.
     profiles : ndarray of int
-        Which of `line_powers`.
+        Indices in `line_powers`.
     shares : ndarray of int
-        Which of the shares of unlikeness.
+        Indices of the variances about the model.
     leaks : tuple of float
         Shares of the family's power that leak.
     """
@@ -74,19 +75,19 @@ class _Hypotheses:
     leaks: tuple[float, ...]
 
     def log_prior(self, share_prior: NDArray[np.float64], edges: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How likely each is beforehand [nats], shape (blades, profiles, edges, shares, 1)."""
+        """Logarithm of the prior of each [nats], shape (blades, profiles, edges, shares, 1)."""
         own = np.outer([BLADES.get(number, 1.0) for number in self.blades], np.array(PROFILES)[self.profiles])
         return np.log(own)[..., None, None, None] + np.log(share_prior[self.shares] / edges[:, None])[..., None]
 
     def held(self, weight: NDArray[np.float64], all_shares: int) -> Self:
-        """Those that are still likely, and the shares about these.
+        """Hypotheses that are still likely, with the shares about theirs.
 
         Parameters
         ----------
         weight : ndarray, shape (blades, profiles, edges, shares, leaks)
-            How likely each is; where there are fewer leaks, those others were not asked and stay.
+            Probability of each; where it has fewer leaks, the others were not tested and stay.
         all_shares : int
-            How many there are.
+            Number of all shares.
         """
         blades, profiles, _, shares, leaks = (
             np.flatnonzero(weight.sum(axis=tuple(set(range(weight.ndim)) - {axis})) > NEGLIGIBLE)
@@ -123,13 +124,13 @@ def fit_edge(
     blades : int, optional
         Blades of the rotor: they set how sharp the edge is. Those of `BLADES` are tried where it is not known.
     leak : float
-        Share of the family's power that lines may leak past its edge: that much, or less by `LEAST_LEAK`.
+        Share of the family's power that lines may leak past its edge; smaller ones, by `LEAST_LEAK`, are tried too.
     plain : bool
-        Take blades to reflect evenly or at their tips alone: where the lines of several rotors run into one another,
-        what falls off says nothing more of them.
+        Take blades to reflect evenly or at their tips alone: where the lines of several rotors merge, the shape of the
+        roll-off says no more of the blades.
     spread : float
-        Range of several rotors' rates over their mean, in whose multiples the orders are counted: what lies about a
-        high order is then of its neighbours too.
+        Range of several rotors' rates over their mean, whose multiples the orders are: power about a high order then
+        includes that of its neighbours.
 
     Returns
     -------
@@ -152,7 +153,7 @@ def fit_edge(
     fewest = min(tried.blades)
     maybe = order[_coarse_nats(lines, loud) > -COARSE_NATS]
     low, high = maybe[0] - _half_range(maybe[0], fewest), maybe[-1] + _half_range(maybe[-1], fewest)
-    furthest = float(order[-1]) + _half_range(order[-1], fewest)  # nothing speaks for an edge that nothing shows
+    furthest = float(order[-1]) + _half_range(order[-1], fewest)  # no line supports an edge further out
     most = max(tried.blades)
     step = max(STEP if most <= max(BLADES) else STEP_GAMMA / most, (high - low) / MOST_STEPS)
     bend_std = PLAIN_BEND if plain else BEND_STD
@@ -164,7 +165,7 @@ def fit_edge(
         each = [spread_powers(number * edges, number, count, spread)[tried.profiles] for number in tried.blades]
         shape = np.ascontiguousarray(np.stack(each)[..., near.order - 1].reshape(-1, len(near.order)).T)
         away = np.clip(1 - near.order / edge, 0, 1)
-        # the first search asks the leak of the least sharp edge alone: it only says about which lines to look
+        # the first search tests the largest leakage alone: it only finds about which lines to look
         asked = loud * np.array(tried.leaks if search else tried.leaks[:1])
         nats, bent = log_likelihood(near, shape, away, bent, bend_std, shares[tried.shares], asked)
         by_axis = (*nats.shape[:2], len(tried.blades), len(tried.profiles), len(edges))
@@ -183,11 +184,11 @@ def fit_edge(
         low, high = low - wider[0], min(high + wider[1], max(furthest, high))
         step = (high - low) / FINE
         tried = tried.held(weight, len(shares))
-    return edge, float(np.hypot(std, apart / np.sqrt(12)))  # nor is it known better than to a step
+    return edge, float(np.hypot(std, apart / np.sqrt(12)))  # known no better than to a step
 
 
 def _shares(lines: OrderPowers, loud: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The shares of unlikeness that may be told from each other, and how likely each is beforehand."""
+    """The variances about the model that may be told from each other, and the prior of each."""
     least = OUTWEIGHED * float((lines.noise / lines.bins).mean()) / max(loud, 1e-9)
     shares = np.array([share for share in SHARES if share >= least or share == SHARES[-1]])
     prior = SHARE_FALL ** np.arange(len(SHARES))
@@ -196,14 +197,14 @@ def _shares(lines: OrderPowers, loud: float) -> tuple[NDArray[np.float64], NDArr
 
 
 def _half_range(order: int, blades: int) -> float:
-    """How far from a line that may be the last the edge may be [lines]."""
+    """How far the edge may be from a line that may be the last [lines]."""
     return float(max(HALF_RANGE, HALF_WIDTHS * order ** (1 / 3) / blades ** (2 / 3)))
 
 
 def _coarse_nats(lines: OrderPowers, loud: float) -> NDArray[np.float64]:
     """Log likelihood of each line to be the last of a family of one level, less that of the likeliest.
 
-    Powers are exponentials; far under the level, where a family rolls off, nothing counts.
+    Powers are exponentially distributed; lines far below the level, in the roll-off, do not count.
     """
     ratio = (lines.power + COARSE_LEAK_SHARE * loud) / (lines.noise + COARSE_LEAK_SHARE * loud)
     total, number = np.cumsum(lines.bins * ratio), np.cumsum(lines.bins)

@@ -1,6 +1,6 @@
-"""The rates of single rotors whose combs lie in one another: found in turn, fitted together.
+"""Chopping frequencies of single rotors whose combs interleave: found one by one, fitted jointly.
 
-Rotors of nearly one rate part at the high orders, where the lines lie further from one another than the dwell's bin.
+Rotors of nearly equal rates are resolved at the high orders, where their lines lie more than one Doppler bin apart.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,65 +18,69 @@ from .flashes import LEAST_LINES, flash_nats
 from .periodogram import Level, Periodogram
 from .unlike_blades import MOST_BLADES, UNEQUAL_FACTOR, strong_multiple
 
-#: Rotors looked for at most.
+#: Most rotors sought.
 MAX_ROTORS = 8
 
-#: How far the rates of one airframe's rotors lie from those known, relative, in hover; and in a manoeuvre or where they
-#: are not alike, from the comb found first: these are sought by their inner orders, which part such rates already.
+#: RATE_SPREAD: how far the rates of one airframe's rotors lie from those known in hover, relative. FURTHEST_SPREAD: the
+#: same from the first comb's rate in a manoeuvre or for unlike rotors; these rates are sought by their first
+#: INNER_ORDERS orders, which resolve them already.
 RATE_SPREAD, FURTHEST_SPREAD, INNER_ORDERS = 0.05, (-0.25, 0.33), 10
 
-#: A rotor that turns slower still has lines at twice its rate, which may lie among these: those at halves of that, out
-#: to so many orders, which other rotors' lines have not filled yet, have this share of their power and so many times
-#: that of noise, all but so large a share of them.
+#: A candidate is twice a rotor's rate if its half-integer orders, out to HALF_ORDERS and away from known lines, are
+#: also occupied: their HALF_QUANTILE power exceeds HALF_SHARE of that at its integer orders and HALF_POWER times the
+#: noise.
 HALF_ORDERS, HALF_SHARE, HALF_POWER, HALF_QUANTILE = 6, 0.05, 4.0, 0.3
 
-#: Unlike blades' lines have between those of a comb this share of its lines' power and more than so many times that of
-#: noise, all but as many of them: half and more where they passed for a rotor's, beside one's a fiftieth.
+#: A candidate consists of lines of a known rotor's unlike blades if the other multiples of that rotation rate have
+#: HALF_QUANTILE power above BETWEEN_SHARE of its own lines' and BETWEEN_POWER times the noise. (False rotors had half
+#: and more, real ones a fiftieth.)
 BETWEEN_SHARE, BETWEEN_POWER = 0.25, 1.0
 
-#: A comb may be every second to fifth line of a rotor whose rate is one of these times its own.
+#: A candidate may share every third to fifth line of a rotor whose rate is one of these times the candidate's.
 RATIOS = np.array([2 / 3, 3 / 4, 4 / 5, 5 / 4, 4 / 3])
 
-#: What lies within so many bins of a line that is known says nothing of these; so many must be left.
+#: Places within NEAR_BINS of a known line do not count in these tests; LEAST_BETWEEN places must be left.
 NEAR_BINS, LEAST_BETWEEN = 2.0, 4
 
-#: The lines of one of these reach this share of what the others' do: else they are what rotors not told apart leave.
+#: Least reach of a rotor of a far rate, as a share of the furthest reach of the rotors found: a shorter one is residue
+#: of unresolved rotors.
 APART_REACH = 0.5
 
-#: Lines that are fitted together at most, memory and time growing with their square and cube; rotors that would have
-#: more are not told apart.
+#: Most lines fitted jointly, as memory and time grow with their square and cube; rotors that would need more are
+#: unresolved.
 MOST_LINES = 2000
 
-#: A second rotor must have this much evidence, and a further one, as two that were fitted leave more by chance [nats];
-#: and this share of the first one's. With less than so large a share of the most that any had it may be what is left of
-#: those found, which are fitted to the end first.
+#: Least evidence for a second rotor, and for a third and further ones, since two fits leave more by chance [nats]; also
+#: at least LEAST_SHARE of the first one's. Below DOUBTFUL_SHARE of the largest seen it may be fit residue, so the
+#: rotors found are first fitted to convergence.
 LEAST_EVIDENCE, FURTHER_EVIDENCE = 13.0, 28.0
 LEAST_SHARE, DOUBTFUL_SHARE = 0.1, 0.5
 
-#: A comb weaker than this share of the strongest is what a rate that changed within the dwell leaves behind.
+#: A comb with less than this share of the strongest one's power is residue of a rate that changed within the dwell.
 LEAST_POWER_SHARE = 0.12
 
-#: A comb of so many times the power of the weakest one may be that many rotors, nearer to one another than the dwell
-#: tells apart: where four of a kind were told apart their powers are within 1.7 in 94 of 100 records, where two passed
-#: for one they were not in 92.
+#: A comb with more than this many times the power of the weakest may be that many unresolved rotors. Where four like
+#: rotors were resolved, their powers were within a factor of 1.7 in 94 of 100 records; where two were merged, they were
+#: not in 92.
 TWO_POWER = 1.7
 
-#: Steps of the joint fit each time a rotor is added, and once all are found: only then their deviations matter. And at
-#: most where what they leave would be called unresolved: strong lines not fitted to the end leave some of themselves.
+#: Gauss-Newton steps of the joint fit: JOINT_STEPS as each rotor is added; LAST_STEPS once all are found, as only then
+#: their standard deviations matter; FURTHER_STEPS before a residual is called unresolved, as strong lines not fitted to
+#: convergence leave part of themselves.
 JOINT_STEPS, LAST_STEPS, FURTHER_STEPS = 2, 1, 4
 
-#: A fit that leaves no less than this share of what the one before left has come to its end; and at most so many.
+#: The joint fit is repeated until its residual exceeds FITTED_SHARE of the one before, MOST_FITS times at most.
 FITTED_SHARE, MOST_FITS = 0.9, 8
 
-#: A helicopter's tail rotor turns at most so many times as fast as its main rotor: at a fraction of its rate every so
-#: many-th line is there, and that fraction may lie among the rates of rotors like the first one. By so much are these
-#: stronger: 20 times and more where a tail is 8 dB under a main rotor of 5 dB, up to 8 where rotors' lines cross.
+#: A tail rotor turns at most MOST_GEAR times as fast as its main rotor. A comb at a fraction of its rate, which may lie
+#: among the rates sought, has lines at every so-many-th order only: these have GEAR_FACTOR times the power of the
+#: others (20 times and more where a tail is 8 dB under a main rotor of 5 dB, up to 8 where rotors' lines cross).
 MOST_GEAR, GEAR_FACTOR = 9, 12.0
 
-#: Lines are looked for so far past the edge of the line family: what strong ones leave there may pass for more.
+#: Lines are sought out to this multiple of the family's edge: further out, residue of strong ones may pass for more.
 FURTHEST = 1.5
 
-#: Rates nearer than this are one: so many bins apart at the outermost order.
+#: Two rates are resolved if their lines at the outermost order lie this far apart [bins].
 RESOLVED_BINS = 0.9
 
 
@@ -89,22 +93,22 @@ class Rotors:
     rates, stds : ndarray, shape (rotors,)
         Chopping frequency of each, rising, and its standard deviation [cycles a sample].
     resolved : bool
-        False where something is left between the combs that is no further comb: the rates lie nearer than the dwell
-        tells apart, or they changed within it. The number of rotors is then a lower bound.
+        False where a residual remains between the combs that is no further comb: rates lie closer than the dwell
+        resolves, or changed within it. The number of rotors is then a lower bound.
     spread : float
-        Range of the rates [cycles a sample], of the unresolved ones as far as they show; 0 for a single rotor.
+        Range of the rates [cycles a sample], unresolved ones included as far as they show; 0 for a single rotor.
     fits : list of CombFit
         Their lines.
     rest : ndarray of complex128, shape (pulses,)
-        Samples that these leave.
+        Residual samples of these fits.
     next_rate : float
-        The rate near those found that spoke loudest when a further one was last sought, be it a rotor's or not
-        [cycles a sample].
+        The rate near those found that had the most evidence when a further rotor was last sought, whether it was one or
+        not [cycles a sample].
     row_edge : (float, float) or None
-        Of a lone rotor whose blades are rows of points, where its lines end, and the standard deviation [cycles a
-        sample from the body].
+        Edge of the lines of a lone rotor whose blades are rows of points, and its standard deviation [cycles a sample
+        from the body].
     unseen : float
-        Range of rates within which others are that wander, none of whose lines are seen [cycles a sample].
+        Range of rates that may hold further rotors of wandering rate, none of whose lines are seen [cycles a sample].
     """
 
     rates: NDArray[np.float64]
@@ -119,7 +123,7 @@ class Rotors:
 
 
 def _low_power(rest: Periodogram, places: NDArray[np.float64], fits: Sequence[CombFit]) -> float:
-    """Power that most places have which are not beside a line that is known; 0 where few are not."""
+    """Power exceeded at most places away from known lines (`HALF_QUANTILE`); 0 where few such places are left."""
     known = np.concatenate([fit.frequencies for fit in fits])
     near = np.abs(places[:, None] - known).min(axis=1) * rest.pulses
     places = places[rest.usable(places) & (near > NEAR_BINS)]
@@ -127,7 +131,7 @@ def _low_power(rest: Periodogram, places: NDArray[np.float64], fits: Sequence[Co
 
 
 def _is_twice(rest: Periodogram, centre: float, rate: float, fits: Sequence[CombFit]) -> bool:
-    """True where a comb has its inner lines at halves of its rate too, which then is twice a rotor's."""
+    """True where a comb's half-integer inner orders are occupied too: its rate is then twice a rotor's."""
     order = np.arange(-HALF_ORDERS, HALF_ORDERS, dtype=float)
     own, half = (_low_power(rest, centre + rate * tried, fits) for tried in (order, order + 0.5))
     return half > max(HALF_SHARE * own, HALF_POWER)
@@ -136,8 +140,8 @@ def _is_twice(rest: Periodogram, centre: float, rate: float, fits: Sequence[Comb
 def _is_between(rest: Periodogram, centre: float, rate: float, fits: Sequence[CombFit], reach: int) -> bool:
     """True where a comb's lines are some of those that a known rotor's unlike blades have at its rotation rate.
 
-    These stand at every multiple of that rate, a rotor's own only at its own multiples. Rotors like the known one, not
-    found yet, have them too: rates are compared as those are sought.
+    Unlike blades have lines at every multiple of the rotation rate, a further rotor only at multiples of its own rate.
+    Like rotors not found yet have such lines too, so rates need only agree to within `RATE_SPREAD`.
     """
     for known in (fit.spacing for fit in fits):
         for parts in range(2, MOST_BLADES + 1):
@@ -155,49 +159,49 @@ def _is_between(rest: Periodogram, centre: float, rate: float, fits: Sequence[Co
 
 
 def _lines_apart(fit: CombFit, pulses: int, factor: float) -> int:
-    """Every how many-th line of a comb is there: of more than one, another rotor's, whose rate is that multiple."""
+    """Every how many-th line of a comb is occupied; more than 1 means a rotor at that multiple of the rate."""
     power = 1 + pulses * np.abs(fit.amplitudes) ** 2
     return strong_multiple(fit.orders, power, range(2, MOST_GEAR + 1), factor)
 
 
 def powers_of(fits: Sequence[CombFit]) -> list[float]:
-    """Powers of combs' lines, over the orders that all of them reach.
+    """Median line power of each comb, over the orders that all of them reach.
 
-    Not their means: where lines of two rotors lie in one another they may come out as large ones that cancel.
+    Not the mean: overlapping lines of two rotors may be fitted as large amplitudes that cancel.
     """
     return [float(np.median(powers)) for powers in _line_powers(fits)]
 
 
 def _line_powers(fits: Sequence[CombFit]) -> list[NDArray[np.floating]]:
-    """Power of each line of combs, over the orders that all of them reach."""
+    """Power of each line of each comb, over the orders that all of them reach."""
     common = min(int(np.abs(fit.orders).max()) for fit in fits)
     return [squared(fit.amplitudes[np.abs(fit.orders) <= common]) for fit in fits]
 
 
 def may_hold(fits: Sequence[CombFit], least: float = TWO_POWER) -> NDArray[np.float64]:
-    """How many rotors each comb may be, by its power over that of the weakest one: 1, or `least` and more."""
+    """How many rotors each comb may hold: its power over the weakest comb's where that exceeds `least`, else 1."""
     powers = np.array([powers.mean() for powers in _line_powers(fits)])
     times = np.minimum(powers / powers.min(), MAX_ROTORS)
     return np.where(times > least, times, 1.0)
 
 
 def hidden_shift(fits: Sequence[CombFit]) -> float:
-    """How far the mean of combs' rates is off, if those that may be several rotors are [cycles a sample]."""
+    """Error of the combs' mean rate if those that may hold several rotors do so [cycles a sample]."""
     rates = np.array([fit.spacing for fit in fits])
     return float(np.average(rates, weights=np.rint(may_hold(fits))) - rates.mean())
 
 
 def nearer_than(fits: Sequence[CombFit], resolution: float) -> bool:
-    """True where rates lie nearer than the dwell tells apart."""
+    """True where two rates lie closer than the dwell resolves."""
     rates = np.sort([fit.spacing for fit in fits])
     return len(rates) > 1 and float(np.diff(rates).min()) < resolution
 
 
 @dataclass(frozen=True)
 class _Verdict:
-    """What came of a rate that spoke for a further rotor: it came in, or is not told apart, or is no rotor's.
+    """Verdict on a candidate rate: added as a rotor, unresolved from those found, or no rotor's (both False).
 
-    `spread` is the range of the rates that are not told apart [cycles a sample].
+    `spread` is the range of the unresolved rates [cycles a sample].
     """
 
     added: bool = False
@@ -210,7 +214,7 @@ _ADDED, _NO_ROTOR = _Verdict(added=True), _Verdict()
 
 @dataclass(frozen=True)
 class Sought:
-    """What speaks for a rotor.
+    """A candidate for a rotor.
 
     Parameters
     ----------
@@ -221,9 +225,9 @@ class Sought:
     evidence : float
         [nats].
     is_apart : bool
-        Whether it is far from the first one.
+        Whether its rate is far from the first one's.
     change : float
-        By how much the rate changes over the dwell, relative.
+        Relative change of the rate over the dwell.
     """
 
     rate: float
@@ -234,7 +238,7 @@ class Sought:
 
 
 class Separation:
-    """The rotors found so far, which grow by one at a time."""
+    """The rotors found so far; one is added at a time."""
 
     def __init__(self, data: Periodogram, comb: Comb, centre: float, reach: int) -> None:
         self.data, self.comb, self.centre = data, comb, centre
@@ -245,22 +249,22 @@ class Separation:
         self.fits: Sequence[CombFit] = []
         self.reaches: list[int] = []
         self.rest = data
-        self.level: Level | None = None  # of the rest, once it was asked for
-        self.fitted_out = True  # nothing to gain by fitting these once more
+        self.level: Level | None = None  # of the residual, once computed
+        self.fitted_out = True  # no gain from fitting these once more
         self.seeks_apart = True
 
     @property
     def is_hopeless(self) -> bool:
-        """Whether more is left than a closer fit of those found, or one more, will ever explain."""
+        """Whether the residual is more than a closer fit, or one more rotor, will ever explain."""
         return False
 
     @property
     def rates(self) -> list[float]:
-        """Of the rotors found [cycles a sample]."""
+        """Rates of the rotors found [cycles a sample]."""
         return [fit.spacing for fit in self.fits]
 
     def sought(self) -> list[Sought]:
-        """What speaks loudest for a further rotor, near the rates known and far from them; the loudest first."""
+        """Candidates with the most evidence near the known rates and far from them; the strongest first."""
         ends = [self.nominal, *self.rates]
         rates = np.arange(min(ends) * (1 - RATE_SPREAD), max(ends) * (1 + RATE_SPREAD), self.resolution / 4)
         out = [self._strongest(rates)]
@@ -272,13 +276,13 @@ class Separation:
         return sorted(out, key=lambda one: -one.evidence)
 
     def _strongest(self, rates: NDArray[np.float64], *, is_apart: bool = False) -> Sought:
-        """The rate of some, rising, whose lines speak loudest."""
+        """The candidate with the most evidence among rising rates."""
         return self._loudest_in(self.rest, rates, is_apart=is_apart)
 
     def _loudest_in(self, data: Periodogram, rates: NDArray[np.float64], *, is_apart: bool) -> Sought:
-        """The same in a record, by the powers of the lines and their flashes."""
+        """The same in a given record, by the evidence of line powers and flashes."""
         sums, reach = even_scores(data.contrast, rates, np.full(len(rates), self.centre), self.furthest)
-        order, far = np.arange(1, reach.max() + 1), np.flatnonzero(reach >= LEAST_LINES)  # fewer lines tell no flash
+        order, far = np.arange(1, reach.max() + 1), np.flatnonzero(reach >= LEAST_LINES)  # fewer lines show no flash
         frequency = self.centre + np.array([-1, 1])[:, None, None] * rates[far, None] * order
         seen = data.usable(frequency) & (order <= reach[far, None])
         sums[far] += flash_nats(np.where(seen, data.amplitude[data.bins_of(frequency)], 0)).sum(axis=0)
@@ -288,8 +292,8 @@ class Separation:
     def _strongest_apart(self) -> Sought:
         """The same among rates further from the nominal one than those of rotors in hover.
 
-        Were these not sought, their lines would pass for those of rates in between at which only every third or fourth
-        line is there. Where lines not told apart fill all places, none of these speaks for one.
+        If such rates were not sought, their lines would pass for combs of rates in between that have only every third
+        or fourth line. Where unresolved lines fill all places, no far rate gains evidence.
         """
         step = max(RESOLVED_BINS / (4 * INNER_ORDERS * self.data.pulses), self.resolution / 4)
         low, high = FURTHEST_SPREAD
@@ -301,13 +305,13 @@ class Separation:
         return self._strongest(float(rates[inner.argmax()]) + near, is_apart=True)
 
     def in_turn(self, sought: list[Sought]) -> Iterator[Sought]:
-        """These, and where none of them came in the rotor of which they may hold every so many-th line."""
+        """The candidates; then, if none was added, the rotor of which the strongest may hold some lines."""
         yield from sought
         if self.fits:
             yield from self._louder_whole(sought[0])
 
     def _louder_whole(self, one: Sought) -> list[Sought]:
-        """A rotor far from the first of which a comb holds every so many-th line: at most one, if that is louder."""
+        """The rotor at one of `RATIOS` times a candidate's rate: at most one, if it has more evidence."""
         low, high = FURTHEST_SPREAD
         rates = one.rate * RATIOS
         away = rates / self.nominal - 1
@@ -319,18 +323,18 @@ class Separation:
         return [found] if found.evidence > one.evidence else []
 
     def _near(self) -> NDArray[np.float64]:
-        """How far from a rate that is about right others are tried [cycles a sample]."""
+        """Offsets at which rates are tried about one that is roughly right [cycles a sample]."""
         return np.arange(-1, 1.01, 0.25) * self.resolution
 
     def join(self, one: Sought) -> _Verdict:
-        """Take a rate in, if it is a rotor's."""
+        """Add a candidate if it is a rotor's."""
         if one.is_apart and _is_twice(self.rest, self.centre, one.rate, self.fits):
             one = replace(one, rate=one.rate / 2, reach=2 * one.reach)
         if one.is_apart and _is_between(self.rest, self.centre, one.rate, self.fits, self.reach):
             return _NO_ROTOR
         rate, reach = one.rate, one.reach
         same = [abs(rate - known) < self.resolution for known in self.rates]
-        if any(same):  # lines of a rotor that is known, perhaps past those that were fitted
+        if any(same):  # lines of a known rotor, perhaps further out than those fitted
             further = [max(r, reach) if own else r for r, own in zip(self.reaches, same, strict=True)]
             if further != self.reaches and self._may_fit(further):
                 self.reaches, self.fitted_out = further, False
@@ -351,7 +355,7 @@ class Separation:
         if nearer_than(together, self.resolution):
             return self._unresolved(rate)
         powers = powers_of(together)
-        if powers[-1] < LEAST_POWER_SHARE * max(powers):  # beside several, nobody's rate
+        if powers[-1] < LEAST_POWER_SHARE * max(powers):  # beside several, such a rate is residue
             return self._unresolved(rate) if len(self.fits) == 1 else _Verdict(unresolved=True)
         self.reaches = [*self.reaches, reach]
         self._take(*fitted)
@@ -362,7 +366,7 @@ class Separation:
         return _Verdict(unresolved=True, spread=float(np.ptp([rate, *self.rates])))
 
     def fit_out(self, steps: int) -> bool:
-        """Fit what was found once more, and again while that leaves much less; whether anything was done."""
+        """Fit the rotors found again, repeatedly while the residual falls much; whether anything was done."""
         if self.fitted_out:
             return False
         self.fitted_out, done = True, False
@@ -379,20 +383,20 @@ class Separation:
         return done
 
     def _alike(self) -> list[int]:
-        """Outermost orders of like rotors: each as far as the one that is seen to reach furthest.
+        """Outermost orders of the rotors: each raised to that of the like rotor that reaches furthest.
 
-        As a rotor came in, those not found yet hid its outer lines.
+        When a rotor was added, rotors not found yet hid its outer lines.
         """
         pairs = list(zip(self.reaches, self.rates, strict=True))
         alike = [max(r for r, other in pairs if abs(other / rate - 1) < 2 * RATE_SPREAD) for _, rate in pairs]
         return alike if self._may_fit(alike) else self.reaches
 
     def make_whole(self) -> None:
-        """Seek rotors of which only every so many-th line is there anew, now that the others are known.
+        """Seek again rotors that have only every so-many-th line, now that the others are known.
 
-        As each came in, lines of rotors not found yet stood between its own or were some of them.
+        When each was added, lines of rotors not found yet stood between its own or passed for some of them.
         """
-        for known in 2 * self.rates:  # some show once others are whole
+        for known in 2 * self.rates:  # twice: some show only once others are whole
             number = int(np.abs(np.array(self.rates) - known).argmin())
             times = _lines_apart(self.fits[number], self.data.pulses, UNEQUAL_FACTOR) if len(self.fits) > 1 else 1
             if times == 1:
@@ -411,7 +415,7 @@ class Separation:
                 self.fit_out(FURTHER_STEPS)
 
     def _take(self, fits: Sequence[CombFit], samples: NDArray[np.complex128]) -> None:
-        """Hold these fits and what they leave."""
+        """Store these fits and their residual."""
         self.fits, self.level = fits, self.data.level_of(samples)
         self.rest = self.data.left(samples, self.level)
 
@@ -420,16 +424,16 @@ class Separation:
         return self.comb.per_turn == 1 and abs(rate - self.nominal) < self.resolution
 
     def _may_fit(self, reaches: list[int]) -> bool:
-        """True where combs of these outermost orders are not too many lines to be fitted together."""
+        """True where combs out to these orders have no more lines than may be fitted jointly."""
         return 2 * sum(reaches) <= MOST_LINES
 
     def _level_about(self) -> Level:
-        """Local level without what is known of the combs already."""
+        """Local level of the residual, without the combs known already."""
         self.level = self.level or self.data.level_of(self.rest.samples)
         return self.level
 
     def _fitted(self, further: Sought | None, steps: int) -> tuple[Sequence[CombFit], NDArray[np.complex128]] | None:
-        """Fit those found together, with a further one if there is one: as from `fit_combs`."""
+        """Joint fit of the rotors found, and of a further one if given: as from `fit_combs`."""
         centre = self.centre if further else self.fits[0].centre
         rates = [*self.rates, further.rate] if further else self.rates
         reaches = [*self.reaches, further.reach] if further else self.reaches
@@ -457,7 +461,7 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float, how: type[Separa
         At least one.
     """
     nominal, centre = comb.chopping, comb.fit.centre
-    # one comb fitted to several finds its centre between them: a strong line near it tells better, if it is a body's
+    # one comb fitted to several rotors has its centre between theirs: the line of a body near it is a better centre
     for line, level_db in data.strong.lines:
         if level_db > LINE_DB and abs(line - centre) * data.pulses < 1.5 and abs(line) > data.rest_half:
             centre = line
@@ -487,7 +491,7 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float, how: type[Separa
             verdict = found.join(one) if one.evidence >= least else _NO_ROTOR
             if verdict.added:
                 break
-            # a tail's lines far from the first comb say nothing of the rotors about it
+            # a far candidate that is no rotor, as a tail's lines, says nothing of rotors near the first
             if one in sought and (verdict.unresolved or not one.is_apart):
                 said.append(verdict)
         else:

@@ -1,4 +1,4 @@
-"""Lines that a supply or an oscillator draws about a strong one: alike on both sides, and no blade's."""
+"""Sidebands that a supply or an oscillator puts about a strong line: alike on both sides, and no blade's."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,25 +7,26 @@ from ..lines import squared
 from .comb import Comb
 from .periodogram import Periodogram
 
-#: A sideband stands so far over the noise of a bin [1], the line that is modulated so far over all of them [dB] and so
-#: near to the comb's centre [bins].
+#: A sideband exceeds CLEAR times the noise of a bin [1]; the modulated line is UNDER_DB over all of them [dB] and
+#: within ON_CENTRE_BINS of the comb's centre [bins].
 CLEAR, UNDER_DB, ON_CENTRE_BINS = 20.0, 10.0, 1.0
 
-#: Together they hold so much power over the noise of a bin [1], and all other lines of the comb next to none.
+#: Together they hold LEAST_POWER times the noise of a bin [1]; all n other lines at most OTHERS + OTHERS_STD x sqrt(n).
 LEAST_POWER, OTHERS, OTHERS_STD = 1000.0, 10.0, 4.0
 
-#: Only where they are as few as lines of blades that are this long for each blade of the rotor [m], 4 pi of it over the
+#: Sidebands have no more orders than lines of blades this long for each blade of the rotor [m]: 4 pi of it over the
 #: wavelength. Most blades are longer.
 SHORT_M = 0.0135
 
-#: What both sides of an order do not have in common is less than this share of what they do, beside noise [nats].
+#: The part in which both sides of an order differ is less than UNLIKE_SHARE of what they share plus UNLIKE_NATS for
+#: noise [nats].
 UNLIKE_SHARE, UNLIKE_NATS = 0.01, 8.0
 
-#: What lies off the phases of a blade's lines is less than these shares of all orders but the strongest and of that,
-#: beside noise [nats an order].
+#: Lines are a blade's if the power off its phases is less than OFF_SHARE of all orders but the strongest, plus
+#: OFF_SHARE_OF_ONE of that, plus OFF_NATS for noise [nats an order].
 OFF_SHARE, OFF_SHARE_OF_ONE, OFF_NATS = 0.01, 1e-3, 4.0
 
-#: Phases of a single order are a blade's whatever they are.
+#: Least orders: the phase of a single one always fits a blade.
 LEAST_ORDERS = 2
 
 #: Phases tried for each order.
@@ -33,12 +34,12 @@ PHASES = 64
 
 
 def sideband_spacing(data: Periodogram, comb: Comb) -> float | None:
-    """Spacing of a comb's lines [cycles a sample] where they are those of a modulation, by the few that stand out.
+    """Spacing of a comb's lines [cycles a sample] if the few that stand out are those of a modulation.
 
-    What modulates a line by one real signal, in amplitude, phase or both, draws each order alike on both sides, its
-    phases mirrored about one that all share. So does a rotor of blades that are alike, but it is also even in time
-    about a blade's flash: from order to order its phases grow by equal steps, but for half turns. Those of a supply's
-    harmonics are any. Several rotors, unlike blades and what reflects on one side alone are not alike on both.
+    A line modulated by one real signal, in amplitude, phase or both, has each order alike on both sides, with phases
+    mirrored about one common phase. So has a rotor of like blades, but it is also symmetric in time about a flash: its
+    phases grow by equal steps from order to order, up to half turns. Phases of a supply's harmonics are arbitrary.
+    Several rotors, unlike blades and one-sided reflectors are not alike on both sides.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def sideband_spacing(data: Periodogram, comb: Comb) -> float | None:
         return None
     order, upper, lower = fit.orders[above][clear], seen[above][clear], seen[below][clear]
     each = np.sqrt((noise[above] + noise[below])[clear] / 4)
-    apart = int(np.gcd.reduce(order))  # the comb may be one of a fraction of their spacing
+    apart = int(np.gcd.reduce(order))  # the comb may have a fraction of their spacing
     order = order // apart
     if order[-1] > most:
         return None
@@ -90,8 +91,8 @@ def sideband_spacing(data: Periodogram, comb: Comb) -> float | None:
 def _common(
     upper: NDArray[np.complexfloating], lower: NDArray[np.complexfloating]
 ) -> NDArray[np.complexfloating] | None:
-    """What each order, over half the noise of a bin, has in common on both sides; None where they are not alike."""
-    # the phase that all are mirrored about; a quarter of a turn more is a modulated phase, and a blade of odd number
+    """Common part of both sides of each order, over half the noise of a bin; None where they are not alike."""
+    # the phase that all are mirrored about; a phase modulation, or an odd number of blades, adds a quarter of a turn
     mirror = np.exp(-1j * np.angle(((upper * lower) ** 2).sum()) / 4)
     upper, lower = mirror * upper, (mirror * lower).conj()
     parts = np.asarray([upper + lower, -1j * (upper - lower)], np.complex128) / 2
@@ -102,7 +103,7 @@ def _common(
 
 
 def _flash(order: NDArray[np.intp], common: NDArray[np.complexfloating]) -> bool:
-    """Whether phases grow by equal steps from order to order, but for half turns, as those of a blade's lines do."""
+    """Whether phases grow by equal steps from order to order, up to half turns, as those of a blade's lines do."""
     steps = np.pi * np.arange(PHASES * order[-1]) / (PHASES * order[-1])
     off = (common * np.exp(-1j * steps[:, None] * order)).imag
     power, least = squared(common), float((off**2).sum(axis=1).min())

@@ -1,7 +1,7 @@
-"""Lines that turn with rotors whose rates change, about a body: what they see, what they add up to, their products.
+"""Lines that follow rotors of changing rates, about a body: their means over records, their sums, their products.
 
-About the body the lines of both sides are the same cosines and sines, so that half as many numbers hold them, and their
-products with one another, all of which a fit needs, take a quarter of what the lines' own would.
+Relative to the body, lines n and -n consist of the same cosine and sine. So half as many numbers hold them, and the
+products of all lines, which a fit needs, take a quarter of the operations.
 """
 
 from collections.abc import Sequence
@@ -18,23 +18,23 @@ def _powers(rate: float, ahead: NDArray[np.float64], reach: int, pulses: int) ->
     out = np.empty((reach + 1, pulses), np.complex64)
     out[0] = 1
     out[1:2] = np.exp(2j * np.pi * rate * (middle_times(pulses) + ahead @ own_polynomials(pulses)))
-    for order in range(2, len(out)):  # of two halves: errors grow with the logarithm of the order
+    for order in range(2, len(out)):  # from two half orders: errors grow with the order's logarithm
         np.multiply(out[order // 2], out[order - order // 2], out=out[order])
     return out
 
 
 class TurningLines:
-    """Unit lines that turn with rotors, each with its own; their phases count from the middle of the record.
+    """Unit lines that each follow their rotor; phases count from the middle of the record.
 
     Parameters
     ----------
     body : ndarray, shape (pulses,)
         Turns of the body's line.
     rotors : sequence of (float, ndarray of shape (degrees,))
-        Of each rotor how far its lines lie apart [cycles a sample], and how far ahead of one that turns evenly it is,
-        by polynomials of `DEGREES` [samples].
+        Line spacing of each rotor [cycles a sample], and its time ahead of a constant-rate rotor, by polynomials of
+        `DEGREES` [samples].
     comb, order : ndarray of int, shape (lines,)
-        Which rotor's each line is, and of which order; each pair once.
+        Rotor and order of each line; each pair occurs once.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class TurningLines:
             self._waves[first[-1] + at : first[-1] + at + len(own)] = own.imag
         #: Which wave each line has, and the factor of its sine.
         self._wave, self._turn = first[comb] + np.abs(order), np.where(order < 0, -1j, 1j)
-        self._sides = (np.flatnonzero(order >= 0), np.flatnonzero(order < 0))  # no wave twice in either
+        self._sides = (np.flatnonzero(order >= 0), np.flatnonzero(order < 0))  # no wave occurs twice in one
         self._body = np.exp(2j * np.pi * body).astype(np.complex64)
 
     def means(self, records: NDArray[np.complexfloating]) -> NDArray[np.complex128]:
@@ -65,7 +65,7 @@ class TurningLines:
         return np.asarray(cosine[self._wave] + self._turn.conj()[:, None] * sine[self._wave], np.complex128)
 
     def sums(self, amplitudes: NDArray[np.complexfloating]) -> NDArray[np.complex64]:
-        """Records that lines of such amplitudes add up to, shape (records, pulses), of (records, lines)."""
+        """Sums of lines as records, shape (records, pulses), for amplitudes (records, lines)."""
         of_waves = np.zeros((2, len(amplitudes), len(self._waves) // 2), np.complex64)
         for side in self._sides:
             of_waves[0][:, self._wave[side]] += amplitudes[:, side]
@@ -75,7 +75,7 @@ class TurningLines:
         return np.asarray((real + 1j * imag) * self._body, np.complex64)
 
     def products(self, basis: NDArray[np.complexfloating]) -> NDArray[np.complex128]:
-        """Mean products of the lines' conjugates with one another, shape (lines, lines), without what a basis spans.
+        """Mean products of each line's conjugate with each line, shape (lines, lines), without what a basis spans.
 
         Parameters
         ----------

@@ -19,84 +19,85 @@ from .points import fit_points
 from .rotors import RATE_SPREAD, RESOLVED_BINS, TWO_POWER, Rotors, may_hold
 from .unlike_blades import blade_numbers
 
-#: A rotor flashes once a period on each side of the body. A second flash of this share of the first one's power is
-#: another rotor's, of a rate that the dwell does not tell apart, where so many lines tell.
+#: A rotor flashes once a period on each side of the body. A second flash of SECOND_FLASH_SHARE of the first one's
+#: power, in LEAST_FLASH_LINES lines a side at least, is another rotor's whose rate is unresolved.
 SECOND_FLASH_SHARE, LEAST_FLASH_LINES = 0.3, 6
 
-#: The same of a comb among others that has the power of two: rotors alone that are so much stronger than another leave
-#: 0.02 to 0.08.
+#: The same for a comb among others that has the power of two: single rotors that are that much stronger than another
+#: show 0.02 to 0.08.
 STRONG_FLASH_SHARE = 0.1
 
-#: Of each comb's lines at least this share is like another's, of few orders more: 0.7 and more of eight rotors told
-#: apart at 9.85 GHz, 0.77 of nearly all sets counted right at 3.3 to 24 GHz and 0 to 20 dB; in two of three of those in
-#: which fewer were told it is below 0.75. Few lines fit changing rates better: four that change have 0.92 and more at
-#: 10 and 20 dB, two that four steady ones passed for 0.76 to 0.83.
+#: Least share of each comb's line power that must match another comb's: LEAST_LIKE; with fewer than FEW_ORDERS orders
+#: LEAST_LIKE_FEW, for changing rates LEAST_LIKE_CHANGING. It was 0.7 and more of eight rotors resolved at 9.85 GHz,
+#: 0.77 of nearly all sets counted right at 3.3 to 24 GHz and 0 to 20 dB, and below 0.75 in two of three sets counted
+#: too low. Few lines fit changing rates better: four changing rotors have 0.92 and more at 10 and 20 dB, two that four
+#: steady ones passed for have 0.76 to 0.83.
 LEAST_LIKE, LEAST_LIKE_FEW, LEAST_LIKE_CHANGING = 0.65, 0.75, 0.88
 
-#: Two rotors whose rates the dwell does not tell apart flash together by chance, the more often the fewer orders show
-#: it. With fewer than this to each side unlike powers, or an odd number of combs, are the only signs of them: where
-#: an odd number was let pass, 29 of 201 sets told at 3.3 and 5.8 GHz were not of the four there were, else 9 of 181.
+#: Two unresolved rotors may flash together by chance, the more often the fewer orders show it. With fewer orders than
+#: this on each side, unequal powers or an odd number of combs are their only signs. With odd numbers accepted, 29 of
+#: 201 sets reported at 3.3 and 5.8 GHz were not of the four rotors there were, else 9 of 181.
 FEW_ORDERS = 16
 
-#: Of more orders an odd number and unlike powers are: of three like rotors told at 9.85 GHz and 0 dB the powers are
-#: within this in 14 of 17, where four passed for three at 0 dB and 9.85 or 24 GHz they were not in three.
+#: With more orders, an odd number of combs counts only if their powers differ by more than this factor. Of three like
+#: rotors reported at 9.85 GHz and 0 dB the powers are within it in 14 of 17 sets; where four passed for three at 0 dB
+#: and 9.85 or 24 GHz they were not in three.
 ODD_POWER = 1.45
 
-#: Blades that reflect at their tips are taken for this many, at most.
+#: Most blades assumed where blades reflect at their tips.
 MOST_TIPS = 6
 
-#: Points along a rotor's blades explain all of its lines but for this share of their power: 0.005 at most where blades
-#: are such rows; where they are not, or rotors of one rate are several, 0.02 and more is left.
+#: A row of points along a rotor's blades is accepted if it leaves less than this share of the lines' power: 0.005 at
+#: most where blades are such rows; 0.02 and more for other blades or several rotors of one rate.
 ROW_LEFT = 0.012
 
-#: What is left between the lines within the band, over what is left beyond it, and as a share of the lines' power,
-#: speaks of rotors that were not found where it exceeds both of these.
+#: The residual between the lines within the band shows rotors not found if it exceeds the noise beyond the band by more
+#: than LEFT_OVER of that noise and LEFT_SHARE of the lines' power. It needs LEAST_BINS bins.
 LEFT_OVER, LEFT_SHARE = 0.3, 0.05
 LEAST_BINS = 100
 
-#: A family of fewer lines than this to a side lies near the body: what is left of it is looked for from half a line out
-#: to the edge, in so many bins at least, and what a lone rotor leaves is held to the share of several where it comes to
-#: so many deviations. (Of 56 sets told as all there were, 30 to 160 ms at 2.4 to 24 GHz, 34 were not; now 18 of 38.)
+#: With fewer than FEW_LINES lines a side, the residual is taken from half a spacing off the body out to the edge, in
+#: LEAST_BINS_FEW bins at least. A lone rotor's is held to the LEFT_SHARE of several where it exceeds FEW_DEVIATIONS
+#: standard deviations. (Of 56 sets reported complete, 30 to 160 ms at 2.4 to 24 GHz, 34 were not; now 18 of 38.)
 FEW_LINES, LEAST_BINS_FEW, FEW_DEVIATIONS = 8, 16, 5.0
 
-#: What a lone rotor leaves may be a change of its rate; from this share of its lines' power on they say little of it.
+#: A lone rotor's residual may come from a change of its rate; above this share of its lines' power it is unresolved.
 LEFT_ALONE = 0.25
 
-#: Where that much of it is left, rates wander: all but the loudest rotor's lines run into one another, and its rate
-#: says little of theirs. Of steady rotors nothing is left, whether the dwell tells their rates apart or not.
+#: A residual above this share of the lines' power means wandering rates: lines of all but the strongest rotor run into
+#: one another, and its rate says little of theirs. Steady rotors leave no residual, resolved or not.
 LEFT_WANDERING = 0.5
 
-#: As does what is left where it comes, with so many of its deviations, to the mean rotor found: one more like it would
-#: not have been seen.
+#: A residual plus this many standard deviations that reaches the power of the mean rotor could hide one more rotor.
 HIDDEN_DEVIATIONS = 1.5
 
-#: What stands past the edge of a lone rotor's family, out to so many times it, speaks of rotors whose outer lines part
-#: where it comes to so many deviations, and to this share of the lines' power.
+#: Power past the family's edge, out to PAST_EDGE times the edge, shows rotors whose outer lines separate if it exceeds
+#: PAST_DEVIATIONS standard deviations and PAST_SHARE of a lone rotor's line power (LEFT_SHARE of several's).
 PAST_EDGE, PAST_DEVIATIONS, PAST_SHARE = 4.0, 4.0, 0.2
 
 
 def _flashes_twice(fit: CombFit, per_turn: int, tip: float, share: float = SECOND_FLASH_SHARE) -> bool:
-    """True where a comb's phases show the flashes of two rotors in each period, the second one of a share of the first.
+    """True where a comb's phases show two rotors' flashes a period, the second with a share of the first's power.
 
-    A blade that reflects along its length flashes once on each side. One that reflects at its tip alone is seen twice
-    at every speed below the tip's, before and after that comes straight on: its lines are J_n(Gamma) (the paper's eq.
-    24), and flash once when these are taken for what they are; `tip` is the order its edge has.
+    A blade that reflects along its length flashes once on each side. A tip that alone reflects passes every speed below
+    its own twice, before and after it moves straight at the radar: its lines are J_n(Gamma) (the paper's eq. 24), and
+    flash once when weighted by that; `tip` is the order of the edge. All kinds of blades must show two.
     """
     blades = [None, *((number, tip) for number in range(1, MOST_TIPS + 1))]
     return all(_second_flashes(fit, per_turn, blade, share) for blade in blades)
 
 
 def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None, share: float) -> bool:
-    """True where the second flashes on both sides are as strong as another rotor's, for blades of one kind.
+    """True where the second flashes on both sides are as strong as another rotor's, for one kind of blade.
 
     Parameters
     ----------
     fit, per_turn
-        The comb, and the strong lines' spacing in lines of it.
+        The comb; its strong lines are `per_turn` spacings apart.
     tip : (int, float), optional
-        Blades that reflect at their tips, and the tip's order; else they reflect along their length.
+        Number of blades that reflect at their tips, and the tip's order; None: blades reflect along their length.
     share
-        Of the first flash's power, both sides' mean, each half of it at least.
+        Least power of the second flash over the first, mean of both sides; each side has half of it.
     """
     from scipy.special import jv  # here, because predicting needs no such import
 
@@ -117,9 +118,9 @@ def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None, 
             alone = np.abs(fft.fft(shape**2, size)) ** 2 / max(float((shape**2).sum()) ** 2, 1e-30)
         power = np.abs(fft.fft(lines, size)) ** 2
         first = int(power.argmax())
-        if not power[first]:  # such tips have no lines of these orders: those that are there flash as another kind's
+        if not power[first]:  # such tips have no lines at these orders: those seen are of another kind
             return False
-        power = power / power[first] - np.roll(alone, first)  # few lines of unlike strength flash beside as well
+        power = power / power[first] - np.roll(alone, first)  # few lines of unequal strength have side lobes
         lines_away = np.abs((np.arange(size) - first + size // 2) % size - size // 2) / FLASH_PADDING
         other = lines_away > FLASH_WIDTH
         for part in (2, 3):  # unequal blades of one rotor flash at fractions of the turn
@@ -128,15 +129,15 @@ def _second_flashes(fit: CombFit, per_turn: int, tip: tuple[int, float] | None, 
     return len(shares) == 2 and min(shares) > share / 2 and sum(shares) > 2 * share
 
 
-#: Of each bin: how far from a centre it is [cycles a sample], its power, whether it can be seen.
+#: Of each bin: its distance from a centre [cycles a sample], its power, whether it can be seen.
 _About = tuple[NDArray[np.float64], NDArray[np.floating], NDArray[np.bool_]]
 
 
 def power_about(data: Periodogram, rest: NDArray[np.complex128], centre: float) -> _About:
-    """Of each bin of what is left: how far from a centre it is [cycles a sample], its power, whether it can be seen.
+    """Each bin of a residual: its distance from a centre [cycles a sample], its power, whether it can be seen.
 
-    A background's skirt is nothing that rotors leave: there the power is in units of that, or what is so loud would
-    outweigh all others by chance.
+    The skirt of a static background is no residue of rotors. There the power is divided by the local level, or such
+    loud bins would outweigh all others by chance.
     """
     frequency = fft.fftfreq(data.pulses)
     away = np.abs(from_whole(np.abs(frequency - centre)))
@@ -149,18 +150,18 @@ def power_about(data: Periodogram, rest: NDArray[np.complex128], centre: float) 
 
 
 class Left(NamedTuple):
-    """What combs leave within their band.
+    """Residual of combs within their band.
 
     Parameters
     ----------
     share : float
-        Of the lines' power, 0 where it is not clearly more than the noise beyond the band.
+        Residual over the lines' power, 0 where it does not clearly exceed the noise beyond the band.
     may_hide : bool
-        Whether it may be a rotor.
+        Whether it may hide a rotor.
     deviations : float
-        How far it is from noise, in its own deviations; infinite where too little of the band is seen to tell.
+        Its excess over noise in standard deviations; infinite where too little of the band is seen to tell.
     few : bool
-        Whether the family has so few lines that it was looked at right beside them.
+        Whether there are fewer than `FEW_LINES` lines a side, so that the residual close to the body counts.
     """
 
     share: float
@@ -170,9 +171,9 @@ class Left(NamedTuple):
 
 
 def left_over(about: _About, fits: Sequence[CombFit], edge: float) -> Left:
-    """What is left within the band.
+    """The residual within the band.
 
-    Fitted lines take noise out with them: each as much as it was let free, those that lie in one another only once.
+    Fitted lines take out noise as well: each the share snr / (1 + snr), overlapping ones only once.
     """
     away, power, usable = about
     pulses = len(power)
@@ -182,7 +183,7 @@ def left_over(about: _About, fits: Sequence[CombFit], edge: float) -> Left:
     beyond = usable & (away > 1.1 * edge)
     if within.sum() < (LEAST_BINS_FEW if few else LEAST_BINS):
         return Left(0.0, False, np.inf, few)
-    # where lines come back from the other end of the span, or leave too little of it, the floor tells the noise
+    # where lines fold back over the span, or too little lies beyond the band, the noise is that of the floor
     nothing_beyond = edge > 0.5 or beyond.sum() < LEAST_BINS
     noise = 1.0 if nothing_beyond else float(power[beyond].mean())
     over = float(power[within].mean()) - noise
@@ -203,9 +204,9 @@ def left_over(about: _About, fits: Sequence[CombFit], edge: float) -> Left:
 
 
 def _stands_past(about: _About, fits: Sequence[CombFit], edge: float) -> bool:
-    """True where more than noise stands past the edge of a line family: near the noise its inner lines alone are seen.
+    """True where more than noise lies past the edge of a line family: near the noise only inner lines are seen.
 
-    Rotors of unlike rates have their lines in one another at the inner orders, and apart at the outer ones.
+    Lines of rotors of unequal rates overlap at the inner orders and separate at the outer ones.
     """
     away, power, usable = about
     furthest = min(PAST_EDGE * edge, (edge + 0.5) / 2)
@@ -224,7 +225,7 @@ def _stands_past(about: _About, fits: Sequence[CombFit], edge: float) -> bool:
 def _may_pair(rotors: Rotors, tip: float) -> bool:
     """True where one of several combs may be two rotors that flash together and pass for one.
 
-    Like rotors of an airframe are of an even number, and of one power.
+    Like rotors of an airframe are even in number and equal in power.
 
     Parameters
     ----------
@@ -241,16 +242,16 @@ def _may_pair(rotors: Rotors, tip: float) -> bool:
 
 
 def _are_unlike(fits: Sequence[CombFit], edge: float, tip: float, *, changing: bool) -> bool:
-    """True where the lines of one of several combs are not those of a rotor like another one.
+    """True where the lines of one of several combs are unlike those of every other rotor.
 
     Parameters
     ----------
     fits, edge
-        As of `like_shares`.
+        As in `like_shares`.
     tip : float
         Order of the edge.
     changing : bool
-        Whether these were fitted as of rates that change.
+        Whether they were fitted with changing rates.
     """
     few = LEAST_LIKE_CHANGING if changing else LEAST_LIKE_FEW
     return bool(like_shares(fits, edge).min() < (few if tip < FEW_ORDERS else LEAST_LIKE))
@@ -265,7 +266,7 @@ def judged(
     *,
     fitted_to: float | None = None,
 ) -> Rotors:
-    """Rotors, called unresolved where their flashes, or what they leave, speak of more than were found.
+    """The rotors, marked unresolved where their flashes or their residual show more than were found.
 
     Parameters
     ----------
@@ -276,7 +277,7 @@ def judged(
     blades : int, optional
         Of a rotor.
     fitted_to : float, optional
-        How far out lines were fitted [cycles a sample from the body], where that may not be as far as they reach.
+        Of changing rotors, how far out lines were fitted [cycles a sample from the body]: perhaps less than they reach.
     """
     about = power_about(data, rotors.rest, rotors.fits[0].centre)
     share, hidden, deviations, few = left_over(about, rotors.fits, edge)
@@ -287,27 +288,27 @@ def judged(
         return rotors
     several = len(rotors.fits) > 1
     per_turn = comb.per_turn if rotors.fits[0] is comb.fit else 1
-    tip = edge / (per_turn * max(fit.spacing for fit in rotors.fits))  # an order is the same for all: blades are alike
+    tip = edge / (per_turn * max(fit.spacing for fit in rotors.fits))  # the same order for all: blades are alike
     strong = may_hold(rotors.fits) > 1 if several else np.array([False])
     twice = any(
         _flashes_twice(fit, per_turn, tip, STRONG_FLASH_SHARE if more else SECOND_FLASH_SHARE)
         for fit, more in zip(rotors.fits, strong, strict=True)
     )
     paired = several and (_may_pair(rotors, tip) or _are_unlike(rotors.fits, edge, tip, changing=fitted_to is not None))
-    if twice and not several and per_turn == 1:  # unlike blades of one rotor do so in its turn
+    if twice and not several and per_turn == 1:  # unlike blades of one rotor flash in turn
         twice = flashes_in_period(comb.fit, blade_numbers(None), tip)[0] == 1
-    if twice and not several:  # or points along a lone one's blades do
+    if twice and not several:  # so do points along a lone rotor's blades
         numbers = range(1, MOST_TIPS + 1) if blades is None else (blades,)
         row = fit_points(rotors.fits[0], per_turn, data.pulses, numbers)
         if row is not None and row.left < ROW_LEFT:
             chopping = per_turn * rotors.fits[0].spacing
             rotors = replace(rotors, row_edge=(row.edge * chopping, row.edge_std * chopping))
             twice = False
-    # lines that come back from the other end of the span are none of a family that ends within it
+    # folded lines contradict a lone rotor's family whose edge lies within the span
     contradicted = not several and rotors.fits[0].is_folded and edge < 0.5
     past = (not several or fitted_to is not None) and _stands_past(about, rotors.fits, fitted_to or edge)
     if fitted_to is None and others_flash(data, rotors.rest, (fit.spacing for fit in rotors.fits), edge):
-        return not_all(rotors, data, any_rate)  # they may be any
+        return not_all(rotors, data, any_rate)  # their rates may be any
     held_to = LEFT_SHARE if several or (few and deviations > FEW_DEVIATIONS) else LEFT_ALONE
     if not (twice or paired or hidden or past or contradicted or share > held_to):
         return rotors
@@ -316,7 +317,7 @@ def judged(
 
 
 def not_all(rotors: Rotors, data: Periodogram, apart: float = 0.0) -> Rotors:
-    """Rotors, called unresolved, spread by what the dwell tells apart at least, or by so much [cycles a sample]."""
+    """The rotors marked unresolved; their spread is at least what the dwell resolves, and `apart` [cycles a sample]."""
     reach = max(int(np.abs(rotors.fits[0].orders).max()), 1)
     least = RESOLVED_BINS / (reach * data.pulses)
     return replace(rotors, resolved=False, spread=max(rotors.spread, least, apart))

@@ -1,7 +1,7 @@
-"""Weak lines between those of a comb: blades that are not quite alike have some at every multiple of the rotation rate.
+"""Weak lines between those of a comb: slightly unlike blades have them at every multiple of the rotation rate.
 
-Left out of the fit they leak into the strong ones, all the same way, and what they pull there passes for another rate
-or for one that changes: of two blades 0.1 rad apart, a quarter of a millimetre at 10 GHz, by some ten deviations.
+Left out of the fit they leak into the strong ones, all in the same way, and this bias passes for another rate or for
+one that changes: for two blades 0.1 rad apart, a quarter of a millimetre at 10 GHz, by some ten standard deviations.
 """
 
 from dataclasses import replace
@@ -17,15 +17,14 @@ from .periodogram import Level, Periodogram
 from .slow_lines import remove_bands
 from .unlike_blades import UNEQUAL_NATS, blade_numbers, two_means_nats
 
-#: They are fitted where so much speaks for them, beside what lies as far from any line [nats]: noise that is fitted
-#: does no harm. They must be so far from the strong ones and from one another [bins].
+#: Weak lines are fitted from this evidence on, against places as far from any line [nats]: fitting noise does no harm.
+#: They must lie LEAST_BINS from the strong ones and from one another [bins].
 LEAST_NATS, LEAST_BINS = 3.0, 2.5
 
-#: The mirror image of a comb, which an imbalance of both channels makes, is as much weaker as the body's is, within so
-#: large a factor.
+#: The mirror image of a comb, from an imbalance of I and Q, is as much weaker as the body's is, within this factor.
 IMAGE_FACTOR = 6.0
 
-#: They are as even as noise: where the strongest of them holds so large a share of all, that is another's line.
+#: They are as even as noise: if the strongest of them holds more than this share of all, it is another's line.
 MOST_SHARE = 0.3
 
 
@@ -39,14 +38,14 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None) -> tup
     comb : Comb
         The comb found in it.
     blades : int or None
-        Of a rotor, where that is known: their number is else one of `blade_numbers`, if lines show it.
+        Blades of a rotor, where known: else any of `blade_numbers` that the lines show.
 
     Returns
     -------
     data : Periodogram
         The record without the lines between; the one given where there are none.
     comb : Comb
-        The comb as it is fitted beside them.
+        The comb as fitted jointly with them.
     """
     fit, best, most, sure = comb.fit, 1, 0.0, True
     if comb.per_turn > 1 or data.one_channel:
@@ -59,7 +58,7 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None) -> tup
         if nats > LEAST_NATS:
             best, most = parts, nats
             sure = not _mirrored(fit, parts, data.pulses) or excess > IMAGE_FACTOR * image
-            sure &= not may_come_back(last, fit.spacing)  # further lines fall between
+            sure &= not may_come_back(last, fit.spacing)  # folded lines fall between
     if best == 1:
         return data, comb
     reach = (int(fit.orders.min()) * best, int(fit.orders.max()) * best)
@@ -83,7 +82,7 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None) -> tup
 
 
 def with_all_lines(data: Periodogram, comb: Comb, blades: int | None) -> Comb:
-    """A comb of unlike blades with the lines that it leaves out: the search may take two of four blades for all.
+    """A comb of unlike blades with the lines that it lacks: the search may take two of four blades for all.
 
     Parameters
     ----------
@@ -93,7 +92,7 @@ def with_all_lines(data: Periodogram, comb: Comb, blades: int | None) -> Comb:
     Returns
     -------
     Comb
-        The one given where nothing more is between its lines, or has no weak ones.
+        The one given where nothing more lies between its lines, or it has no weak ones.
     """
     fit = comb.fit
     numbers = [number for number in blade_numbers(blades) if number > comb.per_turn and number % comb.per_turn == 0]
@@ -116,20 +115,20 @@ def with_all_lines(data: Periodogram, comb: Comb, blades: int | None) -> Comb:
 
 
 def _between(data: Periodogram, fit: CombFit, left: LinesSeen, level: Level, parts: int) -> tuple[float, float]:
-    """What speaks for lines at every part of a comb's spacing, beside what lies as far from any [nats].
+    """Evidence of lines at fractions 1 / `parts` of a comb's spacing, against places as far from any [nats].
 
     Returns
     -------
     nats : float
-        0 where nothing does, or one of them holds too much of all.
+        0 where there is none, or one line holds too much of all.
     excess : float
-        Their mean power over the noise, less that of noise [1].
+        Mean power of the lines over the noise, less 1.
     """
     if fit.spacing * data.pulses < LEAST_BINS * parts:
         return 0.0, 0.0
     last = int(np.abs(fit.orders).max())
     order = np.arange(-last * parts, last * parts)
-    own = order[np.gcd(order, parts) == 1]  # those of fewer blades may be there without them
+    own = order[np.gcd(order, parts) == 1]  # lines of fewer blades may be there without these
     places = (fit.centre + fit.spacing * tried / parts for tried in (own, order + 0.5))
     seen = [place[data.usable(place)] for place in places]
     there, beside = (squared(left.means(place)[0]) * data.pulses / level(place) for place in seen)
@@ -140,15 +139,15 @@ def _between(data: Periodogram, fit: CombFit, left: LinesSeen, level: Level, par
 
 
 def _mirrored(fit: CombFit, parts: int, pulses: int) -> bool:
-    """True where the mirror image of a comb, about velocity zero, lies at so many parts of its spacing."""
+    """True where the mirror image of a comb, about velocity zero, lies at fractions 1 / `parts` of its spacing."""
     part = fit.spacing / parts
     return round(2 * fit.centre / part) % parts != 0 and bool(from_mirror_bins(part, fit.centre, pulses) < MIRROR_BINS)
 
 
 def _image_of_lines(data: Periodogram, fit: CombFit, rest: LinesSeen, level: Level) -> float:
-    """Mean power over noise of the mirror image of a comb's lines, if it is as weak as that of the body's line.
+    """Mean power over noise of the mirror image of a comb's lines, if as much weaker as that of the body's line.
 
-    Infinite where nothing tells: one of both was taken out with what is at rest.
+    Infinite where unknown: the body's line or its image was taken out with the background.
     """
 
     def line_at(place: float) -> float:
@@ -163,7 +162,7 @@ def _image_of_lines(data: Periodogram, fit: CombFit, rest: LinesSeen, level: Lev
 
 
 def by_rotation(comb: Comb) -> Comb:
-    """The same comb counted in rotations, so that the weak lines between its own are of it too."""
+    """The same comb at the spacing of the rotation rate, so that the weak lines between its own belong to it."""
     parts, fit = comb.blades // comb.per_turn, comb.fit
     finer = replace(fit, spacing=fit.spacing / parts, spacing_std=fit.spacing_std / parts, orders=fit.orders * parts)
     return replace(comb, fit=finer, last=comb.last * parts, per_turn=comb.per_turn * parts)
