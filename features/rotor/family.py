@@ -46,6 +46,10 @@ GEARED_STEPS = 4
 #: were ever resolved.
 CHANGE_LEAVES = 2.0
 
+#: Mean power of the residual over the noise above which changing rates are sought whatever that difference: smeared
+#: lines beyond the band may leave as much as those within.
+LOUD_RESIDUAL = 1.5
+
 #: If the edge of the fitted lines and that of all power about the orders differ by more than this many standard
 #: deviations, the fit of outer lines went astray.
 EDGE_DEVIATIONS = 4.0
@@ -294,7 +298,9 @@ def _changing(data: Periodogram, family: Family, edge: float) -> Family:
             return replace(family, ahead=left)
     else:
         about = power_about(data, known.rest, known.fits[0].centre)
-        if abs(left_over(about, known.fits, edge).deviations) < CHANGE_LEAVES:
+        _, power, seen = about
+        is_loud = float(power[seen].mean()) > LOUD_RESIDUAL
+        if abs(left_over(about, known.fits, edge).deviations) < CHANGE_LEAVES and not is_loud:
             return family
     unsure = replace(family, rotors=not_all(known, data)) if known.resolved else family
     reach = max(round(edge / comb.chopping), 1)
