@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 from bladewing.features.rotor.comb import find_comb
-from bladewing.features.rotor.comb_fit import over_orders
+from bladewing.features.rotor.comb_fit import fit_combs, over_orders
 from bladewing.features.rotor.periodogram import prepare
 
 from ...benchmarks import records
+from ..signals import RADAR, rotors
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -27,3 +28,15 @@ def test_powers_are_averaged_over_the_orders_used_of_one_comb():
     rising = over_orders(comb, order, used)(np.where(used, order, 1e6).astype(float))
     assert rising[0] == pytest.approx(np.mean([-4, -3, -2]))
     assert rising[4] == pytest.approx(0.0)
+
+
+def test_a_comb_is_fitted_as_far_out_again_as_it_was() -> None:
+    """Its margin is none of its reach: fitted to again and again, it would grow."""
+    data = prepare(rotors([59.3]).astype(np.complex64), **RADAR)
+    spacing, reach = 2 * 59.3 / RADAR["prf_hz"], (-20, 22)
+    for _ in range(3):
+        fitted = fit_combs(data, 0.0, [spacing], [reach])
+        assert fitted is not None
+        ((fit,), _) = fitted
+        assert fit.reach == (-20, 22)
+        reach = fit.reach
