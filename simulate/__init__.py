@@ -1,6 +1,6 @@
 """From a scene to slow-time IQ: radar, rotors, birds, clutter, receiver, and labelled records of them.
 
-`Scene` is fetched when it is first asked for, because checking one needs pydantic and drawing records does not.
+`Scene` is imported on first use, because checking a scene needs pydantic and drawing records does not.
 """
 
 from typing import TYPE_CHECKING

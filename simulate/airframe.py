@@ -1,4 +1,4 @@
-"""Whole aircraft at the speed of their noise: rotors, body and path, tile by tile in float32."""
+"""Echo of whole aircraft at about the cost of drawing their noise: rotors, body and path, tile by tile in float32."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -54,8 +54,8 @@ def rotors_echo(
 ) -> NDArray[np.complex64]:
     """Echo of all rotors of each aircraft, carried along and shaken by its body.
 
-    The sum over the rotors of hub x `rotor_echo`, times the phasor of the path, to float32; much cheaper than these.
-    The airframe is rigid, so its vibration moves every hub as it moves the body.
+    It is the sum over the rotors of hub x `rotor_echo`, times the phasor of the path, to the precision of float32, but
+    much cheaper to compute. The airframe is rigid, so its vibration moves every hub as it moves the body.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def rotors_echo(
     vibration_rad, vibration_hz, vibration_phase_rad : array_like, shape (records,)
         As in `body_echo`.
     out : ndarray of complex64, shape (records, pulses), optional
-        What the echo is added to, such as the noise: saves passing over the records once more.
+        What the echo is added to, such as the noise: this saves another pass over the records.
 
     Returns
     -------
@@ -79,7 +79,8 @@ def rotors_echo(
     Raises
     ------
     ValueError
-        If a blade is a row of no points, or of more than float32 can tell apart, or too many wavelengths long for it.
+        If a rotor's `points` is below 1 or above `MOST_FLOAT32_POINTS`, or a blade is too many wavelengths long for
+        float32.
     """
     most = max((rotor.points or 0 for rotor in rotors), default=0)
     if most > MOST_FLOAT32_POINTS:
@@ -226,7 +227,7 @@ def _blades(rotor: Rotor, radar: Radar, records: int) -> Blades:
 
 
 def _put(into: Array32, values: Array32, *, add: bool) -> None:
-    """Add a tile to the records, or write it; its excess width falls away."""
+    """Add a tile to the records, or write it; columns beyond the last pulse are dropped."""
     if add:
         into += values[:, : into.shape[1]]
     else:

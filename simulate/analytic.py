@@ -1,8 +1,8 @@
-"""The line spectrum of a steady rotor, the paper's eq. (24): a third way to the same echo, without any time in it.
+"""The line spectrum of a steady rotor, the paper's eq. (24): a third way to the same echo, without time in it.
 
 exp(j G cos(theta)) = sum over m of j^m J_m(G) exp(j m theta), G = 4 pi r cos(beta) / wavelength. So a scatterer at
-radius r has a line every rotation rate, of amplitude J_m(G); of N equal blades every N-th line is left. (The paper's
-phase factor, phi - pi/2 in place of phi + pi/2, counts the angle of a blade from the side away from the radar.)
+radius r has a line at every multiple of the rotation rate, of amplitude J_m(G); N equal blades leave every N-th line.
+(The paper's phase factor, phi - pi/2 in place of phi + pi/2, counts a blade's angle from the side away from the radar.)
 """
 
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class LineSpectrum:
 
 
 def highest_order(gamma: float) -> int:
-    """Order beyond which J_m(gamma) is below 1e-17: behind the edge m = gamma it dies within some gamma^(1/3)."""
+    """Order beyond which J_m(gamma) is below 1e-17: beyond m = gamma it decays within a few gamma^(1/3) orders."""
     return int(np.ceil(gamma + 12 * np.cbrt(gamma) + 20))
 
 
@@ -66,7 +66,7 @@ def blade_coefficients(gamma_root: float, gamma_tip: float, highest: int) -> NDA
     ndarray of float64, shape (highest + 1,)
     """
     width = gamma_tip - gamma_root
-    if width < 1e-6:  # a point, to 1e-13: the mean's error is of the second order about the middle
+    if width < 1e-6:  # a point at the middle, right to 1e-13: the error is of second order in the width
         return point_coefficients((gamma_root + gamma_tip) / 2, highest)
     top = max(highest, highest_order(gamma_tip)) + 2
     orders = np.arange(top + 1)
@@ -115,11 +115,11 @@ def rotor_lines(
     one_side = one_side * np.array([1, 1j, -1, -1j])[np.arange(highest + 2) % 4]
     both = np.concatenate([one_side[:0:-1], one_side])
     orders = np.arange(-highest, highest + 1)
-    # sin(theta) moves every line to its two neighbours
+    # multiplying by sin(theta) shifts every line by one order to each side
     blade = both[1:-1] + edge_asymmetry / 2j * (both[:-2] - both[2:])
     turns = TWO_PI * np.arange(len(amplitudes)) / len(amplitudes)
     comb = np.exp(1j * orders[:, None] * turns) @ amplitudes.astype(np.complex128)
-    comb[np.abs(comb) < 1e-12 * np.abs(amplitudes).sum()] = 0  # lines between those of equal blades are not there
+    comb[np.abs(comb) < 1e-12 * np.abs(amplitudes).sum()] = 0  # equal blades cancel the lines between, to rounding
     amplitude = blade * comb * np.exp(1j * orders * phase_rad)
     frequency = np.asarray(orders * rotation_hz - 2 * velocity_mps / wavelength_m, np.float64)
     return LineSpectrum(orders, frequency, amplitude)

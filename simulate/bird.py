@@ -60,7 +60,7 @@ def stroke_angles_rad(
     cycle_rad : ndarray, shape (..., pulses)
         Phase of the wingbeat [rad]; the wing is highest at 0.
     stroke_scale : array_like, shape (...)
-        Scale of the amplitudes, 1 for the published ones; 0 is a glide.
+        Scale of the amplitudes: 1 for the published ones, 0 for a glide.
 
     Returns
     -------
@@ -166,8 +166,8 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
     radar : Radar
         The radar that looks.
     kind : {"flapping_bird", "gliding_bird", "flock"}
-        Steady flapping; flap and glide, or glide and flap (the turn may fall into the dwell); 2 to `MAX_FLOCK`
-        birds.
+        "flapping_bird" flaps steadily. "gliding_bird" flaps and then glides, or glides and then flaps; the change may
+        fall into the dwell. "flock" is 2 to `MAX_FLOCK` flapping birds.
 
     Returns
     -------
@@ -197,7 +197,7 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
     phase = draws.value("phase_rad", MAX_FLOCK)
     level = np.exp(0.4 * draws.normal(MAX_FLOCK) + 1j * draws.value("phase_rad", MAX_FLOCK)).astype(np.complex64)
     pause, first = draws.uniform(), draws.chance(0.5)
-    # a glide through the whole dwell hardly moves the wings, or not at all
+    # in four gliding birds of ten the wings hardly move in the whole dwell: 5e-6 to 0.05 of the stroke
     still = np.where(draws.chance(0.4), 0.05 * 1e-4 ** draws.uniform(), 1.0)
     sweep = draws.value("sweep_scale")
     body_db = draws.value("bird_body_db")
@@ -231,7 +231,7 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
         micro[rows] += moved * wings
         body[rows] += moved
     truth = {
-        "wingbeat_hz": rate[:, 0],  # what is rendered; of a flock, the first member's
+        "wingbeat_hz": rate[:, 0],  # as rendered; in a flock that of the first member
         "mass_kg": mass,
         "span_m": span,
         "members": members.astype(float),
@@ -244,7 +244,7 @@ def draw_bird(draws: Draws, radar: Radar, kind: str) -> Target:
 def _pause(
     cycle: NDArray[np.float64], when: NDArray[np.float64], beats: NDArray[np.float64], first: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """Hold the wings still on one side of a moment, before it or (not `first`) after it.
+    """Phase of the wingbeat with the wings held still before a moment (`first`) or after it (not `first`).
 
     The moment lies inside the dwell, or up to a quarter of it before or after.
     """

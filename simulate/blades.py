@@ -1,11 +1,11 @@
 """The blades of a rotor at given angles: the inner loop of every rotor, in float32 and in place.
 
-Opposite blades, at theta and theta + pi, are conjugates: weighed by a (1 + s sin) and b (1 - s sin) they add up to
+Opposite blades, at theta and theta + pi, are conjugates. Weighted by a (1 + s sin) and b (1 - s sin), they sum to
 
     sinc(x) [((a + b) + (a - b) s sin(theta)) cos(y) + j ((a - b) + (a + b) s sin(theta)) sin(y)]
 
-with x and y proportional to cos(theta). For a blade anywhere on the hub all four, x, y and the two weights, are linear
-in the first blade's cosine and sine and in 1: a small matrix a record gives them in one product. Where a blade is a row
+with x and y proportional to cos(theta). For a pair at any angle on the hub, x, y and the two weights are all linear in
+the first blade's cosine, its sine and 1: a small matrix a record gives all four in one product. Where a blade is a row
 of n points in place of a line, Dirichlet's kernel sin(n z) / (n sin z), z = x / (n - 1), stands for sinc(x).
 """
 
@@ -23,7 +23,7 @@ TILE_SAMPLES = 1 << 15
 #: Keeps sin(x) / x from 0 / 0 where cosines cancel; far below what a float32 of any other x resolves.
 TINY = np.float32(1e-30)
 
-#: Least phase of a whole blade [rad]: a blade without length is a point, and sin(x) / x = 1.
+#: Least half phase between root and tip [rad]: a blade without length is then a point, with sin(x) / x = 1.
 _LEAST_HALF = 1e-20
 
 Array32 = NDArray[np.float32]
@@ -31,7 +31,7 @@ Array32 = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Blades:
-    """Blades of one rotor a record, as the inner loop wants them.
+    """Blades of one rotor a record, in the form that the inner loop needs.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Blades:
         edge_asymmetry: ArrayLike,
         points: int | None = None,
     ) -> "Blades":
-        """From the parameters of `rotor_echo`, for records of the leading shape `lead`.
+        """Make them from the parameters of `rotor_echo`, for records of leading shape `lead`.
 
         Raises
         ------
@@ -99,7 +99,7 @@ class Blades:
         return self.maps.shape[2] == 3
 
     def sum(self, rows: slice, angle: Array32, room: "Room", real: Array32, imag: Array32 | None) -> None:
-        """Sum of the echoes of some records' blades.
+        """Sum the echoes of some records' blades.
 
         Parameters
         ----------
@@ -139,9 +139,10 @@ class Blades:
 
 
 def _share(x: Array32, points: int | None, room: Array32) -> Array32:
-    """What is left of a blade's echo where its parts differ in phase, in `room` (3, *x.shape); spoils `x`.
+    """Echo of a blade over that with all its parts in phase: sinc(x), or sin(n z) / (n sin z) for a row.
 
-    By Chebyshev's recursion sin(n z) / sin(z) is never 0 / 0, however large z.
+    It lies in `room`, shape (3, *x.shape); `x` is overwritten. By Chebyshev's recursion sin(n z) / sin(z) is never
+    0 / 0, however large z.
     """
     before, share, product = room
     if not points:

@@ -1,7 +1,8 @@
-"""How wrong an echo is at most when an effect is left out: amplitudes, pulse by pulse, in the unit of a scene's levels.
+"""Upper bounds of an echo's error when an effect is left out: amplitudes, pulse by pulse, in a scene's unit.
 
-A blade is a mean over its radius, so all rests on moments of a phasor: |integral of x^n exp(j z x) over 0..1| is at
-most 1 / (n + 1), and by parts at most (1 + n M(n-1)) / |z|. Errors of blades and rotors are added as amplitudes.
+A blade's echo is a mean over its radius, so the bounds rest on moments of a phasor. M(n) = |integral of x^n exp(j z x)
+over 0..1| is at most 1 / (n + 1), and by integration by parts at most (1 + n M(n-1)) / |z|. Errors of blades and rotors
+are added as amplitudes.
 """
 
 from collections.abc import Callable
@@ -23,11 +24,11 @@ from .render_uav import rotor_angle_rad, uav_echo, vibration_rad
 
 Amplitude = NDArray[np.float64]
 
-_SPACING_CLASSES = 40  # of a blade's angles to the line of sight
+_SPACING_CLASSES = 40  # classes of the slope of the phase along a blade, which its angle to the line of sight sets
 
 
 def moment_envelope(order: int, z: Amplitude, root_share: float = 0.0, points: int | None = None) -> Amplitude:
-    """Most that the mean of (r / tip)^order exp(j phase) over a blade can be, shape of `z`.
+    """Upper bound of |mean of (r / tip)^order exp(j phase)| over a blade, shape of `z`.
 
     Parameters
     ----------
@@ -38,8 +39,8 @@ def moment_envelope(order: int, z: Amplitude, root_share: float = 0.0, points: i
     root_share : float
         Radius of the root over that of the tip, 0..1.
     points : int, optional
-        Points of a row, whose phases come together again and again; None for a line. By parts, as for a line: the sum
-        of rising numbers with phases d apart is at most the last of them over |sin(d / 2)|.
+        Points of a row, whose phases agree again at regular steps of `z`; None for a line. By summation by parts, a
+        sum of rising numbers with phases d apart is at most the last of them over |sin(d / 2)|.
     """
     if points:
         whole = np.mean(row_m(root_share, 1.0, points) ** order)
@@ -57,7 +58,7 @@ def moment_envelope(order: int, z: Amplitude, root_share: float = 0.0, points: i
 
 
 def chord(phase_rad: Amplitude) -> Amplitude:
-    """|exp(j phase) - 1|, held at 2 beyond half a turn: what a phase error of at most this size does."""
+    """Upper bound of |exp(j e) - 1| for phase errors e of at most this size [rad]; 2 beyond half a turn."""
     return 2 * np.sin(np.minimum(np.abs(phase_rad), np.pi) / 2)
 
 
@@ -81,7 +82,7 @@ class UavBounds:
         self.centre_m = centre_range_m(part, self.times_s, True)
 
     def of(self, effect: str) -> Amplitude:
-        """Bound of leaving out one of `fidelity.UAV_EFFECTS`."""
+        """Bound of the error of leaving out one of `fidelity.UAV_EFFECTS`."""
         bounds = {
             "blade_curvature": self.blade_curvature,
             "hub_curvature": self.hub_curvature,
@@ -102,7 +103,7 @@ class UavBounds:
         return self.wavenumber * rotor.blade_length_m * float(np.cos(self.part.beta_rad(rotor)))
 
     def _moments(self, rotor: RotorPart) -> tuple[float, Callable[[int, Amplitude], Amplitude]]:
-        """The root's share of a blade, and the envelope of its moments by order and phase."""
+        """Root radius over tip radius, and the rotor's `moment_envelope` as a function of order and phase."""
         share = rotor.root_m / rotor.blade_length_m
         return share, partial(moment_envelope, root_share=share, points=rotor.points)
 
@@ -146,11 +147,11 @@ class UavBounds:
 
     @cached_property
     def level(self) -> Amplitude:
-        """Most that the whole echo's amplitude can be, with every effect."""
+        """Upper bound of the whole echo's amplitude, with every effect."""
         return np.abs(uav_echo(self.part, self.radar, self.times_s, CLOSED_FORM)) + self.blade_curvature()
 
     def _apart(self, path_rad: Amplitude) -> Amplitude:
-        """What scatterers off the line of sight add to a turn of the whole echo: they move a little less than it."""
+        """Error to add where the whole echo is turned by `path_rad`: parts off the line of sight move a little less."""
         total = sum(self.part.amplitude(r.flash_db) * 2 * sum(r.amplitudes) for r in self.part.rotors)
         total += sum(self.part.amplitude(b.level_db) for b in self.part.body)
         return total * np.minimum(2, np.abs(path_rad)) * (self.part.reach_m / self.centre_m.min()) ** 2
@@ -185,18 +186,18 @@ class UavBounds:
         return turned + self.level * chord(np.abs(phase) + np.abs(shaken)) + self._apart(phase)
 
     def _turned(self, rotor: RotorPart, times_s: NDArray[np.float64], *, wanders: bool = True) -> Amplitude:
-        """Blades at the angles of other instants, or of a steady rate, in place of the true ones."""
+        """Error of blades at the angles of other instants, or of a steady rate, in place of the true angles."""
         out = np.zeros(len(self.times_s))
         (share, moment), phase = self._moments(rotor), self._phase(rotor)
         hub = hub_range_m(self.centre_m, rotor.offset_m, np.deg2rad(rotor.bearing_deg))
         length = rotor.blade_length_m
-        # near by, the sphere's sag moves the flash, and a blade that turns runs towards the radar faster
+        # at short range the sphere's sag shifts the flash, and a turning tip changes its range faster
         faster = hub / np.maximum(hub - length, 1e-3 * length)
 
         def straight(cosine: Amplitude) -> Amplitude:
-            """What is left of a blade's phase where the sag may have taken its slope away."""
+            """Least phase along the blade that remains where the sag may cancel its slope."""
             sag = self.wavenumber * length**2 * (1 - cosine**2) / (2 * hub)
-            if rotor.points:  # their phases come together again and again
+            if rotor.points:  # a row's phases agree again at regular steps: none is counted on where there is sag
                 return np.asarray(np.where(sag < 0.05, phase * np.abs(cosine), 0) * (1 - share))
             return np.asarray(np.maximum(phase * np.abs(cosine) - 2 * sag, 0) * (1 - share))
 
@@ -214,11 +215,11 @@ class UavBounds:
         return out
 
     def spacing(self, points: int) -> float:
-        """Energy of the error of so many Gauss points a blade in place of the continuous blade, over all pulses.
+        """Error energy of this many Gauss points a blade in place of the continuous blade, over all pulses.
 
-        The rule is exact for polynomials of order 2 n - 1; what it misses of a phasor are its Legendre terms from order
-        2 n on, (2 l + 1) j_l(z / 2), of which it sees the first by a known share and the others by one at most. The
-        sphere's sag adds what it misses of a phase that bends.
+        The rule of n points is exact for polynomials of order 2 n - 1. Its error for a phasor comes from the Legendre
+        terms from order 2 n on, (2 l + 1) j_l(z / 2): the first counts by a known share, the others by one at most. The
+        sphere's sag bends the phase; the error of that is added (`sag_error`).
         """
         total = np.zeros(len(self.times_s))
         for rotor in self.part.rotors:
@@ -241,9 +242,10 @@ class UavBounds:
 
 @lru_cache(maxsize=512)
 def _gauss_errors(points: int, half_phase_rad: float, steepest: float, sag_rad: float) -> tuple[Amplitude, Amplitude]:
-    """Upper ends of classes of steepness up to `steepest`, finest there, and the error of each, straight and bent.
+    """Upper ends of classes of the phase's slope up to `steepest`, finest there, and the Gauss rule's error in each.
 
-    Kept, because the rotors of an airframe are often alike.
+    The error is that for a straight phase plus that for its bend. Cached, because the rotors of an airframe are often
+    alike.
     """
     classes = steepest * (1 - np.linspace(1, 0, _SPACING_CLASSES + 1)[1:] ** 2)
     half_phase = half_phase_rad * classes
@@ -252,10 +254,11 @@ def _gauss_errors(points: int, half_phase_rad: float, steepest: float, sag_rad: 
 
 
 def sag_error(points: int, phase_rad: Amplitude, sag_rad: float) -> Amplitude:
-    """Most that so many Gauss points miss more of exp(j phase) over a blade where the phase bends by a sag.
+    """Upper bound of the error that a phase bent by a sag adds to a Gauss rule for exp(j phase) over a blade.
 
-    The rule's error is a known share of the phasor's derivative of order 2 n, and that a sum over powers of the slope,
-    at most `phase_rad` along the blade, and of half the second derivative, `sag_rad`: here without the slope's alone.
+    The rule's error is a known share of the phasor's derivative of order 2 n. That derivative is a sum over powers of
+    the slope, at most `phase_rad` along the blade, and of half the second derivative, `sag_rad`. The term of the slope
+    alone is left out here: `gauss_error` bounds it.
     """
     bends = np.arange(1, points + 1)
     order = 2 * points
@@ -266,9 +269,9 @@ def sag_error(points: int, phase_rad: Amplitude, sag_rad: float) -> Amplitude:
 
 
 def gauss_error(points: int, half_phase_rad: Amplitude) -> Amplitude:
-    """Most that the mean of exp(j z x / 2) over -1..1 is missed by by so many Gauss points.
+    """Upper bound of the error of a Gauss rule for the mean of exp(j z x / 2) over -1..1.
 
-    z / 2 is `half_phase_rad`, rising; the bound grows with it, to 2.
+    z / 2 is `half_phase_rad`, in rising order; the bound grows with it, up to 2.
     """
     first = 2 * points
     # C(4n, 2n) / C(2n, n)^2: the leading coefficients of the Legendre polynomials of order 2n and n
@@ -282,7 +285,7 @@ def gauss_error(points: int, half_phase_rad: Amplitude) -> Amplitude:
 
 
 def bird_bound(part: BirdPart, radar: Radar, effect: str, times_s: Amplitude | None = None) -> Amplitude:
-    """Bound of leaving out one of `fidelity.BIRD_EFFECTS`, shape (pulses,), at even instants or at these."""
+    """Bound of leaving out one of `fidelity.BIRD_EFFECTS`, shape (pulses,), at even instants or at `times_s`."""
     times = radar.times_s if times_s is None else times_s
     wavenumber = 2 * TWO_PI / radar.wavelength_m
     if effect == "acceleration":

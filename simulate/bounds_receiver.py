@@ -1,8 +1,8 @@
-"""How wrong a record is at most when an effect of the receiver, or the jitter of its PRF, is left out.
+"""Upper bounds of a record's error when an effect of the receiver, or the jitter of its PRF, is left out.
 
-A receiver is cheap, so it is tried: the closed-form signal passes through it, and each effect's own change is measured
-where it stands in the chain. What the closed form may miss of the signal, and what the effects behind may make of a
-change, come on top. All errors are norms: roots of energies over the dwell.
+Running a receiver is cheap, so the change is measured: the closed-form signal passes through the chain, and each effect
+is switched at its own place. What the closed form may miss of the signal is added. The sum is multiplied by the largest
+gain of the later effects. All errors are norms: roots of energies over the dwell.
 """
 
 from functools import cached_property
@@ -75,17 +75,17 @@ class ReceiverBounds:
 
     @cached_property
     def _missed(self) -> float:
-        """Most of the signal that the closed form misses."""
+        """Largest norm of what the closed form misses of the signal: the range curvature along the blades."""
         curved = sum((bounds.blade_curvature() for bounds in self._uavs.values()), np.zeros(len(self._signal)))
         return _norm(curved)
 
     def _multiplier(self, effect: str) -> float:
-        """Most by which an effect of the antenna changes any sample, over the sample."""
+        """Largest relative change of any sample by an effect that multiplies the signal."""
         turned = self.reception.receive(np.ones_like(self._signal), {effect}, quiet=True)
         return float(np.max(np.abs(turned - 1), initial=0.0))
 
     def gain(self, effect: str) -> float:
-        """Most by which an effect makes a change before it larger: a ratio of norms, at least 1."""
+        """Largest factor by which an effect amplifies a change made before it: a ratio of norms, at least 1."""
         drawn = self.reception.drawn
         return {
             "fading": float(10 ** (abs(drawn.fading_db[0]) / 20)),
@@ -98,11 +98,11 @@ class ReceiverBounds:
 
     @property
     def total_gain(self) -> float:
-        """Most by which the receiver makes a change of the signal larger, without what its converter rounds."""
+        """Largest factor by which the receiver amplifies a change of the signal, its converter's rounding apart."""
         return float(np.prod([self.gain(effect) for effect in self.effects], initial=1.0))
 
     def own(self, effect: str) -> float:
-        """Most that an effect of `CHAIN` changes in all; what the converter rounds anew is not counted."""
+        """Bound of the change by an effect of `CHAIN`; that the converter then rounds otherwise is not counted."""
         if effect == "converter":
             return self.rounding()
         place = self.effects.index(effect)
@@ -119,7 +119,7 @@ class ReceiverBounds:
         return after * (_norm(changed - plain) + spread * reaches)
 
     def rounding(self) -> float:
-        """Most that the converter changes; 0 if there is none."""
+        """Bound of the change by the converter; 0 if there is none."""
         if "converter" not in self.effects:
             return 0.0
         drawn, before = self.reception.drawn, self.effects[:-1]
@@ -133,9 +133,10 @@ class ReceiverBounds:
         return float(step * np.sqrt(len(iq) / 2) + cut + missed * clips)
 
     def jitter(self) -> float:
-        """Most that the even instants in place of the jittered ones change in all, without what is rounded anew.
+        """Bound of the change by even instants in place of the jittered ones; the converter's rounding is not counted.
 
-        The smaller of what the blades' turn and the paths can do, and what the closed form was seen to do.
+        It is the smaller of two bounds. One is from how far blades and paths move between the instants. The other is
+        the change measured on the closed form, plus what that may miss of both signals.
         """
         radar = self._scene.sight
         even, true = radar.times_s, pulse_times_s(self._scene, self._seed)

@@ -1,6 +1,6 @@
 """Named airframes and birds, each with its source.
 
-The paper is "Analysis of Micro-Doppler Signatures of Small UAVs Based on Doppler Spectrum". Levels are not of its
+The paper is "Analysis of Micro-Doppler Signatures of Small UAVs Based on Doppler Spectrum". Levels are not from its
 tables unless a line says so: they are set so that the blades stand out of the noise, and a scene may change them.
 """
 
@@ -17,19 +17,19 @@ class Entry:
     fields : dict
         Fields of `parts.UavPart` or `parts.BirdPart`.
     source : str
-        Where they come from.
+        Where the values come from.
     """
 
     fields: dict[str, Any]
     source: str
 
 
-#: Of the paper's radar, at 9.85 GHz [m].
+#: Wavelength of the paper's radar, at 9.85 GHz [m].
 _PAPER_WAVELENGTH_M = 0.0304357825
 
 
 def _tips(length_m: float, rates_rpm: tuple[float, ...], *, arm_m: float = 0.0, flash_db: float = 17.0) -> list[dict]:
-    """Rotors of point scatterers at the tip, as in the paper's model; neighbours turn against each other."""
+    """Rotors of point scatterers at the tip, as in the paper's model; neighbours turn in opposite senses."""
     count = len(rates_rpm)
     return [
         {
@@ -46,7 +46,7 @@ def _tips(length_m: float, rates_rpm: tuple[float, ...], *, arm_m: float = 0.0, 
 
 
 def _blades(length_m: float, rates_hz: tuple[float, ...], *, arm_m: float, flash_db: float, **more: Any) -> list[dict]:
-    """Rotors of uniform blades; neighbours turn against each other."""
+    """Rotors of uniform blades; neighbours turn in opposite senses."""
     count = len(rates_hz)
     return [
         {

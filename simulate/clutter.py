@@ -15,10 +15,10 @@ from .motion import GRAVITY_MPS2, TWO_PI
 from .radar import Radar
 from .target import Normals, Target
 
-#: How often ground moves by a Gaussian law: the lower part of `ground_law`.
+#: Share of the ground that moves by a Gaussian law: where `ground_law` is below this.
 GAUSSIAN_GROUND = 0.35
 
-#: Width of the line of ripples [m/s].
+#: Rms width of a Bragg line [m/s].
 BRAGG_WIDTH_MPS = 0.1
 
 #: Surface tension of sea water over its density (0.0728 N/m over 1000 kg/m^3 within 3 %).
@@ -61,12 +61,12 @@ def shaped_noise(
     normals : callable
         Source of standard normal numbers, one row a record.
     radar : Radar
-        The radar that looks; speeds beyond its unambiguous one alias, as they do in the field.
+        The radar that looks; all lines lie within its unambiguous span.
     velocity_psd : ndarray, shape (records, lines) or (1, lines)
-        Power at each velocity, any scale; the lines are those of `process_velocities`, or as many of them at both ends
-        of their order (the slow ones) as `velocities_mps` has: nothing is beyond.
+        Power at each of `velocities_mps`, any scale; there is none at other velocities.
     velocities_mps : ndarray, shape (lines,)
-        Those velocities, FFT order.
+        Velocities of the lines in FFT order: all of `process_velocities`, or only the slow ones, which are at both ends
+        of that order (`slow_velocities`).
 
     Returns
     -------
@@ -97,7 +97,7 @@ def real_noise(normals: Normals, radar: Radar, psd: NDArray[np.floating]) -> NDA
     radar : Radar
         The radar that looks.
     psd : ndarray, shape (lines,)
-        Power at each line of `process_velocities` from rest to the fastest positive one: one side of the spectrum.
+        Power at the lines of one side of the spectrum: the first half of `process_velocities`, from rest on.
 
     Returns
     -------
@@ -116,23 +116,26 @@ def real_noise(normals: Normals, radar: Radar, psd: NDArray[np.floating]) -> NDA
 
 
 def _amplitude(psd: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Amplitude of the real and of the imaginary part of each line, for unit power in all, shape of `psd`."""
+    """Amplitude of the real and of the imaginary part of each line, for unit total power, shape of `psd`."""
     total = psd.sum(axis=-1, keepdims=True)
     return np.sqrt(psd / np.where(total > 0, total, 1) / 2).astype(np.float32)
 
 
 def process_velocities(radar: Radar) -> NDArray[np.float64]:
-    """Velocities of the process's lines [m/s], FFT order; twice the dwell at least, so that its ends do not meet."""
+    """Velocities of a noise process's lines [m/s], FFT order.
+
+    The process is periodic; its period is at least two dwells, so that the end of a record does not join its beginning.
+    """
     lines = fft.next_fast_len(2 * radar.pulses)
     return -fft.fftfreq(lines, 1 / radar.prf_hz) * radar.wavelength_m / 2
 
 
-#: Share of the moving ground's power that may be missing beyond its fastest line: far under any receiver's noise.
+#: Share of the moving ground's power that may be left out beyond the fastest line: far under any receiver's noise.
 _BEYOND = 1e-12
 
 
 def slow_velocities(radar: Radar, wind_mph: float) -> NDArray[np.float64]:
-    """Those of `process_velocities` at which ground moves up to that wind, FFT order."""
+    """The lines of `process_velocities` that hold the power of ground in winds up to `wind_mph`, FFT order."""
     v = process_velocities(radar)
     step = np.abs(v[1]) if len(v) > 1 else 1.0
     fastest = -np.log(_BEYOND) / billingsley(wind_mph, radar.carrier_hz)[1] / step
@@ -159,7 +162,7 @@ def ground_psd(
 
 
 def gaussian_ground(draws: Draws) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Draw which ground moves by a Gaussian law, as models older than Billingsley's have it.
+    """Draw in which records the ground moves by a Gaussian law, as in models older than Billingsley's.
 
     Parameters
     ----------
@@ -190,7 +193,7 @@ def draw_ground(
     gaussian: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
 ) -> NDArray[np.complex64]:
     """Wind-blown ground of unit mean power, shape (records, pulses); `gaussian` as `gaussian_ground` gives it."""
-    # as many lines as the strongest wind of the law needs: how many numbers a record takes is the same in any batch
+    # as many lines as the law's strongest wind needs, so that a record takes as many random numbers in any batch
     v = slow_velocities(radar, max(LAWS["wind_mph"].high, float(np.max(wind_mph, initial=0.0))))
     psd, rest = ground_psd(radar, wind_mph, v)
     if gaussian is not None:
@@ -309,7 +312,7 @@ def _texture(draws: Draws, radar: Radar, shape: NDArray[np.float64]) -> NDArray[
     """
     rate_hz = draws.value("texture_hz", _SWELLS)
     weights = draws.normal(2 * _SWELLS) / np.sqrt(_SWELLS)
-    # The swells are slow: 40 points a period of the fastest, drawn out to the pulses in between.
+    # The swells are slow: computed at 40 points a period of the fastest, and interpolated to the pulses.
     fastest_hz = max(LAWS["texture_hz"].high, float(rate_hz.max(initial=0)))
     points = max(33, math.ceil(40 * fastest_hz * radar.dwell_s))
     coarse_s = np.linspace(0, radar.dwell_s, points)

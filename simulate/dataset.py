@@ -28,7 +28,7 @@ KINDS: dict[str, dict[str, float]] = {
     "uav": {"fixed_wing": 0.25, "quadcopter": 0.3, "hexacopter": 0.15, "octocopter": 0.1, "helicopter": 0.2},
     "bird": {"flapping_bird": 0.68, "gliding_bird": 0.15, "flock": 0.17},
     "clutter": {
-        "noise": 0.17,  # most of what a radar looks at; at 0.11 a glimmer in noise was a UAV too often
+        "noise": 0.17,  # most of what a radar sees; with 0.11, weak structure in noise was taken for a UAV too often
         "ground": 0.06,
         "rain": 0.09,
         "sea": 0.07,
@@ -43,22 +43,23 @@ KINDS: dict[str, dict[str, float]] = {
 #: Class of each kind.
 KIND_CLASS = {kind: label for label, kinds in KINDS.items() for kind in kinds}
 
-#: Share of the records, of any kind, that hardly have thermal noise: simulated ones, near targets, laboratories. Were
-#: the levels over the noise another for each class up there, they would give the class away.
+#: Share of the records with hardly any thermal noise: simulated ones, near targets, laboratories. It applies to all
+#: kinds alike: if one class alone had such a high SNR, the level would reveal the class.
 QUIET = 0.12
 
-#: Share of the backgrounds that are rain or sea: were these clutter alone, a drone over the sea would be as well.
+#: Share of the backgrounds that are rain or sea: if they were never behind a target, a model would take a drone over
+#: the sea for clutter.
 WEATHER = 0.2
 
-#: Uniform numbers that the sea takes; rain takes fewer.
+#: Uniform numbers that a background of sea takes; rain takes fewer.
 _WEATHER_NUMBERS = 28
 
 #: What a set of records is for; each has streams of its own, so a test record is never a training record.
 PURPOSES = {"train": 0, "validate": 1, "calibrate": 2, "test": 3, "bench": 4, "report": 5}
 
 #: Columns of `Records.truth`: name -> unit. Where a column has no meaning for a record it holds NaN. Velocities are
-#: those at the first pulse, a vehicle's that in the middle of the dwell; tips move that fast, whatever the aspect.
-#: Levels are those before a receiver fades, which in a short dwell may raise or lower all of it by some decibels.
+#: those at the first pulse; a vehicle's is that in the middle of the dwell. `tip_mps` is the tips' own speed, whatever
+#: the aspect. Levels are before the receiver's fading, which may shift a whole short record by some decibels.
 TRUTH_UNITS = {
     "snr_db": "dB",
     "velocity_mps": "m/s",
@@ -91,7 +92,7 @@ RADAR_GROUP = 24
 _RADAR_STREAM = 1 << 40  # beyond any record's index
 _CHUNK_SAMPLES = 1 << 19  # samples rendered at a time: memory stays flat whatever the count
 _MAX_PULSES = 8192  # longest training record of most radars; beyond it a record only gains resolution
-_LONG_CHANCE = 0.12  # of a radar whose dwell is `long_dwell_s`, as tracks' are: half the cost of all records
+_LONG_CHANCE = 0.12  # probability of a radar with `long_dwell_s`, as tracks have: half the cost of all records
 _MAX_LONG_PULSES = 65536  # longest record of those
 
 
@@ -170,7 +171,7 @@ def draw_records(
 
 
 def _require(purpose: str, **numbers: int) -> None:
-    """A purpose that is one, and whole numbers from 0 on."""
+    """Check that the purpose is known and that the numbers are whole and not negative."""
     if purpose not in PURPOSES:
         raise ValueError(f"purpose is {purpose!r}: it must be one of {', '.join(PURPOSES)}")
     for name, value in numbers.items():
@@ -278,7 +279,7 @@ def _render(
     truth["background_db"][part] += quiet_db
     truth["quiet_db"][part] = quiet_db
     iq[:] = receiver.receive(signal, noise, radar, lambda _: normals_of)
-    # the noise is to sink, not the echo to rise out of float32; a power of two changes no digit
+    # scaled back, so that the noise sinks and no echo grows out of float32's range; a power of two keeps all digits
     iq *= np.exp2(-np.rint(quiet_db * np.log2(10) / 20)).astype(np.float32)[:, None]
 
 
@@ -317,7 +318,7 @@ def powered(target: Target, snr_db: NDArray[np.float64]) -> NDArray[np.complex64
 
 
 def _background(draws: Draws, radar: Radar, normals_of: NormalsOf, level_db: NDArray[np.float64]) -> NDArray:
-    """What is in the cell behind any target: nothing, a return at rest, wind-blown ground, rain or sea."""
+    """Draw what is in the cell behind any target: nothing, a return at rest, wind-blown ground, rain or sea."""
     present, blown = draws.chance(0.6), draws.chance(0.5)
     drawn_db, wind = draws.value("background_db"), draws.value("wind_mph")
     phase, gaussian = draws.value("phase_rad"), gaussian_ground(draws)

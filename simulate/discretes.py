@@ -1,6 +1,6 @@
 """Things that move and are neither UAV nor bird: a person, a vehicle, a wind turbine, a plain reflector.
 
-Each is a handful of scatterers on known paths; they are the hard confusers, because parts of them move fast or turn.
+Each is a handful of scatterers on known paths. They are the hard confusers, because parts of them move fast or turn.
 """
 
 import numpy as np
@@ -15,9 +15,9 @@ from .motion import TWO_PI, range_phasor, reduce_phase, straight_path, turned
 from .radar import Radar
 from .target import Target, mean_power
 
-#: Limbs of a walker: (amplitude, swing of its speed over the torso's, share of that at twice the gait, phase of the
-#: gait in turns). A foot stands for nearly half of the time and then swings at 3x: of a raised cosine over three fifths
-#: of the gait, the second harmonic has 0.45 of the first.
+#: Limbs of a walker: (amplitude, swing of its speed over the torso's speed, share of that swing at twice the gait,
+#: phase of the gait in turns). A foot stands still for nearly half of the time and then swings at three times the
+#: torso's speed: for a raised cosine over three fifths of the gait, the second harmonic has 0.45 of the first.
 LIMBS = (
     (1.0, 0.15, 0.0, 0.0),
     (0.25, 0.8, 0.1, 0.0),
@@ -29,7 +29,7 @@ LIMBS = (
 )
 
 
-#: A foot on a pedal goes round at the gait, in a circle of this radius [m].
+#: Radius of the circle in which a foot on a pedal goes round, once a gait [m].
 CRANK_M = 0.17
 
 #: Most scatterers of a vehicle's body, of another's beside it, and of one of its wheels.
@@ -48,8 +48,8 @@ MAX_BLADE_POINTS = 100
 def draw_person(draws: Draws, radar: Radar) -> Target:
     """Draw a walker, a runner or a cyclist: a torso that sways and limbs whose speed swings about the torso's.
 
-    Feet on the ground go in strides, as much faster as the torso is; those on pedals in even circles, at any speed. A
-    bicycle's wheels, wires and hollow rims, have no echo of their own here; a vehicle's do.
+    The speed of limbs on the ground swings in proportion to the torso's; on pedals they go in even circles, whatever
+    the torso's speed. A bicycle's wheels, wires and hollow rims, have no echo of their own here; a vehicle's do.
     """
     speed = draws.value("person_mps") * draws.value("pace")
     gait, phase = draws.value("gait_hz"), draws.value("phase_rad")
@@ -86,10 +86,10 @@ def draw_person(draws: Draws, radar: Radar) -> Target:
 def draw_vehicle(draws: Draws, radar: Radar) -> Target:
     """Draw a road vehicle that passes: scatterers all over it, each on its own way past the radar, and turning wheels.
 
-    From afar it is one line. Beside the road its parts are seen under angles so unlike that it fills all speeds up to
-    its own, and each of them changes as fast as the vehicle passes. Few scatterers leave lines, many fill the speeds as
-    a flock or rain does; the beam lets those within it through. Its engine shakes it, as rotors shake an airframe:
-    lines beside the body's are no sign of a UAV. Some are not alone in the beam.
+    From afar the vehicle is one line. Close to the road its parts are seen under so different angles that they fill all
+    speeds up to its own, and each part's speed changes as the vehicle passes. Few scatterers leave lines; many fill the
+    speeds as a flock or rain does. Scatterers outside the beam are weak. The engine shakes the body as rotors shake an
+    airframe, so that lines beside the body's are no sign of a UAV. Some vehicles are not alone in the beam.
     """
     body, passage = _vehicle_body(draws, radar, MAX_BODY_POINTS)
     turns = draws.value("engine_hz")[:, None] * radar.times_s
@@ -107,29 +107,29 @@ def draw_vehicle(draws: Draws, radar: Radar) -> Target:
         "acceleration_mps2": pull * np.sin(sight) + (speed * np.cos(sight)) ** 2 / np.hypot(ahead, aside),
         "rotation_hz": speed / (TWO_PI * radius),
     }
-    # Were the SNR always the wheels', a line alone would be a UAV that hides its blades; were it always the body's,
-    # wheels would be rare, and those that are seen a UAV's rotors.
+    # The drawn SNR is the wheels' or the body's. Were it always the wheels', a model would take a lone line for a UAV
+    # whose blades are hidden; were it always the body's, visible wheels would be rare and be taken for a UAV's rotors.
     return Target(wheels, body, -draws.value("wheel_db"), snr_of_body=draws.chance(0.5), truth=truth)
 
 
 def _vehicle_body(
     draws: Draws, radar: Radar, most: int, there: NDArray[np.bool_] | bool = True
 ) -> tuple[NDArray[np.complex64], tuple[NDArray[np.float64], ...]]:
-    """Echo of a vehicle but for its wheels, of unit power and at most so many scatterers, and how it passes.
+    """Draw the echo of a vehicle without its wheels, of unit power and at most `most` scatterers, and how it passes.
 
-    Where it is not `there` it has none.
+    Records in which it is not `there` get no echo.
 
     Returns
     -------
     body : ndarray of complex64, shape (records, pulses)
     passage : tuple of ndarray
-        Speed [m/s] and acceleration [m/s^2] along the road; place ahead and aside [m] at the middle of the dwell, and
-        the line of sight off the square of the road [rad] there, each of shape (records,); way gone since [m], shape
-        (records, pulses).
+        Speed [m/s] and acceleration [m/s^2] along the road, place ahead and aside [m], and angle between the line of
+        sight and the perpendicular to the road [rad], all at the middle of the dwell and of shape (records,); distance
+        gone since then [m], shape (records, pulses).
     """
     speed = draws.value("vehicle_mps")
     pull = draws.acceleration_mps2("road_acceleration_mps2", radar.dwell_s)
-    # by the logarithm alone, slow cars within a few metres, which roadside radars see all day, were one record in 1000
+    # by `road_m` alone, slow cars within a few metres, which roadside radars see all day, would be one record in 1000
     aside, sight = draws.either("road_m", "verge_m", 0.5), draws.value("sight_rad")
     ahead = aside * np.tan(sight)  # at the middle of the dwell
     gone = straight_path(radar.times_s - radar.times_s[radar.pulses // 2], speed, pull)
@@ -146,7 +146,7 @@ def _vehicle_body(
         rows = np.flatnonzero(points > point)
         passing = _passing(radar, x[rows, point], y[rows, point], gone[rows])
         body[rows] += echo[rows, point, None].astype(np.complex64) * passing
-    power = mean_power(body)  # none where a narrow beam passes by all of it
+    power = mean_power(body)  # zero where a narrow beam misses the whole vehicle
     body /= np.sqrt(np.where(power > 0, power, 1))[:, None]
     return body, (speed, pull, ahead, aside, sight, gone)
 
@@ -154,7 +154,7 @@ def _vehicle_body(
 def _passing(
     radar: Radar, ahead_m: NDArray[np.float64], aside_m: NDArray[np.float64], gone_m: NDArray[np.float64]
 ) -> NDArray[np.complex64]:
-    """Phasor of a point that moves along a road, `ahead_m` of the radar's side and `aside_m` off at the middle."""
+    """Phasor of a point on a road, `ahead_m` along it and `aside_m` across it from the radar at the dwell's middle."""
     distance = np.hypot(ahead_m[:, None] + gone_m, aside_m[:, None])
     distance -= np.hypot(ahead_m, aside_m)[:, None]
     return range_phasor(distance, radar.wavelength_m)
@@ -163,12 +163,13 @@ def _passing(
 def _wheels(
     draws: Draws, radar: Radar, gone_m: NDArray[np.float64], cosine: NDArray[np.float64]
 ) -> tuple[NDArray[np.complex64], NDArray[np.float64]]:
-    """Echo of a vehicle's wheels about the vehicle itself, and their radius [m].
+    """Draw the echo of a vehicle's wheels about the vehicle itself, and their radius [m].
 
-    A point on the rim rolls as far as the vehicle has `gone_m`: its radial speed runs from 0 at the ground to twice the
-    vehicle's at the top; `cosine` is that of the angle between the road and the line of sight, a pulse. Even spokes
-    have the lines of a rotor; a tyre's points lie and echo as they will, and the many of one close by fill all speeds
-    up to twice the vehicle's as noise does. A third of the vehicles show spokes, a third tyres, a third both.
+    A wheel rolls as far as the vehicle has `gone_m`. So the radial speed of a point on the rim runs from 0 at the
+    ground to twice the vehicle's at the top. `cosine` is that of the angle between the road and the line of sight, one
+    a pulse. Even spokes have the lines of a rotor. A tyre's points have random places and strengths, and many of them
+    fill all speeds up to twice the vehicle's as noise does. A third of the vehicles show spokes, a third tyres, a third
+    both.
     """
     radius = draws.value("wheel_radius_m")
     wheels, spokes, blocks = (np.floor(draws.value(law)).astype(int) for law in ("wheels", "spokes", "tyre_points"))
@@ -181,7 +182,7 @@ def _wheels(
     depth, angle, echo = (draws.uniform(most) for _ in range(3))
     level = np.exp(0.4 * draws.normal(most))
     out = np.zeros((len(draws), radar.pulses), np.complex64)
-    # a radius is 2000 rad of phase at most: float32 holds it; one sine a vehicle serves all its points
+    # float32 holds the phase of a radius, some 2300 rad at most; all points of a vehicle share one sine and cosine
     rolled = reduce_phase(gone_m / radius[:, None])
     sines, cosines = np.sin(rolled), np.cos(rolled)
     arm_rad = (-2 * TWO_PI / radar.wavelength_m * radius[:, None] * cosine).astype(np.float32)
@@ -204,9 +205,10 @@ def _wheels(
 def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
     """Draw a wind turbine: three long blades of which the range cell holds a part, and its tower at rest.
 
-    A blade is rough on the scale of the wavelength: a row of scatterers, few or many, equal or of random strength, each
-    somewhere on the chord; it is no mirror. Two fifths are as published models draw them, equal points at equal
-    distances, from a few to a smooth line: for a while their lines are as even as a rotor's.
+    A blade is rough on the scale of the wavelength, not a mirror: a few or many scatterers, equal or of random
+    strength, at random places along the blade and across its chord. Two fifths of the turbines are as published models
+    have them, equal points at equal distances, from a few to a smooth line: for a while their lines are as even as a
+    rotor's.
     """
     t, records = radar.times_s, len(draws)
     length, tip = draws.value("turbine_length_m"), draws.value("turbine_tip_mps")
@@ -257,16 +259,17 @@ def draw_wind_turbine(draws: Draws, radar: Radar) -> Target:
 def _even_row(
     first_m: NDArray[np.float64], last_m: NDArray[np.float64], points: NDArray[np.float64], wavelength_m: float
 ) -> NDArray[np.complex64]:
-    """Mean echo of equal points that stand evenly between two places, these [m] nearer: Dirichlet's kernel, any number.
+    """Mean echo of equal points spaced evenly between two places, which are given in metres nearer to the radar.
 
-    In float64: the phase over a long blade is 1e5 rad.
+    Dirichlet's kernel gives it at the same cost for any number of points; in float64, because the phase over a long
+    blade is 1e5 rad.
     """
     between_rad = 2 * TWO_PI / wavelength_m * (last_m - first_m) / (points - 1)
     return diric(between_rad, points).astype(np.float32) * range_phasor(-(first_m + last_m) / 2, wavelength_m)
 
 
 def draw_mover(draws: Draws, radar: Radar) -> Target:
-    """Draw a featureless moving reflector: a far vehicle, a boat, a balloon. A line alone is no drone."""
+    """Draw a featureless moving reflector: a far vehicle, a boat, a balloon. A lone line must not mean a drone."""
     speed = draws.either("mover_mps", "drifter_mps", 0.2)
     acceleration = draws.acceleration_mps2("bird_acceleration_mps2")
     path = straight_path(radar.times_s, speed, acceleration)

@@ -1,7 +1,7 @@
-"""The slow way that is right: exact ranges of dense point scatterers in float64, approximate in their number alone.
+"""Echo from exact ranges of dense point scatterers in float64: slow, and approximate in their number alone.
 
-It is the oracle for the closed form (`rotor`) and for the line spectrum (`analytic`), and the renderer of scenes near
-enough to the radar that the range's curvature shows.
+It is the reference for the closed form (`rotor`) and for the line spectrum (`analytic`), and the renderer of scenes so
+near to the radar that the range's curvature shows.
 
 A target's centre is at range rho(t). A scatterer of the body, or a rotor's hub, stands `offset_m` from it at the angle
 `bearing_rad` from the line of sight (0 is nearer to the radar); a blade's scatterer stands at radius r from the hub.
@@ -105,8 +105,8 @@ def blade_points(
     points : int
         How many, >= 1.
     spacing : {"even", "gauss"}
-        Evenly spaced as in the paper, or at the nodes of Gauss and Legendre: then half a scatterer a radian of phase
-        along the blade, and some twenty more, stand for the continuous blade to all digits.
+        Evenly spaced as in the paper, or at the nodes of the Gauss-Legendre rule: then half a scatterer a radian of
+        phase along the blade, plus some twenty, equal the continuous blade to all digits.
 
     Returns
     -------
@@ -165,7 +165,7 @@ def dense_rotor_echo(
     Returns
     -------
     ndarray of complex128, shape (pulses,)
-        In the unit of `rotor.rotor_echo`, times exp(-j 4 pi hub range / wavelength) in the far field.
+        In the far field it is `rotor.rotor_echo` times exp(-j 4 pi hub range / wavelength), in the same unit.
     """
     amplitudes = np.asarray(blade_amplitudes, np.float64)
     out = np.zeros(np.broadcast_shapes(hub_m.shape, angle_rad.shape), np.complex128)

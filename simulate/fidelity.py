@@ -21,15 +21,15 @@ class Fidelity:
     effects : frozenset of str
         Which of its effects are kept.
     points : int or None
-        Point scatterers that stand for a line, in float64 (a row has its own); None for the closed form of a blade,
-        which has no range curvature along it.
+        Point scatterers in place of each blade that is a line, in float64 (a row keeps its own points); None for the
+        closed form of a blade, which has no range curvature along it.
     """
 
     effects: frozenset[str]
     points: int | None = None
 
 
-#: A UAV in closed form with all that it has then, and a bird with all that it has.
+#: CLOSED_FORM: a UAV whose blades are in closed form, with every other effect; WHOLE_BIRD: a bird with every effect.
 CLOSED_FORM, WHOLE_BIRD = Fidelity(frozenset(UAV_EFFECTS) - {"blade_curvature"}), Fidelity(frozenset(BIRD_EFFECTS))
 
 

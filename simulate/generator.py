@@ -1,4 +1,4 @@
-"""From a seed and a key to a random generator: the one way in which randomness begins."""
+"""From a seed and a key to a random generator: the only source of randomness."""
 
 from numpy.random import Generator, Philox, SeedSequence
 

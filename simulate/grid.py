@@ -1,8 +1,8 @@
-"""Uniform slow time in blocks of pulses: phases at the cost of a few operations a pulse that keep their digits.
+"""Uniform slow time in blocks of pulses: precise phases at a cost of a few operations a pulse.
 
 A phase that is quadratic in time is, within a block, a quadratic in the pulse number n about the block's middle. Its
-constant and its slope are reduced to within half a turn in float64 (n is whole, so whole turns a pulse do not count),
-which leaves at most `BLOCK_PULSES` / 4 turns for float32 to hold.
+constant and its slope are reduced to within half a turn in float64 (n is whole, so whole turns a pulse do not count).
+The slope then adds up to at most `BLOCK_PULSES` / 4 turns, which float32 holds.
 """
 
 from collections.abc import Iterator
@@ -36,7 +36,7 @@ class Tile:
     blocks : slice
         Blocks of pulses.
     pulses : slice
-        The pulses in those blocks; in the last one fewer than it has room for.
+        The pulses in those blocks; the last block may hold fewer than it has room for.
     """
 
     rows: slice
@@ -124,8 +124,8 @@ class PulseGrid:
     def phase(self, tile: Tile, law: PhaseLaw, room: Room) -> NDArray[np.float32]:
         """Phase of each pulse, up to whole turns.
 
-        It is a product of what depends on the block and what depends on the place in the block: a matrix product of
-        few columns, in float64.
+        It is a sum of a few terms, each a product of one factor that depends on the block and one that depends on the
+        place in the block: a matrix product in float64.
 
         Parameters
         ----------
@@ -134,7 +134,7 @@ class PulseGrid:
         law : PhaseLaw
             How the phases grow.
         room : Room
-            Three times the result is taken from it.
+            Scratch memory, of which three times the size of the result is taken.
 
         Returns
         -------
@@ -164,7 +164,7 @@ class PulseGrid:
         return out
 
     def sines(self, sine: Sine) -> NDArray[np.float32]:
-        """Sum of a few sines a record, at the cost of a product of small matrices.
+        """Sum of a few sines a record, computed as a product of small matrices.
 
         Parameters
         ----------

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Uniform numbers a record owns; a vehicle behind its receiver, the widest, takes 1696 of them.
+#: Uniform numbers a record owns: one for its kind, then up to 1696 (a vehicle and its receiver need the most).
 WIDTH = 1697
 
-#: What a steady body's acceleration is of a manoeuvring one's. Half of all bodies are steady, whatever they are: if one
-#: class alone accelerated, a line that bends would be all there is to learn of it.
+#: Factor on the drawn acceleration of a steady body. Half of all bodies are steady, whatever their class: if one class
+#: alone accelerated, a model would learn nothing of it but that its line bends.
 STEADY = 0.05
 
 
@@ -24,7 +24,7 @@ class Law:
     Parameters
     ----------
     kind : {"uniform", "log", "rising"}
-        Uniform in the value, or in its logarithm, or with a density that rises towards the upper end.
+        Uniform in the value, uniform in its logarithm, or with a density that rises towards the upper end.
     low, high : float
         Range, in `unit`.
     unit : str
@@ -54,9 +54,9 @@ LAWS: dict[str, Law] = {
     "long_dwell_s": Law("log", 1.0, 5.0, "s", "staring radars; the paper's bird: 2.5 s"),
     "unambiguous_mps": Law("log", 10.0, 260.0, "m/s", "from slow-body radars to tips of 200 m/s and a margin"),
     # every scene
-    # rising: a model that is shown many UAVs in which nothing can be seen learns to call an empty cell a UAV
+    # rising: a model that is shown many UAVs too weak to be seen learns to call an empty cell a UAV
     "snr_db": Law("rising", -20.0, 32.0, "dB", "micro-motion power over noise, a sample"),
-    # as high as a UAV with its body: a level that only one class reaches would give it away
+    # up to the level of a UAV with its body: a level that one class alone reached would reveal the class
     "clutter_snr_db": Law("uniform", -20.0, 60.0, "dB", "whole clutter return over noise, a sample"),
     "quiet_db": Law("uniform", 0.0, 100.0, "dB", "thermal noise under the usual, to none that float32 holds"),
     "phase_rad": Law("uniform", -np.pi, np.pi, "rad", "no phase is special"),
@@ -97,7 +97,7 @@ LAWS: dict[str, Law] = {
     "bird_acceleration_mps2": Law("uniform", -5.0, 5.0, "m/s^2", "the paper's bird: about 4"),
     "stroke_scale": Law("uniform", 0.6, 1.25, "1", "about the stroke of JEES 2021"),
     "sweep_scale": Law("uniform", -1.0, 1.25, "1", "about the sweep of JEES 2021; models differ in its sign"),
-    # with the wings' own level as high as `clutter_snr_db`: else a strong lone line is never a bird that glides
+    # with the wings' own SNR added nearly as high as `clutter_snr_db`: else a strong lone line is never a gliding bird
     "bird_body_db": Law("uniform", -12.0, 27.0, "dB", "body over wing power; 17-27 in the catalogue"),
     "down_stroke": Law("uniform", 0.0, 0.7, "1", "down-stroke stronger than up-stroke"),
     "feather_weight": Law("log", 0.05, 2.0, "1", "wrist and tip scatterers against the wing's line"),
@@ -115,7 +115,7 @@ LAWS: dict[str, Law] = {
     "pace": Law("log", 1.0, 2.5, "1", "over that: runners and cyclists, to 8.75 m/s"),
     "pedalling": Law("uniform", 0.0, 1.0, "1", "above 0.75 a person rides a bicycle"),
     "gait_hz": Law("uniform", 0.8, 2.2, "Hz", "1-2 Hz"),
-    # not by the logarithm: where vehicles at 20 to 30 m/s are rare beside UAVs that fast, their wheels are rotors
+    # uniform, not log: if vehicles at 20 to 30 m/s are rarer than UAVs that fast, a model takes their wheels for rotors
     "vehicle_mps": Law("uniform", 1.5, 42.0, "m/s", "along the road, from a crawl over towns to motorways"),
     "engine_hz": Law("log", 10.0, 120.0, "Hz", "four-stroke engines fire at 20-30 Hz idling, to 100 Hz driven"),
     "engine_m": Law("log", 1e-6, 3e-4, "m", "panels shaken by it, micrometres to tenths of a millimetre"),
@@ -201,7 +201,7 @@ class Draws:
 
     @property
     def taken(self) -> int:
-        """Numbers taken so far, a record."""
+        """How many numbers of each record were taken."""
         return self._at
 
     def uniform(self, columns: int | None = None) -> NDArray[np.float64]:
@@ -216,21 +216,21 @@ class Draws:
     def value(
         self, law: str, columns: int | None = None, *, least: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]:
-        """Draw by the law of that name, from `least` on if given: shape (records,), or (records, columns)."""
+        """Draw by the law of that name, not below `least` if given: shape (records,), or (records, columns)."""
         return LAWS[law](self.uniform(columns), least)
 
     def either(self, usual: str, other: str, share: float) -> NDArray[np.float64]:
-        """Draw by the law `usual`, or for that share of the records by the law `other`: shape (records,)."""
+        """Draw by the law `usual`, or with probability `share` by the law `other`: shape (records,)."""
         one, two = self.value(usual), self.value(other)
         return np.where(self.chance(share), two, one)
 
     def change(self, law: str, dwell_s: float) -> NDArray[np.float64]:
-        """Draw a rate of change that adds up to no more over a dwell above 1 s than the law's end does in 1 s."""
+        """Draw a rate of change; in dwells above 1 s it adds up to no more than the law's largest rate does in 1 s."""
         most = max(abs(LAWS[law].low), abs(LAWS[law].high)) / max(1.0, dwell_s)
         return np.clip(self.value(law), -most, most)
 
     def acceleration_mps2(self, law: str, dwell_s: float = 0.0) -> NDArray[np.float64]:
-        """Draw an acceleration as `change` does; half of the records hardly have one."""
+        """Draw an acceleration as `change` does; in half of the records it is multiplied by `STEADY`."""
         return self.change(law, dwell_s) * np.where(self.chance(0.5), STEADY, 1.0)
 
     def chance(self, probability: float) -> NDArray[np.bool_]:

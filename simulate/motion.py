@@ -11,8 +11,8 @@ GRAVITY_MPS2 = 9.81
 def reduce_phase(phase_rad: NDArray[np.float64]) -> NDArray[np.float32]:
     """Bring a phase into [-pi, pi] and then to float32.
 
-    A phase grows with range and time to 1e6 rad and more, where float32 has no digit left behind the point; so it is
-    reduced in float64 first, in place of a slower double-precision sine.
+    A phase grows with range and time to 1e6 rad and more, where float32 has hardly a digit left behind the point. So it
+    is reduced in float64 first; that is faster than a double-precision sine of it.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
 """The parts a scene is built from, each validated by itself: what it holds, its units, its ranges and its defaults.
 
-Levels are powers over the receiver's noise, a sample [dB]; angles are in degrees here, because people write them.
+Levels are powers over the receiver's noise power, in one sample [dB]. Angles are in degrees here, because people write
+them.
 """
 
 import math
@@ -17,14 +18,15 @@ from .laws import LAWS
 from .radar import no_carrier
 from .receiver import FAULT_CHANCE, MAX_STEPS
 
-#: Size of any number, at most: beyond every scene, and its samples are finite still.
+#: Largest size of any number: beyond every real scene, and small enough that all samples are finite.
 MOST = 1e12
 
-#: Scatterers of a blade that is a row of them, at most.
+#: Most scatterers of a blade that is a row of them.
 MOST_POINTS = 1000
 
-#: What a parameter can be where its law does not tell: how many of a thing are rendered, what still has a spectrum
-#: (Billingsley's has none in still air), a gait or a texture, and what float32 holds.
+#: Least and largest value that a scene may fix a parameter to, where its law does not say. The limits are how many of a
+#: thing can be rendered, where a gait, a texture or a spectrum still exists (Billingsley's has none in still air), and
+#: what float32 holds.
 BOUNDS = {
     "wheels": (1, MAX_WHEELS),
     "body_points": (1, MAX_BODY_POINTS),
@@ -39,14 +41,14 @@ BOUNDS = {
     "ground_width_mps": (1e-6, 0.6),
     "gait_hz": (0.05, 20),
     "texture_hz": (1e-6, 1000),
-    "texture_shape": (0.05, 1e12),  # of a texture still rarer, float32 holds no power at most places
+    "texture_shape": (0.05, 1e12),  # below, the power of most samples is too small for float32
     "high_pass_hz": (1e-6, 1e9),
     "canceller_pulses": (2, 3),
     "adc_bits": (1, 24),
     "step_count": (1, MAX_STEPS),
 }
 
-#: The same of every level [dB].
+#: The same for every level [dB].
 LEVEL_BOUNDS_DB = (-200, 200)
 
 Real = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -86,9 +88,9 @@ LawValues = Annotated[dict[str, Number], AfterValidator(_known_laws)]
 
 
 def _of_catalogue(values: Any, field: str, entries: dict[str, Entry]) -> Any:
-    """Fields of a part with those of the catalogue's entry that it names, if any, beneath them."""
+    """Fields of a part; those not given come from the catalogue's entry that it names, if it names one."""
     name = values.get(field) if isinstance(values, dict) else None
-    if not isinstance(name, str):  # what is no name is told by the field's own type
+    if not isinstance(name, str):  # a value that is no name is refused later, by the field's own type
         return values
     if name not in entries:
         raise ValueError(f"{field} is {name!r}: it must be one of {', '.join(entries)}")
@@ -96,7 +98,7 @@ def _of_catalogue(values: Any, field: str, entries: dict[str, Entry]) -> Any:
 
 
 class Part(BaseModel):
-    """What all parts share: unknown fields are refused, nothing changes after it was made."""
+    """What all parts share: unknown fields are refused, and a part cannot be changed once made."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -117,7 +119,7 @@ class RadarPart(Part):
 
 
 class BodyPart(Part):
-    """One scatterer of a body, at `offset_m` from its centre and `bearing_deg` from the line of sight (0: nearer)."""
+    """One scatterer of a body, `offset_m` from its centre at `bearing_deg` from the line of sight (0: to the radar)."""
 
     level_db: Level
     offset_m: NotNegative = 0.0
@@ -129,9 +131,9 @@ class RotorPart(Part):
     """One rotor; the sign of `rotation_hz` is its sense.
 
     `flash_db` is one blade's level at its flash, seen at a right angle, where all of it echoes in phase. A blade is a
-    line that reflects evenly from `root_m` to its tip, or a row of so many equal `points`; the only one of a row, and a
-    line whose `root_m` equals `blade_length_m`, is the tip: the paper's point scatterer. `beta_deg` is the UAV's unless
-    given here.
+    line that reflects evenly from `root_m` to its tip, or a row of `points` equal scatterers. A row of one point, and a
+    line whose `root_m` equals `blade_length_m`, is a scatterer at the tip: the paper's model. `beta_deg` is the UAV's
+    unless given here.
     """
 
     blade_length_m: Positive
@@ -164,11 +166,11 @@ class RotorPart(Part):
 
     @property
     def amplitudes(self) -> tuple[float, ...]:
-        """Amplitude of each blade over that of `flash_db`."""
+        """Amplitude of each blade relative to that of `flash_db`."""
         return self.blade_amplitudes or (1.0,) * self.blades
 
     def tip_mps(self, dwell_s: float) -> float:
-        """Speed that its tips do not exceed within the dwell, drift and wander of the rate included [m/s]."""
+        """Upper bound of its tips' speed within the dwell, drift and wander of the rate included [m/s]."""
         drifted_hz = self.rotation_hz + self.drift_hz_per_s * dwell_s
         return 2 * math.pi * (max(abs(self.rotation_hz), abs(drifted_hz)) + self.wander_hz) * self.blade_length_m
 
@@ -188,7 +190,7 @@ class TargetPart(Part):
         return 0.0
 
     def nearest_m(self, dwell_s: float, drift_mps: float = 0.0) -> float:
-        """Smallest range of the centre within the dwell [m], of what moves so much faster than the part [m/s]."""
+        """Smallest range of the centre within the dwell [m], if `drift_mps` is added to the part's velocity [m/s]."""
         velocity, times = self.velocity_mps + drift_mps, [0.0, dwell_s]
         if self.acceleration_mps2 > 0:
             times.append(min(max(-velocity / self.acceleration_mps2, 0.0), dwell_s))
@@ -202,7 +204,7 @@ class TargetPart(Part):
 class UavPart(TargetPart):
     """A UAV: body scatterers and rotors, or the name of an `airframe` of the catalogue that brings both.
 
-    `gain_db` is added to the levels of all of them, so that an airframe of the catalogue is as loud as it is to be.
+    `gain_db` is added to the levels of all of them: it sets the strength of a catalogue airframe in a scene.
     """
 
     airframe: str | None = None
@@ -230,7 +232,7 @@ class UavPart(TargetPart):
         return max([r.offset_m + r.blade_length_m for r in self.rotors] + [b.offset_m for b in self.body])
 
     def amplitude(self, level_db: float) -> float:
-        """Of a scatterer of that level, over the rms of the noise; `gain_db` is added."""
+        """Amplitude of a scatterer of that level over the rms noise, `gain_db` included."""
         return float(10 ** ((level_db + self.gain_db) / 20))
 
     def rotor_beta_deg(self, rotor: RotorPart) -> float:
@@ -242,7 +244,7 @@ class UavPart(TargetPart):
         return math.radians(self.rotor_beta_deg(rotor))
 
     def fastest_tip_mps(self, rotor: RotorPart, dwell_s: float) -> float:
-        """Largest radial speed that a rotor's tips may show within the dwell [m/s]."""
+        """Upper bound of the radial speed of a rotor's tips within the dwell [m/s]."""
         return rotor.tip_mps(dwell_s) * math.cos(self.beta_rad(rotor)) + self.fastest_mps(dwell_s)
 
 
@@ -302,8 +304,8 @@ class ClutterPart(Part):
 class ReceiverPart(Part):
     """The receiver: thermal noise of unit power, and effects by name; `values` fixes their parameters.
 
-    `jitter_s` is the rms error of a pulse's instant, of UAVs and birds alone; `dc_db` the level of an offset at
-    velocity zero.
+    `jitter_s` is the rms error of a pulse's instant; it affects UAVs and birds alone. `dc_db` is the level of an offset
+    at velocity zero.
     """
 
     noise: bool = True

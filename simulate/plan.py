@@ -1,13 +1,13 @@
-"""What a scene requires, and no more: every effect's bound against the noise, and the cheapest renderer that will do.
+"""The plan of a rendering: each effect's error bound against the noise, and the cheapest renderer that is sufficient.
 
-The error of leaving an effect out is measured by its energy over the dwell, over the noise power of a sample. No line
-of the spectrum can then stand further over the noise floor than that, whatever the window; and no test at all, knowing
-both signals, can tell them apart once the energy is well below one (its deflection is twice the energy): hence the
-tolerance of -10 dB. Errors of several effects are added as amplitudes.
+The error of leaving an effect out is its energy over the dwell, relative to the noise power of a sample. No line of the
+error's spectrum can then stand further over the noise floor than that, whatever the window. No test, even one that
+knows both signals, can tell them apart once the energy is well below one (its deflection is twice the energy): hence
+the tolerance of -10 dB. Errors of several effects are added as amplitudes.
 
-Two things are not counted. A converter that is kept rounds a changed record anew: rounding is done to the record, and
-nothing that is done to it makes two signals easier to tell apart. And the digits of the closed form (float32 phases,
-1e-7 of a blade's amplitude a radian) show at tolerances far below that.
+Two things are not counted. First, a converter that is kept rounds a changed record otherwise: but rounding is done to
+the record, and nothing that is done to a record makes two signals easier to tell apart. Second, the rounding error of
+the closed form (float32 phases, 1e-7 of a blade's amplitude a radian) shows only at tolerances far below that.
 """
 
 from dataclasses import dataclass
@@ -23,10 +23,11 @@ from .reception import pulse_times_s
 from .render_uav import full_fidelity
 from .setting import Setting
 
-#: Without receiver noise, what is compared with: the digits of complex64, this far under the strongest target.
+#: Level that errors are compared with where there is no receiver noise: the resolution of complex64, relative to the
+#: strongest target [dB].
 DIGITS_DB = -140.0
 
-#: A tolerance from which on anything may be left out; its power is a number still [dB].
+#: Cap of the tolerance [dB]: anything may be left out at this level, and as a power ratio it is still finite.
 _ANY_DB = 2000.0
 
 #: What each effect is, and what stands in its place.
@@ -67,7 +68,8 @@ class Decision:
     part, effect : str
         Names.
     bound_db : float
-        Most energy of the error of leaving it out, over the noise power of a sample [dB]; -inf where it is not there.
+        Upper bound of the error energy of leaving the effect out, over the noise power of a sample [dB]; -inf if the
+        scene does not have the effect.
     kept : bool
         Whether the renderer keeps it.
     """
@@ -97,7 +99,8 @@ class Plan:
     tolerance_db : float
         Most error energy over the noise power of a sample [dB].
     error_db : float
-        Bound on that of all that is left out together [dB]; -inf where nothing is.
+        Upper bound of the error energy of all that is left out together, and of blades as points, over the noise power
+        of a sample [dB]; -inf if it is zero.
     decisions : tuple of Decision
         One an effect and part.
     fidelity : dict of str to Fidelity
@@ -132,9 +135,10 @@ def make_plan(scene: Setting, seed: int = 0, *, tolerance_db: float = -10.0) -> 
     scene : Setting
         The scene.
     seed : int
-        Root of the rendering's randomness: what the receiver does is judged as it will be drawn.
+        Root of the rendering's randomness: the receiver is judged with the parameters that this seed draws for it.
     tolerance_db : float
-        Most error energy over the dwell, over the noise power of a sample [dB]. At -10 dB no receiver can tell.
+        Most error energy over the dwell, over the noise power of a sample [dB]. At -10 dB no receiver can tell the
+        difference.
 
     Returns
     -------
@@ -153,7 +157,7 @@ def make_plan(scene: Setting, seed: int = 0, *, tolerance_db: float = -10.0) -> 
     times = pulse_times_s(scene, seed)
     bounds = {uav.name: UavBounds(uav, radar, times) for uav in scene.uavs}
     receiver = ReceiverBounds(scene, seed, bounds)
-    # norms, over that of the noise of one sample; the receiver may make a target's error larger
+    # norms of the errors, divided below by the rms noise of a sample; the receiver may amplify a target's error
     errors: dict[tuple[str, str], float] = {}
     for uav in scene.uavs:
         for effect in UAV_EFFECTS:
@@ -168,7 +172,7 @@ def make_plan(scene: Setting, seed: int = 0, *, tolerance_db: float = -10.0) -> 
         errors["receiver", effect] = receiver.own(effect)
     scale = 1 / np.sqrt(noise)
     errors = {key: scale * error for key, error in errors.items()}
-    # half of the amplitude tolerated is for the effects, the rest for the spacing of scatterers where they are needed
+    # half of the tolerated amplitude is for effects left out, the rest for the spacing of scatterers where needed
     allowed, used, dropped = 10 ** (min(tolerance_db, _ANY_DB) / 20), 0.0, set()
     for key, error in sorted(errors.items(), key=lambda item: item[1]):
         if error == 0 or used + error <= allowed / 2:
@@ -194,7 +198,7 @@ def make_plan(scene: Setting, seed: int = 0, *, tolerance_db: float = -10.0) -> 
 
 
 def _strongest(scene: Setting) -> float:
-    """Power of the strongest part of the scene."""
+    """Power of the strongest body, rotor or bird of the scene; 1 if it has none."""
     levels = [point.level_db + uav.gain_db for uav in scene.uavs for point in uav.body]
     levels += [rotor.flash_db + uav.gain_db for uav in scene.uavs for rotor in uav.rotors]
     levels += [max(bird.wing_db, bird.body_db) for bird in scene.birds]
@@ -234,7 +238,7 @@ def _renderer(uav: UavPart, radar: Radar, points: int | None) -> str:
 
 
 def _aliasing(uav: UavPart, radar: Radar) -> str:
-    """Whether the samples fold the blades' Doppler. They do so by themselves, at no cost: nothing is decided here."""
+    """Tell whether the UAV's Doppler is aliased. Sampling does that by itself, at no cost: nothing is decided here."""
     tips = [uav.fastest_tip_mps(rotor, radar.dwell_s) for rotor in uav.rotors]
     fastest = max([uav.fastest_mps(radar.dwell_s), *tips])
     verdict = "none" if fastest <= radar.unambiguous_mps else "the samples fold it, as a radar's do"

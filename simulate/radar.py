@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 #: Speed of light [m/s], exact. (The paper's tables used 3e8.)
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 
-#: A carrier below this was given in another unit [Hz].
+#: Least carrier [Hz]: a smaller number was given in another unit.
 LEAST_CARRIER_HZ = 1e6
 
 
 def no_carrier(carrier_hz: float) -> str:
-    """Why a frequency is no radar's carrier; empty where it may be one's."""
+    """Say why a frequency is no radar's carrier; the text is empty if it may be one's."""
     if carrier_hz >= LEAST_CARRIER_HZ:
         return ""
     return f"{carrier_hz:g} Hz is no radar's: it must be {LEAST_CARRIER_HZ:g} Hz or more: 10 GHz is 10e9"
@@ -27,7 +27,7 @@ def whole(value: object, name: str, least: int = 0) -> int:
     Raises
     ------
     ValueError
-        It is none, or less than the least.
+        If `value` is no whole number, or below `least`.
     """
     if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
         raise ValueError(f"{name} is {value!r}: it must be a whole number of at least {least}")

@@ -16,7 +16,7 @@ from .motion import TWO_PI, turned
 from .radar import Radar
 from .target import Normals
 
-#: How often each fault is present where any may be.
+#: Probability of each fault in a receiver that may have faults.
 FAULT_CHANCE = {
     "fading": 0.4,
     "impulses": 0.2,
@@ -36,7 +36,7 @@ FAULT_CHANCE = {
     "spurs": 0.04,
 }
 
-#: Whose effect each parameter of a receiver is.
+#: Effect that each parameter of a receiver belongs to.
 EFFECT_OF = {
     "fading_db": "fading",
     "fading_hz": "fading",
@@ -69,14 +69,15 @@ EFFECT_OF = {
     "adc_bits": "converter",
 }
 
-#: How often there is none of them: simulated records, good radars. With faults in nearly all records, networks learn
-#: less of what a clear receiver shows, and no more of those that have some (docs/ablation.md).
+#: Probability that a receiver has no fault, as in simulated records and good radars. With faults in nearly all records,
+#: networks do worse with clear receivers, and no better with faulty ones (docs/ablation.md).
 FAULTLESS_CHANCE = 0.5
 
-#: Humps of a band that is not flat.
+#: Number of humps of a band that is not flat.
 HUMPS = 2
 
-#: Spoilt stretches take at most so much of a record, those at any time together, even ones each of what is between two.
+#: Largest share that spoilt stretches take: all those at random times together of the record, each of the evenly spaced
+#: ones of the time between two.
 SPOILT_SHARE = 0.25
 
 #: Most steady lines of a receiver's own.
@@ -133,7 +134,7 @@ class Receiver:
         self.burst_db = draws.value("burst_db")
         self.burst_phase = draws.value("phase_rad")
         self.burst_alike = draws.chance(0.5)
-        # a rectifier ticks, alike once or twice a period of the mains; what bursts at any other rate is noise
+        # identical bursts, a rectifier's ticks, come once or twice a mains period; at any other rate bursts are noise
         self.bursts_of_mains = of_mains | self.burst_alike
         self.burst_hz = np.where(self.bursts_of_mains, periods * self.mains_hz, any_hz)
         faulty = ~draws.chance(FAULTLESS_CHANCE)
@@ -165,7 +166,7 @@ class Receiver:
         radar : Radar
             The radar that looks.
         normals_of : callable
-            Gives the source of normal numbers of the effect of that name.
+            Gives the source of normal numbers for an effect, by its name.
 
         Returns
         -------
@@ -221,17 +222,18 @@ class Receiver:
         return iq * (10 ** (self.gain_db / 20)).astype(np.float32)[:, None]
 
     def _fading(self, radar: Radar, rows: NDArray[np.intp]) -> NDArray[np.float32]:
-        """Slow rise and fall of everything the antenna sees: glint, multipath, a beam that moves on."""
+        """Amplitude factor of the slow rise and fall of all that the antenna sees: glint, multipath, a moving beam."""
         swing = np.broadcast_to(np.log(10) * self.fading_db[rows, None] / 40, (len(rows), self.fading_hz.shape[1]))
         gain = PulseGrid(radar).sines(Sine(swing, self.fading_hz[rows], self.fading_phase[rows]))
         return np.exp(gain, out=gain)
 
     def _spoil(self, iq: NDArray[np.complex64], rows: NDArray[np.intp], normals: Normals) -> None:
-        """Pulses spoilt by another emitter, single or a stretch of them, at any time or, as by another radar, evenly.
+        """Add another emitter's pulses, single or in stretches, at random times or, as of another radar, evenly spaced.
 
-        Single ones are as short in time as a rotor's flashes can be, even ones as regular; in Doppler they are white. A
-        stretch is a tone that sweeps, hardly or through the whole band: a packet, another radar's chirp. Even ones of
-        one phase would be ticks, which at any rate cost drones their name (docs/ablation.md).
+        Single pulses are as short in time as a rotor's flashes can be, and evenly spaced ones as regular; in Doppler
+        they are white. A stretch is a tone that sweeps, from hardly at all to the whole band: a packet, another radar's
+        chirp. Each has a phase of its own: evenly spaced pulses of one phase would be ticks, and with ticks at any rate
+        in training, drones are missed (docs/ablation.md).
         """
         pulses = iq.shape[-1]
         phases = normals(4 * pulses).view(np.complex64)
@@ -247,15 +249,15 @@ class Receiver:
                 first = ((np.angle(other[:count]) / TWO_PI + 0.5) * pulses).astype(np.intp) % pulses
             within = np.arange(lasts)
             turns = within * (self.impulse_turns[row] + self.impulse_sweep[row] * within / (2 * lasts))
-            tone = turned((TWO_PI * (turns % 1)).astype(np.float32))  # there may be millions of them
+            tone = turned((TWO_PI * (turns % 1)).astype(np.float32))  # up to millions of turns: reduced in float64
             stretch = np.float32(10 ** (self.impulse_db[row] / 20)) * phase[: len(first), None] * tone
             spoilt = first[:, None] + within
             heard = spoilt < pulses
-            # two may fall on one pulse
+            # not +=: two stretches may fall on one pulse
             np.add.at(iq[row], spoilt[heard], np.broadcast_to(stretch, spoilt.shape)[heard])
 
     def _steps(self, radar: Radar, rows: NDArray[np.intp]) -> NDArray[np.complex64]:
-        """Gain and phase that step at any time: a control that switches attenuators, an oscillator locked anew."""
+        """Factor whose gain and phase step at random times: a control switches attenuators, an oscillator relocks."""
         out = np.empty((len(rows), radar.pulses), np.complex64)
         for factor, row in zip(out, rows, strict=True):
             at = np.sort(self.step_at[row, : int(self.step_count[row])]) * radar.pulses
@@ -266,17 +268,17 @@ class Receiver:
         return out
 
     def _spurs(self, radar: Radar, rows: NDArray[np.intp]) -> NDArray[np.complex64]:
-        """Steady lines of the receiver's own, or of another mover: any number is no rotor's comb."""
+        """Steady lines of the receiver's own, or of another mover: several lines alone are no rotor's comb."""
         out = np.zeros((len(rows), radar.pulses), np.complex64)
         for n in range(SPURS):
             level = np.where(n < self.spur_count[rows], 10 ** (self.spur_db[rows, n] / 20), 0.0).astype(np.float32)
-            turns = self.spur_turns[rows, n, None] * np.arange(radar.pulses) % 1  # thousands: more than float32 holds
+            turns = self.spur_turns[rows, n, None] * np.arange(radar.pulses) % 1  # thousands: reduced in float64
             angle = (TWO_PI * turns + self.spur_phase[rows, n, None]).astype(np.float32)
             out += level[:, None] * turned(angle)
         return out
 
     def _mains(self, radar: Radar, rows: NDArray[np.intp]) -> NDArray[np.float32]:
-        """Harmonics of the mains, real and so on both sides of the spectrum alike."""
+        """Harmonics of the mains; they are real, so that both sides of the spectrum are alike."""
         order = np.arange(1, self.mains_phase.shape[1] + 1)
         amplitude = order ** -self.mains_slope[rows, None]
         amplitude *= np.sqrt(2 * 10 ** (self.mains_db[rows, None] / 10) / (amplitude**2).sum(axis=1, keepdims=True))
@@ -284,27 +286,29 @@ class Receiver:
         return PulseGrid(radar).sines(Sine(amplitude, order * self.mains_hz[rows, None], cosine))
 
     def _bursts(self, radar: Radar, rows: NDArray[np.intp], normals: Normals) -> NDArray[np.complex64]:
-        """Bursts at a steady rate: in time like a rotor's flashes, in Doppler like nothing, or a comb without an end.
+        """Bursts at a steady rate: in time they resemble a rotor's flashes.
 
-        Some are noise; others are alike and of even strength: a rectifier's ticks. The shortest spoils one pulse.
+        Some are noise, which has no structure in Doppler. Others are identical and of constant amplitude, a rectifier's
+        ticks, whose comb in Doppler has no end. The shortest burst lasts one pulse.
         """
         white = normals(2 * radar.pulses).view(np.complex64)
         rate_hz = self.burst_hz[rows, None]
-        period = radar.prf_hz / rate_hz  # in pulses, as what follows
+        period = radar.prf_hz / rate_hz  # in pulses, as `since` and `lasts` below
         since = (rate_hz * radar.times_s + self.burst_phase[rows, None] / TWO_PI) % 1 * period
         lasts = np.clip(self.burst_share[rows, None] * period, 1.0, period)
         alike = self.burst_alike[rows]
-        shape = white[alike] / np.abs(white[alike])  # one for all bursts of a record
+        shape = white[alike] / np.abs(white[alike])  # all bursts of a record have the same shape
         white[alike] = np.sqrt(2) * np.take_along_axis(shape, since[alike].astype(int) % radar.pulses, axis=-1)
         amplitude = np.sqrt(10 ** (self.burst_db[rows, None] / 10) * period / (2 * lasts))
         return white * np.where(since < lasts, amplitude, 0.0).astype(np.float32)
 
     def _filter(self, iq: NDArray[np.complex64], radar: Radar) -> None:
-        """The band's shape: not flat, falling towards its edges with smooth humps anywhere, and blind at rest.
+        """Apply the frequency response in place: a band that is not flat, a high-pass filter, a clutter canceller.
 
-        A hump of noise must not pass for a rotor's band. A receiver coupled by capacitors lets nothing near velocity
-        zero through; a canceller of clutter takes each pulse from the next, or does so twice: |2 sin(pi f / PRF)|, or
-        its square, over the whole band (Skolnik, Introduction to Radar Systems, ch. 3), but for a delay.
+        The band falls towards its edges and has smooth humps anywhere, so that a hump of noise does not pass for a
+        rotor's band. A receiver coupled by capacitors lets nothing near velocity zero through. A clutter canceller
+        subtracts each pulse from the next, once or twice: |2 sin(pi f / PRF)|, or its square, over the whole band
+        (Skolnik, Introduction to Radar Systems, ch. 3), apart from a delay.
         """
         share = (fft.fftfreq(iq.shape[-1]) * 2).astype(np.float32)
         tilt, square = share**2, fft.fftfreq(iq.shape[-1], 1 / radar.prf_hz).astype(np.float32) ** 2
@@ -327,7 +331,7 @@ class Receiver:
             iq[row] = fft.ifft(spectrum, overwrite_x=True)
 
     def _one_sided(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:
-        """A real recording made analytic afterwards: both sides fold onto one, the other is empty."""
+        """Make records like real recordings made analytic afterwards: both sides fold onto one, the other is empty."""
         pulses = iq.shape[-1]
         keep = np.zeros(pulses, np.float32)
         keep[1 : (pulses + 1) // 2] = 2
@@ -342,7 +346,7 @@ class Receiver:
             iq[row] = folded.conj() if self.conjugate[row] else folded
 
     def _convert(self, iq: NDArray[np.complex64], rows: NDArray[np.intp]) -> None:
-        """Clip and quantise as a converter does whose full scale was set for the record."""
+        """Clip and quantise as a converter whose full scale is set relative to the record's largest sample."""
         for row in rows:
             largest = max(np.abs(iq[row].real).max(), np.abs(iq[row].imag).max())
             if largest == 0:

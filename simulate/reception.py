@@ -1,4 +1,4 @@
-"""A scene's randomness and its receiver: streams of their own for every part, clutter of a level, effects by name."""
+"""A scene's randomness and its receiver: a random stream for every part, clutter of a given level, effects by name."""
 
 import zlib
 from collections.abc import Collection
@@ -18,18 +18,18 @@ from .receiver import NormalsOf, Receiver
 from .setting import Setting
 from .target import mean_power
 
-#: What clutter of a kind is in a scene whose values do not say otherwise: a person walks, at `person_mps`; ground moves
-#: by Billingsley's law.
+#: Values that clutter of a kind has in a scene unless its own `values` say otherwise: a person walks, at `person_mps`;
+#: ground moves by Billingsley's law.
 USUAL = {"person": {"pace": 1.0, "pedalling": 0.0}, "ground": {"ground_law": 1.0}}
 
 
 def generator_of(seed: int, name: str) -> Generator:
-    """The generator of one part: it depends on the seed and the part's name alone."""
+    """Make the generator of one part; it depends on the seed and the part's name alone."""
     return generator(seed, zlib.crc32(name.encode()))
 
 
 class Chosen(Draws):
-    """Draws of which some parameters are fixed by name; `unused` holds those that nothing has asked for so far."""
+    """Draws with some parameters fixed by name; `unused` holds the names of fixed ones that were not asked for yet."""
 
     def __init__(self, uniforms: NDArray[np.float64], values: dict[str, float]) -> None:
         super().__init__(uniforms)
@@ -47,11 +47,11 @@ class Chosen(Draws):
         return self.value(law) if law in self._values else super().change(law, dwell_s)
 
     def acceleration_mps2(self, law: str, dwell_s: float = 0.0) -> NDArray[np.float64]:
-        """Draw an acceleration, or give the value that is fixed: whether the body is steady was settled with it."""
+        """Draw an acceleration, or give the value that is fixed, which is not reduced for a steady body."""
         return self._fixed(super().acceleration_mps2(law, dwell_s), law)
 
     def either(self, usual: str, other: str, share: float) -> NDArray[np.float64]:
-        """Draw by one of two laws, or give the value that is fixed of either."""
+        """Draw by one of two laws, or give the value that either is fixed to."""
         return self._fixed(super().either(usual, other, share), usual, other)
 
     def _fixed(self, drawn: NDArray[np.float64], *laws: str) -> NDArray[np.float64]:
@@ -70,7 +70,7 @@ def pulse_times_s(scene: Setting, seed: int) -> NDArray[np.float64]:
 
 
 def clutter_echo(part: ClutterPart, radar: Radar, seed: int) -> tuple[NDArray[np.complex64], dict[str, Any], list[str]]:
-    """Clutter of mean power `level_db`, what was drawn of it, and which of its `values` it has no use for."""
+    """Echo of clutter of mean power `level_db`, what was drawn for it, and names of its `values` without effect."""
     rng = generator_of(seed, part.name)
     draws = Chosen(rng.random((1, WIDTH)), USUAL.get(part.kind, {}) | part.values)
     if part.kind in DISCRETES:
@@ -81,7 +81,7 @@ def clutter_echo(part: ClutterPart, radar: Radar, seed: int) -> tuple[NDArray[np
     if target.body is not None and target.body_db is not None:
         iq = _unit(iq) + _unit(target.body) * (10 ** (target.body_db / 20)).astype(np.float32)[:, None]
     drawn = {name: float(values[0]) for name, values in target.truth.items() if not np.isnan(values[0])}
-    if part.kind == "ground":  # it moves by one of two laws, and both are drawn
+    if part.kind == "ground":  # the parameters of both its laws are drawn, but one law alone is used
         other = {"wind_mph"} if "width_mps" in drawn else {"ground_width_mps", "ground_still_db"}
         draws.unused |= other & set(part.values)
     return (_unit(iq) * np.float32(10 ** (part.level_db / 20)))[0], drawn, sorted(draws.unused)
@@ -109,15 +109,15 @@ class Reception:
         draws = Chosen(generator_of(seed, "receiver").random((1, WIDTH)), part.values)
         self.drawn = Receiver(draws)
         self.drawn.gain_db = np.zeros(1)  # the levels of a scene are those of its samples
-        #: Names of fixed values that it has no use for.
+        #: Names of fixed values that have no effect.
         self.unused = sorted(draws.unused | ({"gain_db"} & set(part.values)))
         if part.mains_hz is not None:
             follow = np.where(self.drawn.bursts_of_mains, part.mains_hz / self.drawn.mains_hz, 1.0)
             self.drawn.burst_hz = self.drawn.burst_hz * follow
             self.drawn.mains_hz = np.array([part.mains_hz])
-        if "burst_hz" in part.values:  # in training records most bursts come at their receiver's mains' rate
+        if "burst_hz" in part.values:  # else most bursts come at the mains' rate, as in training records
             self.drawn.burst_hz = np.array([part.values["burst_hz"]])
-        # in training records half of the spoilt pulses come evenly, the others at any time
+        # evenly spaced or at random times, half of each in training records; here the parameter that is fixed decides
         if "impulse_pulses" in part.values or "impulse_count" in part.values:
             self.drawn.impulse_even = np.array(["impulse_pulses" in part.values])
         #: Names of the effects that are on; "dc" is the offset.
@@ -133,7 +133,10 @@ class Reception:
     def receive(
         self, signal: NDArray[np.complex64], effects: Collection[str], *, quiet: bool = False
     ) -> NDArray[np.complex64]:
-        """Pass a signal, shape (pulses,), through these effects; leaving one out changes nothing of the others."""
+        """Pass a signal, shape (pulses,), through these effects.
+
+        Leaving one out changes no random number of the others; `quiet` leaves out the thermal noise.
+        """
         self.drawn.on = {name: np.array([name in effects]) for name in self.drawn.on}
         if "dc" in effects:
             signal = signal + self.offset

@@ -29,7 +29,7 @@ class Rendering:
     truth : list of dict
         What is in it, one a part: "name", "label", "kind" and numbers that carry their units.
     warnings : list of str
-        What is right but may not be meant.
+        What is valid but may not be meant.
     """
 
     radar: Radar

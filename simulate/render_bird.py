@@ -72,7 +72,7 @@ def bird_echo(part: BirdPart, radar: Radar, times_s: NDArray[np.float64], how: F
 
 
 def heave_range_m(part: BirdPart, times_s: NDArray[np.float64], bird: Member) -> NDArray[np.float64]:
-    """Range by which the body rises and sinks against the wings [m]: it is lowest where they are highest."""
+    """Range change as the body rises and sinks against the wings [m]: it is lowest when they are highest."""
     cycle, _ = _cycle_rad(part, times_s, bird)
     return -part.heave_m * np.sin(np.deg2rad(part.elevation_deg)) * np.cos(cycle)
 
@@ -100,7 +100,7 @@ def bird_parts_echo(part: BirdPart, radar: Radar, times_s: NDArray[np.float64], 
 def _cycle_rad(
     part: BirdPart, times_s: NDArray[np.float64], bird: Member
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Phase of the wingbeat [rad] and whether the wings are out, 0 or 1; resting birds hold the phase."""
+    """Phase of the wingbeat [rad], which rests hold, and whether the wings are out, 0 (a bounding bird's rest) or 1."""
     if part.flight == "flap":
         beating, out = times_s, np.ones(len(times_s))
     else:
@@ -113,7 +113,7 @@ def _cycle_rad(
 
 
 def bird_truth(part: BirdPart) -> dict[str, Any]:
-    """Numbers of a bird."""
+    """Truth about a bird."""
     return {
         "name": part.name,
         "label": "bird",

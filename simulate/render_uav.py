@@ -1,4 +1,4 @@
-"""Rendering of a scene's UAVs: exact or far ranges, closed-form or dense blades, as a fidelity says."""
+"""Rendering of a scene's UAVs: exact or far-field ranges, blades in closed form or as dense points, by a `Fidelity`."""
 
 from typing import Any
 
@@ -15,10 +15,10 @@ from .rotor import RotorMotion, rotor_echo
 
 
 def full_fidelity(part: UavPart, radar: Radar) -> Fidelity:
-    """Every effect, and as many scatterers a blade as float64 can tell from a continuous one."""
+    """Every effect, and enough scatterers a blade that float64 cannot tell them from a continuous one."""
     longest = max((r.blade_length_m - r.root_m for r in part.rotors if not r.points), default=0.0)
     phase = 2 * TWO_PI * longest / radar.wavelength_m
-    # from a quarter of the phase on they tell a blade, and from e / 8 of it on the bound says so (`sag_error`)
+    # phase / 4 points represent the blade, but the bound (`sag_error`) shows that only from e / 8 x phase points on
     return Fidelity(frozenset(UAV_EFFECTS), int(np.e / 8 * phase + 6 * np.cbrt(phase)) + 30)
 
 
@@ -96,7 +96,7 @@ def uav_echo(part: UavPart, radar: Radar, times_s: NDArray[np.float64], how: Fid
 
 
 def scatterers(rotor: RotorPart, points: int) -> BladePoints:
-    """Points of one blade: its row, or as many as are to stand for a line."""
+    """Points of one blade: its own row, or `points` Gauss points in place of a line."""
     if rotor.points:
         row = row_m(rotor.root_m, rotor.blade_length_m, rotor.points)
         return BladePoints(row, np.full(len(row), 1 / len(row)))
@@ -104,12 +104,12 @@ def scatterers(rotor: RotorPart, points: int) -> BladePoints:
 
 
 def vibration_rad(part: UavPart, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Phase by which the vibration of the rigid airframe moves its echo, body and hubs alike [rad], shape (pulses,)."""
+    """Phase that the vibration of the rigid airframe adds to its echo, body and hubs alike [rad], shape (pulses,)."""
     return part.vibration_rad * np.sin(TWO_PI * part.vibration_hz * times_s)
 
 
 def uav_truth(part: UavPart) -> dict[str, Any]:
-    """Numbers of a UAV; those of rotors are lists, one entry a rotor."""
+    """Truth about a UAV; values of rotors are lists, one entry a rotor."""
     return {
         "name": part.name,
         "label": "uav",
@@ -135,7 +135,7 @@ def _flashes(rotor: RotorPart) -> int:
 
 
 def _repeats(rotor: RotorPart) -> int:
-    """How often a turn looks the same: once a blade where all echo alike, twice for strong, weak, strong, weak.
+    """Repeats of a rotor's echo within a turn: once a blade if all are equal, twice for strong, weak, strong, weak.
 
     Lines stand that many rotation rates apart.
     """

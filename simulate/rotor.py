@@ -5,7 +5,7 @@ far field, eqs. 2 and 4). The integral over r of exp(+j 2 k r cos(beta) cos(thet
 
     (L2 - L1) exp(j k (L1 + L2) c) sinc(k (L2 - L1) c),     c = cos(beta) cos(theta),  sinc(x) = sin(x) / x.
 
-The blade opposite has the conjugate, so two blades cost little more than one.
+The opposite blade has the conjugate echo, so two blades cost little more than one.
 """
 
 from dataclasses import dataclass
@@ -114,8 +114,8 @@ def rotor_echo(
     blade_amplitudes : array_like, shape (..., blades)
         Amplitude of each blade, equally spaced in angle; 0 takes a blade away.
     edge_asymmetry : array_like, shape (...)
-        How unlike the leading and the trailing edge reflect, -1..1: a blade's amplitude is 1 + asymmetry * sin(angle),
-        and sin(angle) > 0 is where it recedes (for a positive rotation rate).
+        How differently the leading and the trailing edge reflect, -1..1: a blade's amplitude is multiplied by
+        1 + asymmetry * sin(angle); it recedes where sin(angle) > 0 (for a positive rotation rate).
     points : int, optional
         Equal scatterers a blade, evenly from `root_m` to the tip, >= 1; one is at the tip, which is the paper's model.
         None: a line that reflects evenly (Martin and Mulgrew 1990).
@@ -123,7 +123,7 @@ def rotor_echo(
     Returns
     -------
     ndarray of complex64, shape (..., pulses)
-        Sum over the blades of the mean of exp(j 2 k r c) over what reflects of the blade: a blade of amplitude 1
+        Sum over the blades of the mean of exp(j 2 k r c) over the reflecting part of the blade: a blade of amplitude 1
         seen at rest at a right angle contributes 1.
 
     Raises
@@ -156,7 +156,7 @@ def rotor_echo(
             real, imag = np.empty_like(reduced), np.empty_like(reduced)
             blades.sum(rows, reduced, room, real, imag)
             part.real, part.imag = real, imag
-    if fine.any():  # each record by what itself needs, whatever stands beside it
+    if fine.any():  # the precision of a record depends on itself alone, not on the others of its batch
         amplitudes = np.asarray(blade_amplitudes, np.float64)
         number = amplitudes.shape[-1]
         amplitudes = np.broadcast_to(amplitudes, (*lead, number)).reshape(len(out), number)
@@ -166,7 +166,7 @@ def rotor_echo(
 
 
 def needs_float64(wavelength_m: float, blade_length_m: ArrayLike, beta_rad: ArrayLike) -> NDArray[np.bool_]:
-    """True where a blade is so many wavelengths long that the rounding of a float32 angle shows."""
+    """Tell where a blade is too long in wavelengths (`LARGEST_GAMMA`) for angles rounded to float32."""
     return np.asarray(2 * TWO_PI / wavelength_m * np.multiply(blade_length_m, np.abs(np.cos(beta_rad))) > LARGEST_GAMMA)
 
 
@@ -180,7 +180,7 @@ def _double_echo(
     amplitudes: NDArray[np.float64],
     points: int | None,
 ) -> NDArray[np.complex64]:
-    """The closed form blade by blade in float64, where float32 has no digits left: long blades, rows of many points.
+    """Closed form blade by blade in float64, where float32 is too coarse: long blades, rows of many points.
 
     Angles are of shape (records, pulses), amplitudes (records, blades), all others (records, 1).
     """

@@ -18,7 +18,7 @@ _MOST_BYTES = 16 << 20
 
 
 class SceneError(ValueError):
-    """A scene that cannot be: one line a problem, each with the field, the value and the rule.
+    """Raised for an invalid scene: one line a problem, each with the field, the value and the rule.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class Scene(Setting):
                 file = files("bladewing.simulate") / "scenes" / f"{name}.toml"
             if isinstance(file, Path) and file.exists() and not (file.is_file() and file.stat().st_size <= _MOST_BYTES):
                 raise ValueError(f"it must be a file of at most {_MOST_BYTES} bytes")
-            values = tomllib.loads(file.read_text(encoding="utf-8-sig"))  # some editors begin with a mark
+            values = tomllib.loads(file.read_text(encoding="utf-8-sig"))  # some editors begin with a byte-order mark
         except OSError as error:
             meant = _meant(name) if isinstance(error, FileNotFoundError) else []
             cure = " or ".join(meant) or f"a TOML file, or a shipped scene: {', '.join(shipped())}"
@@ -124,7 +124,7 @@ def shipped() -> list[str]:
 
 
 def _meant(name: str) -> list[str]:
-    """What a name of nothing may stand for: the file with its suffix, the shipped scene that is written nearly so."""
+    """Suggest what a name without a file may stand for: the file with its suffix, a shipped scene of similar name."""
     return [file for file in (f"{name}.toml",) if os.path.isfile(file)] + get_close_matches(name, shipped(), n=1)
 
 
@@ -140,7 +140,7 @@ def _line(problem: dict[str, Any]) -> str:
         return f"unknown field {field}: the fields are {', '.join(model.model_fields)}"
     if problem["type"] == "missing":
         return f"{field} is missing: it is required"
-    table = ".".join(part for part in problem["loc"] if isinstance(part, str))  # as its header is written
+    table = ".".join(part for part in problem["loc"] if isinstance(part, str))  # the name in the table's header
     rule = _RULES.get(problem["type"], problem["msg"].removeprefix("Input ").removeprefix("Value error, "))
     if problem["type"] == "value_error":
         return f"{field}: {rule}" if field else rule
@@ -151,7 +151,7 @@ def _line(problem: dict[str, Any]) -> str:
     return f"{field} is {problem['input']!r}: it {rule}"
 
 
-#: What must be of a field, where the library's own words are no cure.
+#: Rule for each type of error whose message by the library does not say what to do.
 _RULES = {
     "string_pattern_mismatch": "must begin with a letter, and hold letters, digits, _ and - alone",
     "tuple_type": "must be a list: write [...] about it",
@@ -159,7 +159,7 @@ _RULES = {
     "dict_type": "must be a table: write { name = number }",
 }
 
-#: The models that the names within a field's path stand for.
+#: Model that each name within a field's path stands for.
 _PARTS: dict[str, type[BaseModel]] = {
     "radar": RadarPart,
     "uav": UavPart,

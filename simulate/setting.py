@@ -1,4 +1,4 @@
-"""What a radar looks at, checked as a whole: the parts together, and what is right but may not be meant."""
+"""What a radar looks at, checked as a whole: the parts together, and what is valid but may not be meant."""
 
 import math
 
@@ -17,10 +17,10 @@ _LEAST_PRF_HZ = 100.0
 #: A bird heavier than this, which no wings carry, may have been given in grams [kg].
 _HEAVIEST_KG = 25.0
 
-#: From this rms jitter on, of the time between pulses, one in 400 comes after the next.
+#: Rms jitter over the time between pulses above which a warning is given: one pulse in 400 then comes after the next.
 _MOST_JITTER = 0.25
 
-#: Names that random streams of the receiver go by.
+#: Names of the receiver's random streams, which no part may have.
 _RESERVED = ("noise", "jitter", "receiver")
 
 
@@ -105,7 +105,7 @@ class Setting(BaseModel):
         return self.receiver.noise and "noise" not in self.off
 
     def warnings(self) -> list[str]:
-        """What is right but may not be meant: one line each."""
+        """Tell what is valid but may not be meant, one line each."""
         radar, said = self.sight, []
         if radar.prf_hz < _LEAST_PRF_HZ:
             said.append(f"radar.prf_hz is {radar.prf_hz:g}: in Hz, so that {radar.prf_hz:g} kHz is {radar.prf_hz:g}e3")
@@ -166,7 +166,7 @@ class Setting(BaseModel):
 
 
 def _nearest_m(part: TargetPart, dwell_s: float) -> float:
-    """Smallest range of a target's centre within the dwell, of a flock that of any member [m]."""
+    """Smallest range of a target's centre within the dwell [m]; for a flock, that of its nearest member."""
     if isinstance(part, BirdPart):
         return min(part.nearest_m(dwell_s, bird.velocity_mps) + bird.place_m for bird in members(part))
     return part.nearest_m(dwell_s)

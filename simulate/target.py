@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .laws import LAWS
 
-#: Draws that many standard normal numbers from each record's own generator: (count) -> (records, count) float32.
+#: Draws `count` standard normal numbers from each record's own generator: (count) -> (records, count) float32.
 Normals = Callable[[int], NDArray[np.float32]]
 
 
@@ -27,7 +27,7 @@ class Target:
     snr_law : str
         The law of the SNR.
     snr_of_body : ndarray of bool or None, shape (records,)
-        Where the SNR is drawn for the body instead, as that of clutter is.
+        Where the SNR is drawn for the body instead, by the law `clutter_snr_db`.
     truth : dict of str to ndarray, each of shape (records,)
         What is true of each record; names carry their units.
     """
@@ -40,7 +40,7 @@ class Target:
     truth: dict[str, NDArray] = field(default_factory=dict)
 
     def snr_db(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """SNR of the micro-motion [dB] that the law makes of uniform numbers in [0, 1), shape (records,)."""
+        """SNR of the micro-motion [dB] that the laws give for uniform numbers in [0, 1), shape (records,)."""
         drawn_db = LAWS[self.snr_law](u)
         if self.snr_of_body is None or self.body_db is None:
             return drawn_db

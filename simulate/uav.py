@@ -20,29 +20,30 @@ ROTORS = {"fixed_wing": 1, "quadcopter": 4, "hexacopter": 6, "octocopter": 8, "h
 #: Blades a rotor may have.
 BLADES = (2, 3, 4)
 
-#: No rotor turns slower [Hz], however long its blades (24-100 Hz in P, and a margin): what does has wheels or wings.
+#: Slowest rotor [Hz], however long its blades (24-100 Hz in P, and a margin): what turns slower has wheels or wings.
 LEAST_ROTATION_HZ = 20.0
 
-#: This share of the UAVs that move may be fast ones.
+#: Share of the moving UAVs whose speed is drawn by the law `fast_uav_mps`.
 FAST_CHANCE = 0.2
 
-#: A tip is at least so many times as fast as the aircraft: rotors advance by at most 0.4 of their tips' speed
-#: (helicopters), propellers by a third. What turns no faster than it moves is a wheel.
+#: Least ratio of tip speed to the aircraft's speed: rotors advance by at most 0.4 of their tips' speed (helicopters),
+#: propellers by a third. A part whose rim is no faster than the body is a wheel.
 TIP_OVER_BODY = 2.5
 
-#: From this speed on discs are tilted as far as they ever are [m/s]: drag holds the thrust by then.
+#: Speed from which discs have their full tilt [m/s], where drag balances the thrust; below, the tilt rises with speed.
 TILTED_MPS = 20.0
 
-#: An airframe is shaken by its rotors with no more than this [m/s^2]: five times gravity, beyond which no autopilot
-#: flies. What a wave sees of it is its length over the wavelength, so that only short waves see much.
+#: Largest acceleration with which rotors shake an airframe [m/s^2]: five times gravity, beyond which no autopilot
+#: flies. The phase of the shaking goes with its displacement over the wavelength, so it is large for short waves only.
 SHAKEN_MPS2 = 50.0
 
-#: What a blade reflects with, and how often: a line (Martin and Mulgrew 1990), its tip alone (P), or some points of it.
-#: A model that knows one of them takes the spectrum of another for clutter.
+#: Points that stand for a blade, and the share of the UAVs with that number. None: a uniform line (Martin and Mulgrew
+#: 1990); 1: the tip alone (P). A model trained on one of them alone takes the spectrum of another for clutter.
 POINTS = {None: 0.55, 1: 0.15, 2: 0.07, 3: 0.07, 5: 0.06, 8: 0.05, 12: 0.05}
 
-#: Of the blades with their tips alone this share is rough instead: so many points each, every one as strong as it will.
-#: Where the wavelength is that of a blade's unevenness no blade is like another, and the lines of every turn show.
+#: ROUGH_CHANCE: share of the UAVs with tips alone whose blades are rough instead; ROUGH_POINTS: points of such a blade,
+#: each of random strength. Where a blade's unevenness is as large as the wavelength, no two blades are alike, and lines
+#: show at every multiple of the rotation rate.
 ROUGH_CHANCE, ROUGH_POINTS = 0.5, 4
 
 
@@ -97,7 +98,7 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
         "velocity_mps": velocity,
         "acceleration_mps2": acceleration,
         "tip_mps": TWO_PI * rates.max(axis=1) * length,
-        # one reflecting blade repeats once a turn, as blades do that are all unlike; equal ones `blades` times
+        # a lone reflecting blade, and rough blades that are all unlike, repeat once a turn; others flash `blades` times
         "chopping_hz": rates.mean(axis=1) * np.where((amplitudes[:, 1:] > 0).any(axis=1) & ~rough, blades, 1),
     }
     tail = []
@@ -126,10 +127,11 @@ def draw_uav(draws: Draws, radar: Radar, kind: str) -> Target:
 
 
 def _flight(draws: Draws, kind: str, beta_rad: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Speed along the way that is flown, and the part of it along the line of sight, which the aspect leaves.
+    """Draw the speed of flight, and its component along the line of sight, which depends on the aspect [m/s].
 
-    A propeller pulls along its axis, a lifting rotor nearly square to it. Seen along its axis the one flies with all of
-    its speed towards the radar, the other with hardly any: few lifting rotors' tips look slower than their body.
+    A propeller pulls along its axis, a lifting rotor nearly at right angles to it. Seen along the axis, a propeller
+    aircraft has all of its speed along the line of sight, and one with lifting rotors hardly any. So the tips of a
+    lifting rotor seldom look slower than the body.
     """
     still = draws.chance(0.3)
     flown = draws.sign() * draws.either("uav_mps", "fast_uav_mps", FAST_CHANCE)
@@ -144,7 +146,7 @@ def _flight(draws: Draws, kind: str, beta_rad: NDArray[np.float64]) -> tuple[NDA
 
 
 def _motion(draws: Draws, rate_hz: NDArray[np.float64], radar: Radar) -> RotorMotion:
-    """One rotor's sense, phase, drift and wander."""
+    """Draw one rotor's sense, phase, drift and wander."""
     return RotorMotion(
         rotation_hz=rate_hz * draws.sign(),
         phase_rad=draws.value("phase_rad"),
@@ -156,7 +158,7 @@ def _motion(draws: Draws, rate_hz: NDArray[np.float64], radar: Radar) -> RotorMo
 
 
 def _blade_amplitudes(draws: Draws) -> NDArray[np.float64]:
-    """Amplitudes, shape (records, max(BLADES)): equal, unequal, or (seldom) one reflecting blade alone."""
+    """Draw amplitudes, shape (records, max(BLADES)): equal, unequal, or (seldom) one reflecting blade alone."""
     inequality = np.where(draws.chance(0.5), 0.0, draws.value("blade_inequality"))
     amplitudes = np.exp(inequality[:, None] * draws.normal(max(BLADES)))
     amplitudes[draws.chance(0.06), 1:] = 0.0
@@ -164,7 +166,7 @@ def _blade_amplitudes(draws: Draws) -> NDArray[np.float64]:
 
 
 def _rough(draws: Draws, rotor: Rotor) -> list[Rotor]:
-    """A rotor of rough blades, as rotors of one point a blade: anywhere along it, on each as strong as it will."""
+    """Draw rough blades as `ROUGH_POINTS` rotors of one point a blade: random radius, each blade of random strength."""
     length, root, amplitudes = (np.asarray(v) for v in (rotor.blade_length_m, rotor.root_m, rotor.blade_amplitudes))
     out = []
     for _ in range(ROUGH_POINTS):
@@ -177,10 +179,10 @@ def _rough(draws: Draws, rotor: Rotor) -> list[Rotor]:
 def _tail_rotor(
     draws: Draws, main_length_m: NDArray[np.float64], main: RotorMotion
 ) -> tuple[Rotor, NDArray[np.float64]]:
-    """A two-blade tail rotor, geared to the main one, in an upright plane: its aspect is another angle.
+    """Draw a two-blade tail rotor, geared to the main one, and its rate [Hz]; its disc is upright, so beta is its own.
 
-    Tip speed is held below 200 m/s, as on real airframes. What the main rotor drifts and wanders, it does times the
-    ratio, whichever way it turns.
+    Tip speed is at most 200 m/s, as on real airframes. Drift and wander of its rate are those of the main rotor times
+    the gear ratio, whichever way it turns.
     """
     length = main_length_m * draws.value("tail_ratio")
     main_hz = np.abs(main.rotation_hz)
@@ -200,7 +202,7 @@ def _tail_rotor(
 
 
 def _of(rotor: Rotor, rows: NDArray[np.intp], points: int | None, blades: int | None = None) -> Rotor:
-    """Some records' rotor, with the first of its blades, each of so many points."""
+    """Take a rotor of some records: its first `blades` blades (None: all), each of `points` points (None: a line)."""
     taken = {f.name: getattr(rotor, f.name)[rows] for f in fields(rotor) if f.name not in ("motion", "points")}
     taken["blade_amplitudes"] = taken["blade_amplitudes"][:, :blades]
     motion = {f.name: getattr(rotor.motion, f.name)[rows] for f in fields(rotor.motion)}
