@@ -155,9 +155,11 @@ def ground_psd(
     # Integral of exp(-b|v|) over each line's width: right also where the width of a line exceeds 1/b.
     width = np.abs(v[1]) if len(v) > 1 else 1.0
     edge = np.abs(v)[None, :]
-    psd = np.where(
-        edge == 0, 2 * (1 - np.exp(-b * width / 2)), np.exp(-b * edge) * 2 * np.sinh(np.minimum(b * width / 2, 300))
-    )
+    over_line = 2 * np.sinh(np.minimum(b * width / 2, 300))
+    psd = np.where(edge == 0, 2 * (1 - np.exp(-b * width / 2)), np.exp(-b * edge) * over_line)
+    # velocities beyond the unambiguous span fold back into it: a geometric series to each side
+    span = 2 * radar.unambiguous_mps
+    psd += (np.exp(-b * (span - edge)) + np.exp(-b * (span + edge))) / -np.expm1(-b * span) * over_line
     return psd, a / (a + 1)
 
 

@@ -16,7 +16,7 @@ from .discretes import MAX_BLADE_POINTS, MAX_BODY_POINTS, MAX_TYRE_POINTS, MAX_W
 from .insects import MAX_INSECTS
 from .laws import LAWS
 from .radar import no_carrier
-from .receiver import FAULT_CHANCE, MAX_STEPS
+from .receiver import FAULT_CHANCE, MAX_STEPS, SPURS
 
 #: Largest size of any number: beyond every real scene, and small enough that all samples are finite.
 MOST = 1e12
@@ -45,6 +45,7 @@ BOUNDS = {
     "high_pass_hz": (1e-6, 1e9),
     "canceller_pulses": (2, 3),
     "adc_bits": (1, 24),
+    "spur_count": (1, SPURS),
     "step_count": (1, MAX_STEPS),
 }
 

@@ -11,6 +11,7 @@ from bladewing.simulate.clutter import (
     draw_clutter,
     draw_ground,
     gaussian_ground,
+    ground_psd,
     process_velocities,
     shaped_noise,
 )
@@ -92,6 +93,19 @@ def test_ground_of_billingsleys_law_is_the_same_whatever_else_was_drawn():
     mixed = draw_ground(normals(3), RADAR, wind, phase, (width, np.full(3, 0.5)))
     np.testing.assert_array_equal(mixed[[0, 2]], usual[[0, 2]])
     assert not np.array_equal(mixed[1], usual[1])
+
+
+@pytest.mark.parametrize("prf_hz", [25.0, 40.0, 300.0])
+def test_ground_beyond_the_unambiguous_span_folds_back_into_it(prf_hz):
+    """Against the law summed over lines far beyond the span."""
+    radar, wind_mph = Radar(1e10, prf_hz, 64), 35.0
+    v, span = process_velocities(radar), 2 * radar.unambiguous_mps
+    psd, _ = ground_psd(radar, np.array([wind_mph]), v)
+    _, b = billingsley(wind_mph, radar.carrier_hz)
+    width, fine = abs(v[1]), np.linspace(-0.5, 0.5, 2001)
+    places = v[:, None, None] + span * np.arange(-200, 201)[:, None] + width * fine
+    brute = np.trapezoid(np.exp(-b * np.abs(places)), dx=1 / 2000).sum(axis=1)
+    np.testing.assert_allclose(psd[0] / psd.sum(), brute / brute.sum(), rtol=1e-5)
 
 
 def test_ground_rests_and_moves_in_billingsleys_shares():
