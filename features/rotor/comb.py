@@ -20,6 +20,7 @@ from .comb_search import (
     best_candidate,
     factors_about,
     fastest_chopping,
+    fine_factors,
     spacing_limits,
     with_faster,
 )
@@ -255,7 +256,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
 
 def counted_from(data: Periodogram, comb: Comb, place: float, blades: int | None) -> tuple[Comb | None, str]:
     """The comb counted anew from another of its lines, the likeliest body's, at `place` [cycles a sample]."""
-    steps = comb.fit.spacing * factors_about(data.pulses, FINE_STEPS, 2 * FINE_STEPS)
+    steps = comb.fit.spacing * fine_factors(data.pulses)
     scores, reaches = even_scores(data.contrast, steps, np.full(len(steps), place))
     best = int(scores.argmax())
     reach = int(reaches[best])

@@ -9,7 +9,7 @@ from scipy import fft
 from ..bodies import LINE_DB
 from ..notch import parabola_offset
 from .comb_scores import even_scores
-from .comb_search import FINE_STEPS, Candidate, factors_about
+from .comb_search import Candidate, fine_factors
 from .folding import outermost_orders
 from .one_sided import Sides
 from .periodogram import Periodogram
@@ -193,7 +193,7 @@ def _scores_about(
 
     The scores are of shape (spacings, *places.shape).
     """
-    steps = found.spacing * factors_about(data.pulses, FINE_STEPS, 2 * FINE_STEPS)
+    steps = found.spacing * fine_factors(data.pulses)
     tried = np.repeat(steps, places.size), np.tile(places.ravel(), len(steps))
     scores, _ = even_scores(data.contrast, *tried, _furthest(data, found)[1])
     return steps, scores.reshape(len(steps), *places.shape)

@@ -62,9 +62,14 @@ class CombFit:
     snr: NDArray[np.float64]
 
     @property
+    def outermost(self) -> int:
+        """Its outermost order to either side, the margin included."""
+        return int(np.abs(self.orders).max(initial=0))
+
+    @property
     def is_folded(self) -> bool:
         """Whether its outer lines come back from the other end of the span."""
-        return bool(comes_back(np.abs(self.orders).max(initial=0), self.spacing))
+        return bool(comes_back(self.outermost, self.spacing))
 
     @property
     def reach(self) -> tuple[int, int]:

@@ -1,5 +1,6 @@
 """Search for combs: spacings from the autocorrelation of band-limited spectra, scored by the likelihood of lines."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -123,6 +124,10 @@ class _Grid:
     starts: NDArray[np.intp]
     weight: NDArray[np.float64]
 
+    def near(self, pulses: int) -> Callable[[int], NDArray[np.bool_]]:
+        """Which periods hardly differ from one, by its place."""
+        return lambda index: np.abs(self.periods / self.periods[index] - 1) <= 2 * MAX_PERIODS / pulses
+
 
 @lru_cache(maxsize=16)
 def _grid(pulses: int, low: float, high: float) -> _Grid:
@@ -142,6 +147,11 @@ def _grid(pulses: int, low: float, high: float) -> _Grid:
 def factors_about(pulses: int, steps: int, per_bin: int) -> NDArray[np.float64]:
     """Factors of the spacings tried about one: `steps` to each side, `per_bin` of them to a bin at the PRF."""
     return np.asarray(1 + np.arange(-steps, steps + 1) / (per_bin * pulses), np.float64)
+
+
+def fine_factors(pulses: int) -> NDArray[np.float64]:
+    """Factors of the spacings tried last about one, in steps fine enough for its fit to begin from."""
+    return factors_about(pulses, FINE_STEPS, 2 * FINE_STEPS)
 
 
 def spacing_limits(pulses: int, prf_hz: float) -> tuple[float, float]:
@@ -167,7 +177,7 @@ def coarse_spacings(
     found: list[float] = []
     for correlation in _correlations(evidence.rows[0], distance, BANDS, data.pulses):
         sums = np.add.reduceat((correlation * turn).real[grid.lags], grid.starts) * grid.weight
-        found += _apart(grid.periods, sums, 2 * MAX_PERIODS / data.pulses)
+        found += grid.periods[_highest(sums, PER_BAND, grid.near(data.pulses))].tolist()
     spacings = (1 / np.array(found))[:, None] * np.array(OCTAVES)
     spacings = np.unique(spacings.ravel())
     spacings = spacings[(spacings >= low) & (spacings <= high)]
@@ -197,7 +207,7 @@ def free_spacings(data: Periodogram, evidence: Evidence, limits: tuple[float, fl
     found = []
     for correlation in _correlations(evidence.rows[0], distance, BANDS[1:], data.pulses):
         sums = np.add.reduceat(np.abs(correlation[grid.lags]), grid.starts) * grid.weight
-        for period in _apart(grid.periods, sums, 2 * MAX_PERIODS / data.pulses):
+        for period in grid.periods[_highest(sums, PER_BAND, grid.near(data.pulses))].tolist():
             used = number[: max(1, int(0.9 * data.pulses / period))]
             lags = np.rint(used * period).astype(np.intp)
             turn = int((steering[:, : len(used)] @ correlation[lags]).real.argmax()) / 48
@@ -205,13 +215,13 @@ def free_spacings(data: Periodogram, evidence: Evidence, limits: tuple[float, fl
     return found
 
 
-def _apart(periods: NDArray[np.float64], sums: NDArray[np.float64], least: float) -> list[float]:
-    """Periods of the highest sums, each further from the others than `least`, relative."""
-    taken: list[float] = []
-    left = sums.copy()
-    while len(taken) < PER_BAND and np.isfinite(left[index := int(left.argmax())]):
-        taken.append(float(periods[index]))
-        left[np.abs(periods / periods[index] - 1) <= least] = -np.inf
+def _highest(scores: NDArray[np.float64], most: int, near: Callable[[int], NDArray[np.bool_]]) -> list[int]:
+    """Places of the highest finite scores, the highest first, none of them near one before it."""
+    taken: list[int] = []
+    left = scores.copy()
+    while len(taken) < most and np.isfinite(left[index := int(left.argmax())]):
+        taken.append(index)
+        left[near(index)] = -np.inf
     return taken
 
 
@@ -243,13 +253,12 @@ def _families(
     spacings: NDArray[np.float64], scores: NDArray[np.float64], centres: NDArray[np.float64], pulses: int
 ) -> list[int]:
     """The best of each family of neighbouring spacings about one centre, best family first."""
-    taken: list[int] = []
-    left = scores.copy()
-    while len(taken) < FAMILIES and np.isfinite(left[index := int(left.argmax())]):
-        taken.append(index)
-        near = np.abs(spacings / spacings[index] - 1) <= 6 / pulses
-        left[near & (np.abs(centres - centres[index]) * pulses <= 2)] = -np.inf
-    return taken
+
+    def near(index: int) -> NDArray[np.bool_]:
+        alike = np.abs(spacings / spacings[index] - 1) <= 6 / pulses
+        return np.asarray(alike & (np.abs(centres - centres[index]) * pulses <= 2), np.bool_)
+
+    return _highest(scores, FAMILIES, near)
 
 
 def best_candidate(data: Periodogram) -> Candidate | None:
@@ -287,7 +296,7 @@ def _best_within(data: Periodogram, limits: tuple[float, float]) -> Candidate | 
     if not len(scores):
         return None
     chosen = _families(spacings, scores, centres, data.pulses)
-    fine = factors_about(data.pulses, FINE_STEPS, 2 * FINE_STEPS)
+    fine = fine_factors(data.pulses)
     # a line's frequency is known to a hundredth of a bin; a centre from the phase of a correlation less well
     shifts = [(0.0,) if centres[i] in data.strong.centres else CENTRE_SHIFTS for i in chosen]
     family = np.repeat(np.arange(len(chosen)), [len(fine) * len(s) for s in shifts])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..lines import from_whole
 from .comb_scores import heights, loudest_of_each
-from .comb_search import FINE_STEPS, FLASH_SHARE, Candidate, factors_about, spacing_limits
+from .comb_search import FLASH_SHARE, Candidate, fine_factors, spacing_limits
 from .flashes import flash_evidence
 from .folding import may_come_back
 from .periodogram import Periodogram
@@ -65,7 +65,7 @@ def of_one_rotor(data: Periodogram, found: Candidate) -> Candidate:
     centres = np.array(sorted({found.centre, *data.strong.centres}))
     about, tried = np.repeat(centres, len(spacings)), np.tile(spacings, len(centres))
     loudest = np.argsort(-heights(data.contrast, tried, about), kind="stable")[:LOUDEST]
-    steps = factors_about(data.pulses, FINE_STEPS, 2 * FINE_STEPS)
+    steps = fine_factors(data.pulses)
     spacings, (scores, lows, highs) = loudest_of_each(data, tried[loudest, None] * steps, about[loudest])
     each = zip(*(values.tolist() for values in (spacings, about[loudest], lows, highs, scores)), strict=True)
     coarser = _apart((Candidate(*values) for values in each), OFF_BINS / data.pulses)

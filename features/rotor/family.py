@@ -230,7 +230,7 @@ def _not_twins(family: Family) -> list[CombFit]:
         return fits
     out: list[CombFit] = []
     for fit in fits:
-        reach = float(np.abs(fit.orders).max()) * family.data.pulses
+        reach = fit.outermost * family.data.pulses
         if all(abs(fit.spacing - other.spacing) * reach > TWIN_BINS for other in out):
             out.append(fit)
     return out
@@ -317,7 +317,7 @@ def _changing(data: Periodogram, family: Family, edge: float) -> Family:
     powers = powers_of(fits)
     own = edge_of_lines(data, apart.fits, apart.rest, 1, None)
     around = edge_around(data, comb, apart, None, own)
-    fitted_to = max(float(np.abs(fit.orders).max()) * fit.spacing for fit in fits)
+    fitted_to = max(fit.outermost * fit.spacing for fit in fits)
     rotors = judged(apart, data, comb, max(min(own[0], span_of(data)), edge), fitted_to=fitted_to)
     led_astray = abs(own[0] - around[0]) > EDGE_DEVIATIONS * np.hypot(own[1], around[1])
     if led_astray or not rotors.resolved or min(powers) < LEAST_POWER_SHARE * max(powers):

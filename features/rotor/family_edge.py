@@ -239,7 +239,7 @@ def _fills_span(
 
 def _amplitudes_at(fit: CombFit, orders: NDArray[np.intp]) -> NDArray[np.complex128]:
     """Amplitudes of a fit's lines of these orders, 0 where it has none, same shape."""
-    widest = int(max(np.abs(orders).max(), np.abs(fit.orders).max()))
+    widest = max(int(np.abs(orders).max()), fit.outermost)
     table = np.zeros(2 * widest + 1, np.complex128)
     table[widest + fit.orders] = fit.amplitudes
     return table[widest + orders]

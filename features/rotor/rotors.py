@@ -174,7 +174,7 @@ def powers_of(fits: Sequence[CombFit]) -> list[float]:
 
 def _line_powers(fits: Sequence[CombFit]) -> list[NDArray[np.floating]]:
     """Power of each line of each comb, over the orders that all of them reach."""
-    common = min(int(np.abs(fit.orders).max()) for fit in fits)
+    common = min(fit.outermost for fit in fits)
     return [squared(fit.amplitudes[np.abs(fit.orders) <= common]) for fit in fits]
 
 

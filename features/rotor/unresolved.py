@@ -318,6 +318,6 @@ def judged(
 
 def not_all(rotors: Rotors, data: Periodogram, apart: float = 0.0) -> Rotors:
     """The rotors marked unresolved; their spread is at least what the dwell resolves, and `apart` [cycles a sample]."""
-    reach = max(int(np.abs(rotors.fits[0].orders).max()), 1)
+    reach = max(rotors.fits[0].outermost, 1)
     least = RESOLVED_BINS / (reach * data.pulses)
     return replace(rotors, resolved=False, spread=max(rotors.spread, least, apart))

@@ -51,7 +51,7 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None) -> tup
     if comb.per_turn > 1 or data.one_channel:
         return data, comb
     left, level = LinesSeen(comb.rest[None]), data.level_of(comb.rest)
-    last = int(np.abs(fit.orders).max())
+    last = fit.outermost
     image = _image_of_lines(data, fit, left, level)
     for parts in blade_numbers(blades):
         nats, excess = _between(data, fit, left, level, parts)
@@ -126,7 +126,7 @@ def _between(data: Periodogram, fit: CombFit, left: LinesSeen, level: Level, par
     """
     if fit.spacing * data.pulses < LEAST_BINS * parts:
         return 0.0, 0.0
-    last = int(np.abs(fit.orders).max())
+    last = fit.outermost
     order = np.arange(-last * parts, last * parts)
     own = order[np.gcd(order, parts) == 1]  # lines of fewer blades may be there without these
     places = (fit.centre + fit.spacing * tried / parts for tried in (own, order + 0.5))
