@@ -22,7 +22,7 @@ def model_card(report: Mapping[str, Any]) -> str:
     Returns
     -------
     str
-        Markdown; the same for the same content.
+        Markdown; equal content gives equal text.
     """
     name = headline_model(report)
     model = next(one for one in report["models"] if one["name"] == name)
@@ -75,7 +75,7 @@ def model_card(report: Mapping[str, Any]) -> str:
 
 
 def expectations(report: Mapping[str, Any]) -> str:
-    """Write what the README says may be expected, the failures first."""
+    """Write the README's section on what to expect, the failures first."""
     name = headline_model(report)
     found, scores = report["scores"][name], report["scores"]
     others = ", ".join(
@@ -107,13 +107,13 @@ def expectations(report: Mapping[str, Any]) -> str:
 
 
 def budgets(report: Mapping[str, Any]) -> str:
-    """Write what three budgets of time buy, in batches."""
+    """Write the most accurate choice within each of three time budgets, for answers in batches."""
     batch = report["cost"]["batches"][-1]["batch"]
     return "\n".join(f"- {line}" for line in front_budgets(report, batch=batch)).replace("\u00a0", " ")
 
 
 def costs(report: Mapping[str, Any]) -> str:
-    """Write what an answer costs in batches, samples to probabilities."""
+    """Write what an answer costs in batches, from samples to probabilities."""
     timed = report["cost"]["batches"][-1]
     models = ", ".join(
         f"`{row['name']}` {number(row['ratio_to_fft'])}" for row in timed["stages"] if row["stage"] == "chain"
@@ -153,7 +153,7 @@ def _rate(rate: Mapping[str, Any]) -> str:
 
 
 def _envelope(limits: Mapping[str, float]) -> list[str]:
-    """The radars that are answered for, in the units that people give them in."""
+    """List the limits of the radars that the model answers for, in customary units."""
 
     def between(low: str, high: str, one: float, unit: str) -> str:
         return f"{number(limits[low] / one)} to {number(limits[high] / one)} {unit}"
@@ -180,7 +180,7 @@ def _training(report: Mapping[str, Any]) -> str:
     )
     if given is None:
         return f"{drawn} There is no account of how these models were trained."
-    took = "" if given.get("resumed") else f"; {number(given['seconds'])} s"  # what went before is not in it
+    took = "" if given.get("resumed") else f"; {number(given['seconds'])} s"  # a resumed training's time is incomplete
     return (
         f"{drawn} {count(given['records']['train'])} records, seed {given['settings']['seed']}, and "
         f"{count(given['records']['calibrate'])} others to calibrate{took}."

@@ -1,7 +1,7 @@
-"""What can be chosen: each picture with a small network trained here, the measurements with trees, each model given.
+"""The choices of the front: each picture with a small network, the measurements with trees, and each given model.
 
-A choice is told by its kind ("picture", "features" or "model"), its name and its ONNX file: that is enough to open it
-in another process.
+The networks and the trees are trained here. A choice is defined by its kind ("picture", "features" or "model"), its
+name and its ONNX file: that is enough to open the choice in another process.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from .settings import ReportConfig
 
 #: Dwells that are compared [s].
 DWELLS_S = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32)
-#: Bins and bits that spectra are stored in.
+#: Numbers of bins, and of bits a level, in which stored spectra are tried.
 STORED_BINS, STORED_BITS = (64, 128, 256, 512, 1024), (32, 16, 8, 4)
-#: The choice that measurements alone make: boosted trees trained on the same records as the networks.
+#: Name of the choice that reads the measurements alone: boosted trees trained on the same records as the networks.
 FEATURES = "features"
 
-# Small, so that a quick run still makes enough steps for the networks to leave their beginning.
+# Small, so that the networks take enough steps to learn something even in a quick run.
 _BATCH = 64
 
 Answer = Callable[[NDArray[np.complex64], Radar], NDArray[np.float32]]
@@ -39,7 +39,7 @@ OnDone = Callable[[float], None]
 
 @dataclass(frozen=True)
 class FrontSet:
-    """What the choices are trained on and asked, as inputs by name; the samples themselves are not kept.
+    """Inputs by name that the choices are trained on and asked about; the samples themselves are not kept.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class FrontSet:
         The pictures, "features", and "radar" (four numbers).
     labels : (n,) int
     snr_db : (n,) float
-        NaN where there is none.
+        NaN where a record has no SNR.
     dwell : (n,) int
         Index in `DWELLS_S`.
     """
@@ -59,17 +59,17 @@ class FrontSet:
 
 
 def radar_of(dwell_s: float, reference: Radar) -> Radar:
-    """The reference radar with another dwell."""
+    """Give the reference radar with another dwell."""
     return Radar(reference.carrier_hz, reference.prf_hz, round(dwell_s * reference.prf_hz))
 
 
 def stored_name(bins: int) -> str:
-    """Name of the spectrum of so many bins among the inputs."""
+    """Give the input's name of the spectrum of this many bins."""
     return f"spectrum of {bins} bins"
 
 
 def pictures_of(names: Sequence[str]) -> dict[str, Picture]:
-    """The named pictures, those of `PICTURES` and the spectra of other bins."""
+    """Give the named pictures, from `PICTURES` and from the spectra of each number in `STORED_BINS`."""
     stored = {
         stored_name(bins): Picture(
             f"Doppler spectrum, {bins} bins",
@@ -95,7 +95,7 @@ def draw_sets(
     Parameters
     ----------
     purposes : mapping of str to int
-        Purpose to records of each dwell.
+        Purpose to number of records of each dwell.
     names : sequence of str
         Pictures, and `FEATURES`.
     reference : Radar
@@ -103,12 +103,12 @@ def draw_sets(
     on_done : callable
         Called with the share done.
     ask : callable
-        Shown every block of samples (purpose, samples, radar) before they are dropped, in order.
+        Called in order with every block (purpose, samples, radar), before the samples are dropped.
 
     Returns
     -------
     dict of str to FrontSet
-        By purpose; the dwells one after the other.
+        Purpose to its set, in which the dwells follow one another.
     """
     pictures = pictures_of(names)
     total = sum(purposes.values()) * sum(DWELLS_S)
@@ -123,7 +123,7 @@ def draw_sets(
                 # every dwell draws targets of its own
                 records = draw_records(radar, some, seed, purpose=purpose, start=place * count + at)
                 for name, picture in pictures.items():
-                    # what is learnt from may be coarse, what is asked must be what a user would give
+                    # Training inputs may be coarse; test inputs must be exactly what a user would give.
                     dtype = np.float32 if purpose == "test" else np.float16
                     kept[name].append(in_blocks(picture.make, records.iq, radar).astype(dtype, copy=False))
                 if FEATURES in names:
@@ -147,7 +147,7 @@ def draw_sets(
 
 
 def network_for(picture: Picture, *, seed: int) -> Any:
-    """An untrained network for a picture: one anatomy for spectra, one for pictures with time in them."""
+    """Make an untrained network for a picture: one architecture for spectra, one for pictures with a time axis."""
     from bladewing.models.cnn import ImageNet, SpectrumNet
 
     shapes = {"picture": picture.shape, "radar": (4,)}
@@ -155,7 +155,7 @@ def network_for(picture: Picture, *, seed: int) -> Any:
 
 
 def network_bytes(net: Any) -> bytes:
-    """The network as ONNX, without calibration."""
+    """Give the network as ONNX, without calibration."""
     from bladewing.models.calibration import Calibration
     from bladewing.models.export import export_network
 
@@ -180,7 +180,7 @@ def train_picture(
     Returns
     -------
     answer : callable
-        From the bits that the test pictures are kept in to their probabilities (n, 3).
+        From the number of bits that each level of the test pictures is stored in to their probabilities (n, 3).
     seconds : float
         Time that the training took [s].
     """
@@ -212,7 +212,7 @@ def train_picture(
 
 
 def train_features(sets: Mapping[str, FrontSet], config: ReportConfig) -> tuple[NDArray[np.floating], bytes, float]:
-    """Train boosted trees on the measurements: the test records' probabilities, the ONNX file, the time it took [s]."""
+    """Train boosted trees on the measurements; give the test records' probabilities, the ONNX file and the time [s]."""
     from bladewing.models.calibration import Calibration
     from bladewing.models.export import export_tabular
     from bladewing.models.tabular import tabular_scores, train_boosted
@@ -232,7 +232,7 @@ def classifier_of(name: str, files: Sequence[bytes]) -> Classifier:
 
 
 def open_choice(kind: str, name: str, files: Sequence[bytes]) -> Answer:
-    """Open a choice: what then answers goes all the way from samples to probabilities.
+    """Open a choice and return a function that goes all the way from samples to probabilities.
 
     Parameters
     ----------
@@ -267,6 +267,6 @@ def open_choice(kind: str, name: str, files: Sequence[bytes]) -> Answer:
 def prepared(
     kind: str, name: str, files: Sequence[bytes], iq: NDArray[np.complex64], radar: Radar
 ) -> Callable[[], object]:
-    """Open a choice and give what answers these samples; for `memory.peak_bytes`."""
+    """Open a choice and return a function that answers these samples; for `memory.peak_bytes`."""
     answer = open_choice(kind, name, files)
     return lambda: answer(iq, radar)

@@ -1,4 +1,4 @@
-"""What an answer costs: every step from IQ to probabilities, beside the bare FFT of the same run."""
+"""What an answer costs: every step from IQ to probabilities, compared with the bare FFT in the same run."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..timing import Work, quote, ratio, time_in_turns
 
 BATCHES = (1, 64)
 
-#: So many batches take turns at most: each is timed a dozen times, so that a disturbance does not count.
+#: Largest number of batches that take turns. Each is then timed a dozen times, so that one disturbance does not count.
 _MOST_TURNS = 250
 
 
@@ -40,15 +40,15 @@ def time_chain(
     models : mapping of str to bytes
         Name to sealed ONNX model, timed on inputs that are ready.
     classifiers : mapping of str to Classifier
-        What answers: these models, and what is made of several of them.
+        What answers: the models themselves, and cascades made of several of them.
     iq : (64 or more, pulses) complex64
-        Records; the batches take them in rotation.
+        Records; they are split into batches that are used in turn.
     carrier_hz, prf_hz : float
         Of the records [Hz].
     seconds : float
         Time to spend on each batch size [s].
     least_rounds : int
-        Rounds to make however long they take.
+        Fewest rounds, however long they take.
     on_share : callable, optional
         Called with the share done, 0 to 1.
 
@@ -57,8 +57,8 @@ def time_chain(
     list of dict
         One a batch size: ``batch`` and ``stages``, a list of ``{"stage", "name", "median_us", "p99_us", "passed_us",
         "rounds", "ratio_to_fft", "ratio_low", "ratio_high"}`` (see `timing.quote` and `timing.ratio`); stage is "fft",
-        "input" (name: the input), "model" (name: the model) or "chain" (name: the classifier). Times are a record (see
-        `timing.quote`).
+        "input" (name: the input), "model" (name: the model) or "chain" (name: the classifier). Times are per record
+        (see `timing.quote`).
     """
     results = []
     for place, batch in enumerate(BATCHES):
@@ -81,7 +81,7 @@ def time_chain(
 
 
 def _batches(iq: NDArray[np.complex64], batch: int) -> list[NDArray[np.complex64]]:
-    """The records in batches, those that take turns."""
+    """Split the records into full batches, at most `_MOST_TURNS` of them."""
     return [iq[start : start + batch] for start in range(0, len(iq) - batch + 1, batch)][:_MOST_TURNS]
 
 
@@ -119,6 +119,6 @@ def _network(content: bytes, inputs: tuple[str, ...], ready: list[dict[str, NDAr
 
 
 def in_turn(works: list[Work]) -> Work:
-    """Make one piece of work of several: each call does the next."""
+    """Combine several pieces of work into one: each call does the next piece, and after the last the first again."""
     turns = itertools.cycle(works)
     return lambda: next(turns)()

@@ -1,4 +1,4 @@
-"""How well any detector could find a rotor in receiver noise: what the measured curves are held against."""
+"""Upper bound on how well any detector finds a rotor in receiver noise; the measured curves are compared with it."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from .scores import FALSE_ALARM_RATE
 
-#: Lines of the combs whose bound is drawn; 0: the whole echo is known but for its phase.
+#: Numbers of comb lines for which the bound is drawn; 0: the whole echo is known except its phase.
 LINES = (0, 30, 120)
 _SNR_DB = np.arange(-35.0, 35.5, 1.0)
 
 
 def detection_bound(snr_db: ArrayLike, *, pulses: int, lines: int, false_alarm_rate: float) -> NDArray[np.float64]:
-    """Largest detection rate of an echo in white noise.
+    """Give the largest detection rate of an echo in white noise.
 
-    The energy of so many known lines follows a chi-square law with two degrees of freedom a line, central without the
-    echo and with the echo's energy as its non-centrality; an echo known but for its phase is one line.
+    The energy in `lines` known lines follows a chi-square law with two degrees of freedom per line. Without the echo
+    the law is central; with it the non-centrality is the echo's energy. An echo known except its phase is one line.
 
     Parameters
     ----------
     snr_db : array_like
-        Power of the echo over the noise, a sample [dB].
+        Power of the echo over the noise in one sample [dB].
     pulses : int
         Samples.
     lines : int
-        Lines the echo's energy is spread over, at places that are known; 0: its whole shape is known.
+        Number of lines, at known frequencies, that the echo's energy is spread over; 0: its whole shape is known.
     false_alarm_rate : float
         0 to 1.
 
@@ -45,7 +45,7 @@ def detection_bound(snr_db: ArrayLike, *, pulses: int, lines: int, false_alarm_r
 
 
 def detection_bounds(pulses: int) -> list[dict[str, Any]]:
-    """Curves for the page: ``lines``, ``snr_db`` and ``found``, from SNRs at which nothing is found."""
+    """Give the page's curves: ``lines``, ``snr_db`` and ``found``, starting at SNRs too low to find anything."""
     curves = []
     for lines in LINES:
         found = detection_bound(_SNR_DB, pulses=pulses, lines=lines, false_alarm_rate=FALSE_ALARM_RATE)

@@ -24,7 +24,7 @@ def _log_times(axes: Axes, label: str) -> None:
 
 
 def front(report: Mapping[str, Any]) -> list[Panel]:
-    """Balanced accuracy against the cost of the whole chain, one panel a batch size; the front is filled and joined."""
+    """Draw accuracy against the whole chain's cost, one panel per batch size; unbeaten ones are filled and joined."""
     panels = []
     look = looks([model["name"] for model in report["models"]])
     for part in report["trade"]:
@@ -67,13 +67,13 @@ def front(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def stages(report: Mapping[str, Any]) -> list[Panel]:
-    """Median time of every step, one panel a batch size, each with a tick at its 99th percentile."""
+    """Draw the median time of every step with a tick at its 99th percentile, one panel per batch size."""
     panels = []
     look = looks([model["name"] for model in report["models"]])
     for part in report["cost"]["batches"]:
         rows = part["stages"]
         with drawing(height_in=0.8 + 0.2 * len(rows)) as (figure, axes):
-            for i, row in enumerate(rows):  # dots: a bar's length says nothing on a scale without a zero
+            for i, row in enumerate(rows):  # dots, no bars: a bar's length means nothing on a scale without a zero
                 colour = look[row["name"]].colour if row["stage"] in ("model", "chain") else MUTED
                 axes.plot([row["median_us"], row["p99_us"]], [i, i], color=colour, linewidth=1.4)
                 axes.plot([row["p99_us"]] * 2, [i - 0.25, i + 0.25], color=colour, linewidth=1.4)
@@ -92,7 +92,7 @@ def stages(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def stage_name(row: Mapping[str, Any]) -> str:
-    """Name a step of the chain for people."""
+    """Give the name of a step of the chain as shown on the page."""
     inputs = {
         "levels": "level input",
         "spectrum": "spectrum input",
@@ -110,7 +110,7 @@ def stage_name(row: Mapping[str, Any]) -> str:
 
 
 def fft_against_stft(report: Mapping[str, Any]) -> list[Panel]:
-    """How many times longer the STFT takes than the FFT, beside the paper's range, one panel a record length."""
+    """Draw how many times longer the STFT takes than the FFT, with the paper's range, one panel per record length."""
     panels = []
     for part in report["fft_against_stft"]:
         rows, (low, high) = part["stft"], part["paper_ratio"]
@@ -137,7 +137,7 @@ def fft_against_stft(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def time_law(report: Mapping[str, Any]) -> list[Panel]:
-    """Time against operations, with the fitted law, for one FFT and for the STFT."""
+    """Draw time against operations with the fitted law, for one FFT and for the STFT."""
     panels = []
     for name, title in (("fft", "One FFT"), ("stft", "STFT")):
         law = report["time_law"][name]
@@ -159,10 +159,10 @@ def time_law(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def storage(report: Mapping[str, Any]) -> list[Panel]:
-    """Bytes a record in each form, as it is and compressed."""
+    """Draw the bytes per record of each form, uncompressed and compressed."""
     rows = report["storage"]
     with drawing(height_in=0.8 + 0.36 * len(rows)) as (figure, axes):
-        # no bars: on such an axis they would begin anywhere
+        # No bars: a logarithmic axis has no zero where they could begin.
         for i, row in enumerate(rows):
             ends = [row["compressed_bytes"], row["bytes"]]
             axes.plot(ends, [i, i], color=_BLUE, linewidth=1, zorder=2)

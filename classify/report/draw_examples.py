@@ -1,4 +1,4 @@
-"""Figures of one record a class: spectrum and STFT picture beside each other, on one velocity axis."""
+"""Figures of one record per class: STFT picture and spectrum side by side, on one velocity axis."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from matplotlib.axes import Axes
 from .svg import MUTED, NARROW_IN, SERIES, Panel, drawing, panel
 from .words import number, percent, size, spoken
 
-# The strongest colour [dB over the median]: a body's own level would leave nothing of what moves about it.
+# Level at which the colours end [dB over the median]: on a scale up to the body's level the micro-motion would vanish.
 CLIPPED_DB = 45.0
-# Short strokes at the right edge.
+# Style of the comb's teeth, short strokes at the right edge.
 _TEETH: dict[str, Any] = {"color": SERIES[3], "linestyle": "none", "marker": 0, "markersize": 6, "markeredgewidth": 0.8}
 
 
 def examples(report: Mapping[str, Any]) -> list[Panel]:
-    """One panel a class: the STFT picture left, the spectrum right."""
+    """Draw one panel per class: the STFT picture left, the spectrum right."""
     panels = []
     for one in report["examples"]:
         with drawing(height_in=3.0) as (figure, unused):
@@ -35,7 +35,7 @@ def examples(report: Mapping[str, Any]) -> list[Panel]:
             for edge in found["band_mps"] or ():
                 right.axhline(edge, color=SERIES[4], linewidth=0.9, linestyle=(0, (4, 2)))
             if found["chopping_mps"] and found["body_mps"] is not None:
-                # orders that would fall closer than the eye parts them say nothing
+                # a tooth at every order of the comb, to both sides of the body
                 teeth = [
                     found["body_mps"] + order * found["chopping_mps"]
                     for order in range(-found["orders"], found["orders"] + 1)
@@ -61,7 +61,7 @@ def examples(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def stft_pictures(report: Mapping[str, Any]) -> list[Panel]:
-    """The paper's four STFTs of one record."""
+    """Draw the paper's four STFTs of one record."""
     panels = []
     for one in report["stft_pictures"]["pictures"]:
         with drawing(height_in=2.6, width_in=NARROW_IN) as (figure, axes):

@@ -14,13 +14,13 @@ from .svg import INK, MUTED, PAPER, SERIES, Panel, banded, drawing, panel
 from .ticks import log_ticks, percent_ticks, share_axis
 from .words import batch_words, count, micros, millis, percent
 
-#: Letters of the points that nothing beats, in the order of their cost.
+#: Letters of the points that no other beats, in the order of their cost.
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _BIT_LOOKS = {32: (2, "D"), 16: (3, "o"), 8: (1, "s"), 4: (4, "v")}
 
 
 def best_points(report: Mapping[str, Any], place: int) -> list[tuple[str, Mapping[str, Any], Mapping[str, Any]]]:
-    """Letter, choice and dwell of every point that nothing beats at one batch size, the cheapest first."""
+    """Give letter, choice and dwell of every point that no other beats at one batch size, the cheapest first."""
     points = [
         (row, point)
         for row in report["front"]["choices"]
@@ -32,7 +32,7 @@ def best_points(report: Mapping[str, Any], place: int) -> list[tuple[str, Mappin
 
 
 def time_front(report: Mapping[str, Any]) -> list[Panel]:
-    """Accuracy against the time of a record, one panel a batch size; what nothing beats is joined and lettered."""
+    """Draw accuracy against time per record, one panel a batch size; unbeaten points are joined and lettered."""
     panels = []
     choices = report["front"]["choices"]
     looks = choice_looks(choices)
@@ -85,7 +85,7 @@ def time_front(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def by_dwell(report: Mapping[str, Any]) -> list[Panel]:
-    """Balanced accuracy and UAVs found against the dwell, apart for what was trained here and what was given."""
+    """Draw balanced accuracy and UAVs found against the dwell, in separate panels for trained and given choices."""
     panels = []
     for slug, title, rows in _groups(report):
         for key, label in (("balanced_accuracy", "balanced accuracy"), ("uav_found", "UAVs found")):
@@ -108,7 +108,7 @@ def by_dwell(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def by_snr(report: Mapping[str, Any]) -> list[Panel]:
-    """UAVs found against the SNR at one dwell, with what no detector in white noise can exceed; where any are known."""
+    """Draw UAVs found against SNR at one dwell, with the bound in white noise; groups with too few UAVs are omitted."""
     panels = []
     front = report["front"]
     for slug, title, rows in _groups(report):
@@ -135,7 +135,7 @@ def by_snr(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def stored(report: Mapping[str, Any]) -> list[Panel]:
-    """Balanced accuracy of spectra stored in fewer bins and bits, one line a number of bits."""
+    """Draw the balanced accuracy of spectra stored in fewer bins and bits, one line per number of bits."""
     rows = report["front"]["stored"]
     with drawing(height_in=3.2) as (figure, axes):
         words = []
@@ -170,7 +170,7 @@ def stored(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def _groups(report: Mapping[str, Any]) -> list[tuple[str, str, list[tuple[Mapping[str, Any], Any]]]]:
-    """What was trained here and what was given: slug, title, and each choice with its look."""
+    """Group the choices into those trained here and the given models: slug, title, and each choice with its look."""
     rows = report["front"]["choices"]
     looks = choice_looks(rows)
     return [

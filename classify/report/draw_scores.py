@@ -16,13 +16,13 @@ from .words import percent, spoken
 
 GROUPS = ("all", "uav", "bird", "clutter")
 _TITLES = {"all": "All records", "uav": "UAV records", "bird": "Bird records", "clutter": "Clutter records"}
-# A point over fewer records than this says little: the lines break there; the tables keep it.
+# A point over fewer records than this says little: the line breaks there, but the tables keep the value.
 LEAST_SHOWN = 10
 _GAP = dict.fromkeys(("value", "low", "high"), math.nan)
 
 
 def accuracy_by_snr(report: Mapping[str, Any]) -> list[Panel]:
-    """Accuracy against SNR, one panel over all records and one a class."""
+    """Draw accuracy against SNR, one panel over all records and one per class."""
     panels = []
     for group in GROUPS:
         with drawing(height_in=2.5, width_in=NARROW_IN) as (figure, axes):
@@ -35,7 +35,7 @@ def accuracy_by_snr(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def accuracy_by_dwell(report: Mapping[str, Any]) -> list[Panel]:
-    """Accuracy against the length of the record, one panel over all records and one a class."""
+    """Draw accuracy against the length of the record, one panel over all records and one per class."""
     panels = []
     for group in GROUPS:
         with drawing(height_in=2.5, width_in=NARROW_IN) as (figure, axes):
@@ -51,7 +51,7 @@ def accuracy_by_dwell(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def _lines(axes: Axes, report: Mapping[str, Any], by: str, group: str, *, centre: Any, unit: float = 1.0) -> str:
-    """Draw one line a model with its Wilson band; return in words where each begins and ends."""
+    """Draw one line per model with its Wilson band; return in words where each line begins and ends."""
     names = [model["name"] for model in report["models"]]
     words = []
     for name, look in looks(names).items():
@@ -70,7 +70,7 @@ def _lines(axes: Axes, report: Mapping[str, Any], by: str, group: str, *, centre
 
 
 def accuracy_by_beta(report: Mapping[str, Any]) -> list[Panel]:
-    """UAVs answered right and found, against the angle their rotors are seen at."""
+    """Draw UAVs answered right and UAVs found against the angle between line of sight and rotor plane."""
     panels = []
     names = [model["name"] for model in report["models"]]
     for key, title in (("answered", "UAVs answered right"), ("found", "UAVs found at the false-alarm rate")):
@@ -94,7 +94,7 @@ def accuracy_by_beta(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def reliability(report: Mapping[str, Any]) -> list[Panel]:
-    """Reliability diagrams, one panel a model: points on the diagonal mean what they say."""
+    """Draw reliability diagrams, one panel per model: on the diagonal the probability equals the accuracy."""
     names = [model["name"] for model in report["models"]]
     panels = []
     for name, look in looks(names).items():
@@ -104,7 +104,7 @@ def reliability(report: Mapping[str, Any]) -> list[Panel]:
             axes.plot([0, 1], [0, 1], color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
             for one in found["bins"]:
                 share = one["accuracy"]["count"] / total
-                # The bars along the foot show how often the model is that sure.
+                # Bars at the bottom show the share of records with a confidence in this bin.
                 axes.bar(one["from"], share, width=one["to"] - one["from"], align="edge", color=MUTED, alpha=0.35)
             x = [one["confidence"] for one in found["bins"]]
             y = [one["accuracy"]["value"] for one in found["bins"]]
@@ -133,7 +133,7 @@ def _worst_bin(bins: Sequence[Mapping[str, Any]]) -> str:
 
 
 def called_uav(report: Mapping[str, Any]) -> list[Panel]:
-    """Share of each kind that is called UAV: false drones in one panel, found drones in the other."""
+    """Draw the share of each kind that is called UAV: false drones in one panel, found drones in the other."""
     return [
         _called_uav(report, "false", "Birds and clutter called UAV (should be 0)", wanted=False),
         _called_uav(report, "found", "UAVs called UAV (should be 100 %)", wanted=True),
@@ -141,7 +141,7 @@ def called_uav(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def _called_uav(report: Mapping[str, Any], slug: str, title: str, *, wanted: bool) -> Panel:
-    """Draw one row a kind and one point a model; ``wanted`` chooses the kinds of UAV, else all others."""
+    """Draw one row per kind and one point per model; if ``wanted``, kinds of UAV, else all others."""
     names = [model["name"] for model in report["models"]]
     rates = {
         name: {
@@ -170,7 +170,7 @@ def _called_uav(report: Mapping[str, Any], slug: str, title: str, *, wanted: boo
 
 
 def families(report: Mapping[str, Any]) -> list[Panel]:
-    """Accuracy on each family by a model that was trained on it and by one that was not."""
+    """Draw the accuracy on each family of a model trained with it and of one trained without it."""
     rows = report["families"]["families"]
     kept, gone = SERIES[2], SERIES[3]
     title = "Accuracy on a family, with and without it in the training"
@@ -192,7 +192,7 @@ def families(report: Mapping[str, Any]) -> list[Panel]:
 
 
 def _named_rows(axes: Axes, names: Sequence[str]) -> None:
-    """Lay out shares along x with one named row each, the first on top, and a rule between any two."""
+    """Lay out shares along x in named rows, the first on top, with a thin line between neighbouring rows."""
     for line in range(1, len(names)):
         axes.axhline(line - 0.5, color=MUTED, linewidth=0.3)
     axes.grid(visible=False, axis="y")

@@ -32,7 +32,7 @@ def ask(
     seed : int
         Root seed; the records are those of the purpose "report", which no training draws from.
     on_records : callable, optional
-        Called with the number of records done so far.
+        Called with the number of records done until now.
 
     Returns
     -------

@@ -18,27 +18,30 @@ from .pictures import STFT_SETTINGS
 
 # The paper's middle window [samples] and its largest overlap.
 WINDOW, OVERLAP = STFT_SETTINGS[0]
-# Of one record a class: long enough for a wing to beat, and windows long enough to part lines from the body.
+# EXAMPLE_RADAR: its dwell is long enough to hold a wingbeat. EXAMPLE_WINDOW: STFT window [samples], long enough to
+# separate the micro-motion's lines from the body's.
 EXAMPLE_RADAR, EXAMPLE_WINDOW = Radar(carrier_hz=9.85e9, prf_hz=10e3, pulses=3000), 160
-# Kinds that show what their class is about, and of how many records the first fitting one is shown.
+# EXAMPLE_KINDS: typical kind of each class. EXAMPLES_DRAWN: records drawn of each kind, to pick the shown one from.
 EXAMPLE_KINDS, EXAMPLES_DRAWN = ("quadcopter", "flapping_bird", "vehicle"), 100
-# Strong enough to see, weak enough to be honest [dB].
+# SNRs of the records shown: high enough to see something, low enough to be realistic [dB].
 SNR_SHOWN_DB = (12.0, 20.0)
-# ... and with a line this far over the noise, if any has one [dB].
+# Preferred are records with a line more than this far over the noise [dB].
 CLEAR_DB = 20.0
-# Shown resolution: neighbouring values are pooled by their maximum, so that no line is lost.
+# Largest number of points of a spectrum, and of rows and columns of a picture. Neighbouring values are pooled by their
+# maximum, so that no line is lost.
 POINTS, ROWS, COLUMNS = 400, 128, 90
-# The velocities shown reach past the fastest line this strong [dB over the noise], and at least so far [m/s].
+# The velocity axis reaches MARGIN times as far as the fastest line above LINE_DB [dB over the noise], at least to
+# LEAST_SPAN_MPS [m/s] and at most to the unambiguous velocity.
 LINE_DB, MARGIN, LEAST_SPAN_MPS = 10.0, 1.4, 25.0
 
 
 def draw_examples(seed: int, classes: tuple[str, ...]) -> list[dict[str, Any]]:
-    """One fitting record of each of `EXAMPLE_KINDS`, as `show_examples` gives them.
+    """Draw one suitable record of each of `EXAMPLE_KINDS`, as `show_examples` gives them.
 
     Parameters
     ----------
     seed : int
-        Root of their randomness.
+        Root seed of the records.
     classes : tuple of str
     """
     drawn = (draw_records(EXAMPLE_RADAR, EXAMPLES_DRAWN, seed, purpose="bench", kind=kind) for kind in EXAMPLE_KINDS)
@@ -46,12 +49,12 @@ def draw_examples(seed: int, classes: tuple[str, ...]) -> list[dict[str, Any]]:
 
 
 def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, Any]]:
-    """Pick and prepare the first fitting record of each class.
+    """Pick and prepare the most suitable record of each class; of equally suitable ones the first.
 
     Parameters
     ----------
     records : Records
-        Those of 12 to 20 dB SNR are preferred, of these those without a background.
+        Preferred are those of 12 to 20 dB SNR, among these those without a background, then those with a clear line.
     classes : tuple of str
 
     Returns
@@ -62,7 +65,7 @@ def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, 
         ``body_mps``, ``chopping_hz``, ``chopping_mps``, ``orders``, ``band_hz``, ``band_mps`` [slowest, fastest],
         ``tip_mps``; None where there is no value; ``notches_mps``: pairs) and ``picture`` (``velocity_mps`` [first,
         last], ``time_s`` [first, last], ``level_db`` rows of whole numbers, one a velocity, above the median over all
-        velocities). Velocities are cut where nothing is left to see.
+        velocities). Fast velocities at which nothing is seen are cut off.
     """
     radar, shown = records.radar, []
     for name in classes:
@@ -90,19 +93,19 @@ def show_examples(records: Records, classes: tuple[str, ...]) -> list[dict[str, 
 
 
 def _flaws(records: Records, row: int) -> tuple[bool, bool, bool]:
-    """What speaks against showing a record, the worst first: its SNR, a background, nothing clear to be seen."""
+    """Say what speaks against showing a record, the worst first: a wrong SNR, a background, no clear line."""
     low, high = SNR_SHOWN_DB
     if not low <= records.truth["snr_db"][row] <= high:
         return True, True, True
     alone = "background_db" not in records.truth or np.isnan(records.truth["background_db"][row])
     clear = _spectrum(records.radar, records.iq[row])[1].max() > CLEAR_DB
-    if clear and alone and records.labels[row] == "uav":  # its comb and band are drawn in
+    if clear and alone and records.labels[row] == "uav":  # the figure marks comb and band, so both must be measured
         clear = not _measured(records.radar, records.iq[row])["reason"]
     return False, not alone, not clear
 
 
 def show_stfts(seed: int) -> dict[str, Any]:
-    """The four STFTs of the paper's quadcopter, and the one spectrum of the same record.
+    """Give the four STFTs of the paper's quadcopter, and the one spectrum of the same record.
 
     Parameters
     ----------
@@ -113,7 +116,7 @@ def show_stfts(seed: int) -> dict[str, Any]:
     -------
     dict
         ``scene``; ``pictures``, one a setting: ``window``, ``overlap``, ``frames`` and a picture as in `show_examples`;
-        ``spectrum`` as there; ``fft_bytes`` and in each picture ``bytes``: complex64, kept whole.
+        ``spectrum`` as there; ``fft_bytes`` and in each picture ``bytes``: size as complex64, all frequencies kept.
     """
     from bladewing.simulate import Scene
 
@@ -132,7 +135,7 @@ def show_stfts(seed: int) -> dict[str, Any]:
 
 
 def _measured(radar: Radar, iq: NDArray[np.complex64]) -> dict[str, Any]:
-    """What `measure` finds in a record, as velocities too."""
+    """Give what `measure` finds in a record, frequencies also as velocities."""
     found = measure(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
 
     def known(value: Any, scale: float = 1.0) -> float | None:
@@ -155,20 +158,20 @@ def _measured(radar: Radar, iq: NDArray[np.complex64]) -> dict[str, Any]:
 
 
 def _spectrum(radar: Radar, iq: NDArray[np.complex64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Velocities, rising, and the level over the noise floor [dB] at each."""
+    """Give rising velocities and the level over the noise floor at each [dB]."""
     spectrum = doppler_spectrum(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
     order = np.argsort(spectrum.velocity_mps)
     return spectrum.velocity_mps[order], spectrum.level_db[order].astype(np.float64)
 
 
 def _span_mps(radar: Radar, velocity: NDArray[np.float64], level: NDArray[np.float64]) -> float:
-    """How far the velocity axis reaches to either side [m/s]."""
+    """Give how far the velocity axis reaches to either side [m/s]."""
     lines = np.abs(velocity[level > LINE_DB])
     return min(radar.unambiguous_mps, max(LEAST_SPAN_MPS, MARGIN * float(lines.max(initial=0.0))))
 
 
 def _curve(velocity: NDArray[np.float64], level: NDArray[np.float64]) -> dict[str, Any]:
-    """Pooled spectrum for JSON."""
+    """Pool a spectrum for JSON: the mean velocity and the highest level of each pool."""
     middle, highest = _pools(velocity, POINTS).mean(axis=1), _pools(level, POINTS).max(axis=1)
     return {"velocity_mps": np.round(middle, 3).tolist(), "level_db": np.round(highest, 1).tolist()}
 
@@ -176,10 +179,10 @@ def _curve(velocity: NDArray[np.float64], level: NDArray[np.float64]) -> dict[st
 def _picture(
     radar: Radar, iq: NDArray[np.complex64], span_mps: float, *, window: int, overlap: float
 ) -> dict[str, Any]:
-    """STFT power [dB] with velocity down the rows, rising, and time across."""
+    """Give the pooled STFT power [dB]: one row per velocity, rising, and one column per time."""
     power = np.abs(scipy.fft.fftshift(stft(iq, window=window, overlap=overlap), axes=-1)) ** 2
     level_db = 10.0 * np.log10(power + power.max() * 1e-12)
-    # Doppler is -2 v / wavelength: rising velocity is falling frequency.
+    # The Doppler frequency is -2 v / wavelength: rising velocity is falling frequency.
     rising = level_db.T[::-1]
     step = 2.0 * radar.unambiguous_mps / STFT_BINS
     velocity = -step * (np.arange(STFT_BINS) - STFT_BINS // 2)[::-1]
@@ -195,14 +198,14 @@ def _picture(
 
 
 def _pools(values: NDArray[np.floating], most: int) -> NDArray[np.floating]:
-    """Group neighbours along the first axis into at most so many pools of equal size; a rest at the end is dropped."""
+    """Group neighbours along the first axis into at most `most` pools of equal size; a remainder is dropped."""
     size = -(-values.shape[0] // most)
     count = values.shape[0] // size
     return values[: count * size].reshape(count, size, *values.shape[1:])
 
 
 def _outer_edges(pools: NDArray[np.floating]) -> list[float]:
-    """Where the first pool of an evenly spaced axis begins and the last one ends."""
+    """Give where the first pool of an evenly spaced axis begins and where the last one ends."""
     axis = pools.ravel()
     half = (axis[1] - axis[0]) / 2.0
     return [float(axis[0] - half), float(axis[-1] + half)]

@@ -1,7 +1,7 @@
-"""Left-out families: what a model says of kinds, bands and PRFs that it was not trained on.
+"""Left-out families: how a model answers on kinds, bands and PRFs that it was not trained on.
 
-Each family is taken out of the records that train and calibrate, a model is made of the rest, and both it and the model
-of all records are asked about the family, beside all records of the other classes.
+Each family in turn is removed from the training and calibration records, and a model is trained on the rest. This model
+and the model trained on all records are tested on the family and on all records of the other classes.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..labels import UNKNOWN
 from ..training_config import TrainingConfig
 from .metrics import mean_of_rates, rate, recalls
 
-#: Which records belong to a family, by their truth.
+#: Family to a function of the records' truth that tells which records belong to it.
 FAMILIES: dict[str, Callable[[Mapping[str, NDArray]], NDArray[np.bool_]]] = {
     "hexacopters": lambda truth: truth["kind"] == "hexacopter",
     "helicopters": lambda truth: truth["kind"] == "helicopter",
@@ -30,7 +30,7 @@ FAMILIES: dict[str, Callable[[Mapping[str, NDArray]], NDArray[np.bool_]]] = {
     "PRF 8-20 kHz": lambda truth: (truth["prf_hz"] >= 8e3) & (truth["prf_hz"] < 20e3),
 }
 
-#: The model that is made eight times: the cheapest to train that is worth having.
+#: The model that is trained eight times, once on all records and once without each family: the cheapest worth having.
 MODEL = "features-boosted"
 
 Answer = Callable[[Gathered], tuple[NDArray[np.floating], NDArray[np.str_]]]
@@ -39,25 +39,25 @@ Answer = Callable[[Gathered], tuple[NDArray[np.floating], NDArray[np.str_]]]
 def left_out(
     settings: TrainingConfig, model: str = MODEL, *, on_share: Callable[[float], None] | None = None
 ) -> dict[str, Any]:
-    """Leave every family out in turn.
+    """Leave out every family in turn, and compare with a model trained on all records.
 
     Parameters
     ----------
     settings : TrainingConfig
         How the model is trained; as many test records are drawn as training ones.
     model : str
-        Of the ladder.
+        Name in the ladder of models.
     on_share : callable, optional
         Called with the share done.
 
     Returns
     -------
     dict
-        ``model``, ``train_records``, ``test_records`` and ``families``: for each its ``name``, its test ``records``
-        and, with it in the training (``kept``) and without (``left_out``), the balanced ``accuracy`` (the classes that
-        the family does not belong to stand with all their records), the shares ``unknown`` and ``wrong`` (named, and
-        not what they are) of its records, and the ``calibration_error`` over the records that the accuracy is of, each
-        class counting a third.
+        ``model``, ``train_records``, ``test_records`` and ``families``: for each its ``name``, the number of its test
+        ``records`` and, with the family in the training (``kept``) and without (``left_out``): the balanced
+        ``accuracy`` (the family stands for its class; the other classes count with all their records), the shares of
+        the family's records that are ``unknown`` and ``wrong`` (named, but as another class), and the
+        ``calibration_error`` over the same records as the accuracy, each class counting a third.
     """
     from bladewing.models import LADDER
 
@@ -89,7 +89,7 @@ def left_out(
 
 
 def _part(records: Gathered, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Gathered:
-    """Some of the records."""
+    """Select some of the records."""
     return Gathered(
         {name: values[rows] for name, values in records.inputs.items()},
         records.labels[rows],
@@ -98,11 +98,11 @@ def _part(records: Gathered, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Gath
 
 
 def _trained(model: str, settings: TrainingConfig, sets: Mapping[str, Gathered]) -> Answer:
-    """Train, and give what answers records: their probabilities and labels."""
+    """Train a model and return a function that gives records' probabilities and labels."""
     from ..gather import TrainingSets
     from ..train import train_one
 
-    # the account's own figures are not used here, so any records do
+    # The training's own test figures are not used here, so a few validation records serve as its test set.
     few = _part(sets["validate"], np.arange(min(600, len(sets["validate"]))))
     sealed, _ = train_one(model, settings, TrainingSets(**sets, test=few), lambda _: None)
     classifier = Classifier(sealed, source=model)
@@ -117,12 +117,12 @@ def _trained(model: str, settings: TrainingConfig, sets: Mapping[str, Gathered])
 def _described(
     probabilities: NDArray[np.floating], answers: NDArray[np.str_], test: Gathered, of: NDArray[np.bool_]
 ) -> dict[str, Any]:
-    """What is said of a family's records."""
+    """Summarise the answers on a family's records."""
     named, right, classes = answers != UNKNOWN, probabilities.argmax(axis=1) == test.labels, probabilities.shape[1]
     among = of | ~np.isin(test.labels, test.labels[of])
     weights = among / np.maximum(1, np.bincount(test.labels[among], minlength=classes))[test.labels]
-    # of a balanced world in which the family stands for its class: among records of one class alone even probabilities
-    # that are right on the whole err
+    # Each class weighs the same, and the family stands for its class. On records of one class alone even probabilities
+    # that are calibrated over all classes would show an error.
     error = expected_calibration_error(probabilities, test.labels, weights=weights) if of.any() else None
     return {
         "accuracy": mean_of_rates(recalls(right[among], test.labels[among], classes)),

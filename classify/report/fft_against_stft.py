@@ -16,16 +16,16 @@ from ..timing import Work, quote, ratio, time_in_turns
 
 # The paper's claim: how many times faster one FFT is than the STFT, by number of samples.
 PAPER_RATIOS = {2000: (19.0, 46.0), 10_000: (22.0, 77.0)}
-# Its STFT windows [samples] and overlaps; the number of frequencies is not stated there, 512 serves all windows.
+# The paper's STFT windows [samples] and overlaps. It does not state the number of frequencies; 512 suits all windows.
 STFT_WINDOWS = (20, 80, 200)
 STFT_OVERLAPS = (0.5, 0.9)
 STFT_BINS = 512
-# Lengths that the law of one FFT is fitted over.
+# FFT lengths [samples] over which the law of computing time is fitted.
 LAW_LENGTHS = (256, 512, 1024, 2000, 4096, 8192, 10_000, 16_384)
 
 
 def stft(iq: NDArray[np.complex64], *, window: int, overlap: float) -> NDArray[np.complex64]:
-    """Short-time Fourier transform of one record with a Hann window, zero-padded to 512 frequencies.
+    """Compute the short-time Fourier transform of one record with a Hann window, zero-padded to 512 frequencies.
 
     Parameters
     ----------
@@ -44,19 +44,19 @@ def stft(iq: NDArray[np.complex64], *, window: int, overlap: float) -> NDArray[n
 
 
 def frames(iq: NDArray[np.complex64], *, window: int, overlap: float) -> NDArray[np.complex64]:
-    """Frames of a record as a view, shape (frames, window)."""
+    """Give the overlapping frames of a record as a view, shape (frames, window)."""
     hop = max(1, round(window * (1.0 - overlap)))
     return windows(iq, ((len(iq) - window) // hop + 1, window), (hop, 1))
 
 
 @lru_cache(maxsize=8)
 def _taper(window: int) -> NDArray[np.float32]:
-    """Hann's window, made once: it is no part of what a transform costs."""
+    """Give the Hann window, cached: making it is no part of a transform's cost."""
     return np.hanning(window).astype(np.float32)
 
 
 def transformed(some: NDArray[np.complex64]) -> NDArray[np.complex64]:
-    """Spectra of frames (frames, window), shape (frames, 512)."""
+    """Compute the spectra of frames (frames, window), shape (frames, 512)."""
     return scipy.fft.fft(some * _taper(some.shape[-1]), n=STFT_BINS, axis=-1)
 
 
@@ -68,11 +68,11 @@ def time_fft_against_stft(
     Parameters
     ----------
     seed : int
-        Of the noise they are fed.
+        Seed of the noise that is transformed.
     seconds : float
         Time to spend on each length [s].
     least_rounds : int
-        Rounds to make however long they take.
+        Fewest rounds, however long they take.
     on_share : callable
         Called with the share done, 0 to 1.
 
@@ -114,21 +114,21 @@ def time_law(
     least_rounds: int,
     on_share: Callable[[float], None],
 ) -> dict[str, Any]:
-    """Hold the time of transforms against their number of operations, 5 N log2 N for one of length N.
+    """Fit the time of transforms to their number of operations, 5 N log2 N for one of length N.
 
     Parameters
     ----------
     stfts : sequence of dict
-        As made by `time_fft_against_stft`: frames times 5 N log2 N, N = 512, each.
+        As made by `time_fft_against_stft`; each counts as 5 N log2 N operations per frame, N = 512.
     seed, seconds, least_rounds, on_share
-        As there.
+        As in `time_fft_against_stft`.
 
     Returns
     -------
     dict
         ``fft`` and ``stft``, each with ``points`` (``{"pulses", "window", "overlap", "operations", "time_us"}``) and
-        the fit of time = ``call_us`` + ``ns_each`` * operations over them, with ``worst_factor``: how far the farthest
-        point lies from the fit.
+        the fit of time = ``call_us`` + ``ns_each`` * operations over them, with ``worst_factor``: the largest ratio
+        between a point's time and its fit, the larger over the smaller.
     """
     rng = np.random.default_rng(seed)
     works: dict[int, Work] = {}
@@ -165,11 +165,11 @@ def _operations(length: int) -> float:
 
 
 def _fitted(points: list[dict[str, Any]]) -> dict[str, Any]:
-    """Least squares of the relative errors, neither term below zero."""
+    """Fit by least squares of the relative errors; neither coefficient may be negative."""
     operations = np.array([point["operations"] for point in points])
     times_us = np.array([point["time_us"] for point in points])
     terms = np.stack([np.ones(len(points)), operations], axis=1) / times_us[:, None]
-    # in the columns' own sizes: one is a million times the other
+    # Columns are normalised first: one is a million times the other.
     sizes = np.linalg.norm(terms, axis=0)
     (call_us, each_us), _ = nnls(terms / sizes, np.ones(len(points)))
     call_us, each_us = float(call_us / sizes[0]), float(each_us / sizes[1])

@@ -1,4 +1,4 @@
-"""The front: what every choice of picture, model and dwell gives, and what it costs in time, memory and storage."""
+"""The front: how accurate every choice of picture, model and dwell is, and its cost in time, memory and storage."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from .scores import FALSE_ALARM_RATE, snr_edges
 from .settings import ReportConfig
 from .storage import RECORDS_QUOTED
 
-#: A record's time that a user may grant [us].
+#: Time budgets for one record [us].
 BUDGETS_US = (50.0, 200.0, 1000.0)
-#: "Time to declare": the dwell at which so many of the UAVs over this SNR [dB] are found.
+#: "Time to declare": the shortest dwell at which at least this share of the UAVs above this SNR [dB] is found.
 DECLARED_SHARES, DECLARED_SNR_DB = (0.5, 0.8), 0.0
 
 Phase = Callable[[str, float], AbstractContextManager[OnDone]]
@@ -42,7 +42,7 @@ Phase = Callable[[str, float], AbstractContextManager[OnDone]]
 
 @dataclass(frozen=True)
 class Given:
-    """A model that is given, not trained here.
+    """A model that was trained elsewhere and is given to the report.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Given:
     inputs : tuple of str
         Names of what it reads.
     train_s : float or None
-        How long it took to train [s], where that is known.
+        Duration of the training [s]; None where it is not known.
     """
 
     files: tuple[bytes, ...]
@@ -62,7 +62,7 @@ class Given:
 def measure_front(
     models: Mapping[str, Given], config: ReportConfig, reference: Radar, *, parts: Parts, phase: Phase
 ) -> dict[str, Any]:
-    """Train what must be trained, score and time every choice at every dwell.
+    """Train the choices that need training, then score and time every choice at every dwell.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def measure_front(
     reference : Radar
         The radar of all records; its dwell is replaced by each of `DWELLS_S`.
     parts : Parts
-        What was measured before is not measured again.
+        Results measured earlier, which are not measured again.
     phase : callable
         Makes a phase of the progress, see `Progress.phase`.
 
@@ -81,9 +81,9 @@ def measure_front(
         ``dwells_s``, ``train_records``, ``test_records`` (of each dwell), ``epochs``; ``declared`` (``shares`` and
         ``snr_db``), ``quoted_dwell_s``; ``bounds``: see `detection_bound.detection_bounds`; ``choices``: one a picture,
         one for the measurements and one a model, see `_row`; ``budgets``: for each batch size and budget the choice
-        most accurate on half of the test records and what it gives on the other half, or None; ``stored``: for each
-        number of bins and bits ``bytes``, ``bytes_per_million``, the accuracy and whether nothing is as small and as
-        good (``front``).
+        most accurate on half of the test records with its scores on the other half, or None; ``stored``: for each
+        number of bins and bits ``bytes``, ``bytes_per_million``, the accuracy and whether no other row beats it in
+        size and accuracy (``front``).
     """
     _score(models, config, reference, parts=parts, phase=phase)
     entries = [("picture", name) for name in PICTURES] + [("features", FEATURES)]
@@ -116,7 +116,7 @@ def measure_front(
 
 
 def _score(models: Mapping[str, Given], config: ReportConfig, reference: Radar, *, parts: Parts, phase: Phase) -> None:
-    """Finish every part that holds what a choice gets right."""
+    """Score every choice that has no stored part yet; each result becomes a part."""
     stored = [choices.stored_name(bins) for bins in STORED_BINS]
     missing = [name for name in (*PICTURES, *stored) if not parts.have(f"front picture {name}")]
     features = [] if parts.have(f"front features {FEATURES}") else [FEATURES]
@@ -164,7 +164,7 @@ def _features(sets: Mapping[str, FrontSet], config: ReportConfig) -> dict[str, A
 
 
 def _stored(name: str, sets: Mapping[str, FrontSet], config: ReportConfig, done: OnDone) -> list[dict[str, Any]]:
-    """Rows of one number of bins: trained on whole levels, asked about levels kept in fewer and fewer bits."""
+    """Make the rows of one number of bins: trained on unquantised levels, tested on levels of fewer and fewer bits."""
     answer, _ = choices.train_picture(name, sets, config, on_done=done)
     channels, bins = sets["test"].inputs[name].shape[1:]
     rows = []
@@ -176,22 +176,22 @@ def _stored(name: str, sets: Mapping[str, FrontSet], config: ReportConfig, done:
 
 
 def _scores(labels: NDArray[np.int64], probabilities: NDArray[np.floating]) -> dict[str, Any]:
-    """Balanced accuracy and the UAVs found at the false-alarm rate."""
+    """Give the balanced accuracy and the share of UAVs found at the false-alarm rate."""
     recalls = metrics.recalls(probabilities.argmax(axis=1) == labels, labels, len(CLASSES))
     found = metrics.detection_at(probabilities[:, 0], labels == 0, false_alarm_rate=FALSE_ALARM_RATE)
     return {"balanced_accuracy": metrics.mean_of_rates(recalls), "uav_found": found["detection"]}
 
 
 def _by_dwell(test: FrontSet, probabilities: NDArray[np.floating]) -> dict[str, Any]:
-    """The scores of each dwell, and the shortest dwells that find enough of the stronger UAVs."""
+    """Give the scores of each dwell, and the shortest dwells that find `DECLARED_SHARES` of the stronger UAVs."""
     dwells, declared = [], []
     for place in range(len(DWELLS_S)):
         here = test.dwell == place
         labels, mine = test.labels[here], probabilities[here]
-        # the best of many looks better than it is on the records it was chosen by
+        # The best of many choices looks too good on the records that chose it: one half chooses, the other is quoted.
         chosen, quoted = (_scores(labels[half::2], mine[half::2]) for half in (0, 1))
         dwells.append({**_scores(labels, mine), "chosen_by": chosen["balanced_accuracy"], "quoted": quoted})
-        # the same false alarms, but only UAVs that show something
+        # All non-UAVs stay, so the false alarms are the same; of the UAVs only those above the SNR stay.
         strong = (labels != 0) | (test.snr_db[here] > DECLARED_SNR_DB)
         declared.append(_scores(labels[strong], mine[strong])["uav_found"]["value"])
     here = test.dwell == DWELLS_S.index(DWELL_S)
@@ -206,7 +206,7 @@ def _by_dwell(test: FrontSet, probabilities: NDArray[np.floating]) -> dict[str, 
 def _found_by_snr(
     labels: NDArray[np.int64], score: NDArray[np.floating], snr_db: NDArray[np.float64]
 ) -> list[dict[str, Any]]:
-    """UAVs found in slices of the SNR, at the false-alarm rate over all birds and clutter."""
+    """Give the share of UAVs found in slices of the SNR; the false-alarm rate is that over all birds and clutter."""
     threshold = metrics.detection_at(score, labels == 0, false_alarm_rate=FALSE_ALARM_RATE)["threshold"]
     found, uav_db = score[labels == 0] > threshold, snr_db[labels == 0]
     return [
@@ -216,7 +216,7 @@ def _found_by_snr(
 
 
 def _networks(config: ReportConfig) -> dict[str, tuple[bytes]]:
-    """ONNX files of the pictures' networks; their time and size do not depend on what they learnt."""
+    """Give ONNX files of untrained networks for the pictures: time and size do not depend on the training."""
     of_shape = {
         picture.shape: (choices.network_bytes(choices.network_for(picture, seed=config.seed)),)
         for picture in PICTURES.values()
@@ -231,7 +231,7 @@ def _costs(
     reference: Radar,
     done: OnDone,
 ) -> dict[str, Any]:
-    """What every choice costs, by its name."""
+    """Measure what every choice costs; name to its costs."""
     quoted = choices.radar_of(DWELL_S, reference)
     batch = draw_records(quoted, BATCHES[-1], config.seed, purpose="bench").iq
     found: dict[str, Any] = {}
@@ -239,7 +239,7 @@ def _costs(
         found[name] = {
             "model_bytes": sum(map(len, files[name])),
             "weights": " and ".join(sorted(set(map(_weights, files[name])))),
-            "model_operations": sum(map(network_operations, files[name])),  # of a cascade at most
+            "model_operations": sum(map(network_operations, files[name])),  # for a cascade the upper limit: both models
             "peak_bytes": peak_bytes(choices.prepared, kind, name, files[name], batch, quoted),
             "dwells": [],
         }
@@ -252,7 +252,7 @@ def _costs(
         for name, answer in answers.items():
             with counted_transforms() as counter:
                 answer(iq, radar)
-            operations[name] = round(counter.total / len(iq))  # of a cascade the mean
+            operations[name] = round(counter.total / len(iq))  # for a cascade the mean over the records
         timed = [_timed(answers, iq, radar, size, config.front_s) for size in BATCHES]
         for name in answers:
             cost = [part[name] for part in timed]
@@ -264,7 +264,7 @@ def _costs(
 def _timed(
     answers: Mapping[str, choices.Answer], iq: NDArray[np.complex64], radar: Radar, batch: int, seconds: float
 ) -> dict[str, dict[str, Any]]:
-    """Time of every choice at one dwell and batch size, in turns with the bare FFT."""
+    """Time every choice at one dwell and batch size, in turns with the bare FFT."""
     some = [iq[at : at + batch] for at in range(0, len(iq), batch)]
     works: dict[str | None, Work] = {None: in_turn([partial(scipy.fft.fft, one) for one in some])}
     for name, answer in answers.items():
@@ -282,7 +282,7 @@ def _timed(
 
 
 def _weights(onnx_bytes: bytes) -> str:
-    """The smallest type that a graph's weights are kept in."""
+    """Name the smallest data type of a graph's weights."""
     import onnx
 
     kept = {one.data_type for one in onnx.load_model_from_string(onnx_bytes).graph.initializer}
@@ -294,7 +294,7 @@ def _weights(onnx_bytes: bytes) -> str:
 def _row(
     kind: str, name: str, scored: Mapping[str, Any], cost: Mapping[str, Any], given: Given | None
 ) -> dict[str, Any]:
-    """One choice: what it is, what it weighs, and what it gives and costs at each dwell."""
+    """Describe one choice: what it is, its size, and its scores and costs at each dwell."""
     if kind == "picture":
         words, model, size = PICTURES[name].words, "small network", int(np.prod(PICTURES[name].shape))
     elif kind == "features":
@@ -324,11 +324,11 @@ def _row(
 
 
 def _accuracy(point: Mapping[str, Any], by: str = "balanced_accuracy") -> float:
-    return round(float(point[by]["value"] or 0.0), 9)  # means of three shares: equal ones differ in the last digit
+    return round(float(point[by]["value"] or 0.0), 9)  # equal means of three shares may differ in the last digit
 
 
 def _mark(rows: Sequence[Mapping[str, Any]]) -> None:
-    """Say of every cost which points nothing beats: ``front`` in each entry of ``cost``."""
+    """Set ``front`` in each entry of ``cost``: whether no other point beats this one in time and accuracy."""
     points = [(row, point) for row in rows for point in row["dwells"]]
     accuracy = [_accuracy(point) for _, point in points]
     for place in range(len(BATCHES)):
@@ -339,9 +339,9 @@ def _mark(rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _budget(rows: Sequence[Mapping[str, Any]], place: int, budget_us: float) -> dict[str, Any]:
-    """The most accurate on one half of the test records within a record's time; of equals the cheapest.
+    """Find the choice within a time budget that is most accurate on one half of the test records.
 
-    What it gives is quoted from the other half.
+    Of equally accurate ones the cheapest is taken. Its scores are quoted from the other half.
     """
     points = [(row, point, point["cost"][place]["median_us"]) for row in rows for point in row["dwells"]]
     within = [entry for entry in points if entry[2] <= budget_us]

@@ -1,4 +1,4 @@
-"""Letters beside the points of a front, each where it is read as that point's and no other's."""
+"""Letters beside the points of a front, each placed so that nobody takes it for another point's letter."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from .svg import INK
 
 _Place = tuple[float, float]
 
-#: Half the width and the height of a letter of 8 point, and of a marker of 6, with some air [point].
+#: Half width and half height of a letter of 8 point and of a marker of 6 point, both with some margin [point].
 _LETTER, _MARKER = (4.3, 5.0), (4.0, 4.0)
 
-#: A line leads to a letter that is farther from its point [point].
+#: A letter farther than this from its point gets a line to the point [point].
 CLOSE = 10.5
 
-#: Every other lettered point is at least so many times farther from a letter without such a line.
+#: A letter without a line must be at least this many times farther from every other lettered point than from its own.
 OWN = 1.5
 
-# The best first. Up and left of a point of the front there is no other point, nor the line that joins them.
+# Directions from a point to its letter [degree], the best first. _FREE: up and left of a point of the front lies no
+# other point and not the line that joins them. _TAKEN: directions in which beaten points may lie.
 _FREE, _TAKEN = (140, 180, 90, 160, 120, 105, 150, 130, 170), (330, 300, 0, 270)
 _SHIFTS = tuple(
     (far * cos(radians(angle)), far * sin(radians(angle)))
@@ -29,22 +30,22 @@ _SHIFTS = tuple(
     for angle in angles
 )
 
-# What a worse place weighs beside a fault, each by its rank and those among the beaten points besides.
+# Penalty of each place, where a fault counts 1: it grows with the rank; the _TAKEN directions get 0.6 more.
 _WEIGHT = {
     shift: 0.003 * rank + 0.6 * (rank >= len(_SHIFTS) * len(_FREE) // len(_FREE + _TAKEN))
     for rank, shift in enumerate(_SHIFTS)
 }
 
-_ROUNDS = 8  # enough to come to rest
+_ROUNDS = 8  # enough for the places to stop changing
 
 
 def write_letters(axes: Axes, x: Sequence[float], y: Sequence[float], texts: Sequence[str]) -> None:
-    """Write a letter beside each point of a front, with a line to it where it might be taken for another's.
+    """Write a letter beside each point of a front, with a line between them if the letter is not close.
 
     Parameters
     ----------
     axes : Axes
-        With all its ticks and labels: what comes later would move the points, and the letters with them.
+        With all its ticks and labels already set: later ones would move the points after the letters were placed.
     x, y : sequence of float
         The points.
     texts : sequence of str
@@ -61,7 +62,7 @@ def write_letters(axes: Axes, x: Sequence[float], y: Sequence[float], texts: Seq
             text, (px, py), xytext=shift, textcoords="offset points", ha="center", va="center", color=INK, fontsize=8
         )
         if hypot(*shift) > CLOSE:
-            near = 1 - 4.5 / hypot(*shift)  # it ends short of the letter
+            near = 1 - 4.5 / hypot(*shift)  # the line ends short of the letter
             ends = axes.transData.inverted().transform(
                 [[(a + part * by) / scale for a, by in zip(at, shift, strict=True)] for part in (0.0, near)]
             )
@@ -69,9 +70,10 @@ def write_letters(axes: Axes, x: Sequence[float], y: Sequence[float], texts: Seq
 
 
 def places(points: Sequence[_Place], frame: tuple[float, float, float, float]) -> list[_Place]:
-    """Where the letter of each point of a front stands, from the point itself [point].
+    """Give the offset of each letter from its point of a front [point].
 
-    Each in turn takes the best place beside the others', until none finds a better one; from both ends of the front.
+    The letters take turns: each moves to the best place beside the others until none moves. This is done in both orders
+    of the front, and the better result is kept.
 
     Parameters
     ----------
@@ -106,7 +108,7 @@ def _faults(
     others: Sequence[tuple[_Place, _Place]],
     frame: tuple[float, float, float, float],
 ) -> int:
-    """How often a letter with its line would lie over something, be taken for another's, or leave the field."""
+    """Count the faults of a place: letter or line over something, taken for another point's, or outside the field."""
     point, far = points[own], hypot(*shift)
     at = point[0] + shift[0], point[1] + shift[1]
     spots = _line(point, shift)
@@ -125,18 +127,18 @@ def _faults(
 
 
 def _over(letter: _Place, other: _Place, half: tuple[float, float] = (0.0, 0.0)) -> bool:
-    """Whether a letter lies over another thing of that half width and height."""
+    """Whether a letter overlaps another thing of the given half width and half height."""
     return all(abs(a - b) < mine + its for a, b, mine, its in zip(letter, other, _LETTER, half, strict=True))
 
 
 def _line(point: _Place, shift: _Place) -> list[_Place]:
-    """Places along the line from a point's marker to its letter; none where no line is drawn."""
+    """Give places along the line from a point's marker to its letter; none if no line is drawn."""
     steps = [part / 8 for part in range(2, 9)] if hypot(*shift) > CLOSE else []
     return [(point[0] + step * shift[0], point[1] + step * shift[1]) for step in steps]
 
 
 def _cross(one: list[_Place], other: list[_Place]) -> bool:
-    """Whether two lines cross: each has the ends of the other on both of its sides."""
+    """Whether two lines cross: the ends of each lie on different sides of the other."""
     if not (one and other):
         return False
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..workers import workers_at_hand
 
-# Those whose versions change scores or timings.
+# Packages whose versions change scores or timings.
 PACKAGES = ("bladewing", "numpy", "scipy", "onnxruntime")
 
 
@@ -34,7 +34,7 @@ def describe_machine() -> dict[str, Any]:
 
 
 def _cpu_model(cpuinfo: Path) -> str:
-    """Model name as Linux gives it, else as the platform module does."""
+    """Give the processor's model name from Linux, else from the platform module."""
     if cpuinfo.exists():
         for line in cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines():
             key, _, value = line.partition(":")

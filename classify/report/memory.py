@@ -1,4 +1,4 @@
-"""Peak memory of an answer, read off a process of its own."""
+"""Peak memory of an answer, measured in a process of its own."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ _STATUS, _CLEAR = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 
 
 def peak_bytes(work: Callable[..., Callable[[], object]], *arguments: Any) -> int | None:
-    """How far a process's memory rises over what its libraries take.
+    """Measure how far a fresh process's memory rises above what its libraries take.
 
     Parameters
     ----------
     work : callable
-        Importable; called with the arguments in a fresh process, it prepares (opens the model) and returns what
-        answers, which is called once.
+        Importable. It is called with the arguments in the fresh process, prepares (opens the model) and returns the
+        function that answers, which is then called once.
     *arguments
         Passed on.
 
     Returns
     -------
     int or None
-        Rise of the resident memory at its peak [byte]; None where the system does not tell (not Linux).
+        Rise of the resident memory at its peak [byte]; None where the system does not report it (not Linux).
     """
     if not (sys.platform == "linux" and _CLEAR.exists()):
         return None
@@ -35,13 +35,13 @@ def peak_bytes(work: Callable[..., Callable[[], object]], *arguments: Any) -> in
 
 
 def _measure(work: Callable[..., Callable[[], object]], arguments: tuple[Any, ...]) -> int | None:
-    """The rise, in this process."""
+    """Measure the rise in this process."""
     import bladewing.models.runtime  # noqa: F401
     import scipy.fft  # noqa: F401
 
     before = _resident("VmRSS")
     try:
-        _CLEAR.write_text("5")  # forget the peak so far
+        _CLEAR.write_text("5")  # resets the kernel's peak (VmHWM)
     except OSError:
         return None
     work(*arguments)()

@@ -1,6 +1,6 @@
 """The report's arithmetic: rates with their intervals, detection at a false-alarm rate, calibration.
 
-Every function takes arrays and returns numbers; none knows of radars, models or files. A rate is the dictionary
+Every function takes arrays and returns numbers; none depends on radars, models or files. A rate is the dictionary
 ``{"value", "low", "high", "right", "count"}``: a share of ``count`` records with its 95 % Wilson interval, all three
 ``None`` where there are no records (strict JSON has no NaN).
 """
@@ -22,7 +22,7 @@ Rate = dict[str, Any]
 
 
 def wilson(right: int, count: int) -> tuple[float, float]:
-    """Wilson score interval of a binomial share, 95 %.
+    """Give the 95 % Wilson score interval of a binomial share.
 
     Parameters
     ----------
@@ -45,14 +45,14 @@ def wilson(right: int, count: int) -> tuple[float, float]:
     shrink = 1.0 + z * z / count
     centre = (share + z * z / (2 * count)) / shrink
     half = z * math.sqrt(share * (1.0 - share) / count + z * z / (4.0 * count * count)) / shrink
-    # Exact at the ends, where rounding would leave 1e-17 instead of the closed form's zero.
+    # The ends are set exactly: rounding would leave about 1e-17 where the closed form gives zero.
     low = 0.0 if right == 0 else max(0.0, centre - half)
     high = 1.0 if right == count else min(1.0, centre + half)
     return low, high
 
 
 def rate(hits: NDArray[np.bool_]) -> Rate:
-    """Share of true entries with its 95 % Wilson interval; ``None`` throughout for an empty array.
+    """Give the share of true entries with its 95 % Wilson interval; all three are ``None`` for an empty array.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def rate(hits: NDArray[np.bool_]) -> Rate:
 
 
 def recalls(hits: NDArray[np.bool_], labels: NDArray[np.integer], classes: int) -> list[Rate]:
-    """Rate of each class's records, in the order of the classes; `mean_of_rates` of them is the balanced accuracy.
+    """Give the rate of each class's records, in class order; their `mean_of_rates` is the balanced accuracy.
 
     Parameters
     ----------
@@ -84,11 +84,11 @@ def recalls(hits: NDArray[np.bool_], labels: NDArray[np.integer], classes: int) 
 
 
 def mean_of_rates(rates: Sequence[Rate]) -> Rate:
-    """Mean of independent rates, with an interval recovered from theirs (MOVER, Zou and Donner 2008).
+    """Average independent rates and derive the mean's interval from theirs (MOVER, Zou and Donner 2008).
 
-    Balanced accuracy is the mean of the classes' recalls: each end of the interval lies as far from the mean as the
-    root of the summed squares of the parts' own distances to that end, divided by their number. Rates over no records
-    are left out.
+    Balanced accuracy is such a mean, of the classes' recalls. The lower end of the interval lies below the mean by the
+    root of the summed squares of the rates' own distances to their lower ends, divided by the number of rates; the
+    upper end likewise. Rates over no records are left out.
 
     Parameters
     ----------
@@ -111,9 +111,9 @@ def mean_of_rates(rates: Sequence[Rate]) -> Rate:
 
 
 def design_effect(hits: NDArray[np.bool_], groups: NDArray[np.intp]) -> float | None:
-    """How many times the variance of a share exceeds that of independent records, because groups share something.
+    """Give the variance of a share over the variance that independent records would have.
 
-    The records of one group were made for one radar; if a radar is hard, they fail together. The ratio is the
+    The records of one group were made for one radar; if that radar is hard, they fail together. The result is the
     between-group (ratio-estimator) variance of the share over the binomial one.
 
     Parameters
@@ -140,9 +140,10 @@ def design_effect(hits: NDArray[np.bool_], groups: NDArray[np.intp]) -> float | 
 def detection_at(
     scores: NDArray[np.floating], targets: NDArray[np.bool_], *, false_alarm_rate: float
 ) -> dict[str, Any]:
-    """Detection rate when the threshold lets through at most a given share of the non-targets.
+    """Give the detection rate at a threshold that at most a given share of the non-targets exceeds.
 
-    The threshold is the lowest score that keeps to the rate; a record is declared when its score is above it.
+    The threshold is the lowest non-target score that keeps to this share (see `first_out`). A record is declared when
+    its score is strictly above the threshold.
 
     Parameters
     ----------
@@ -179,7 +180,7 @@ def detection_at(
 
 
 def reliability(confidence: NDArray[np.floating], hits: NDArray[np.bool_], *, bins: int = 15) -> dict[str, Any]:
-    """Reliability diagram and expected calibration error over equal bins of the confidence.
+    """Give the reliability diagram and the expected calibration error over equal bins of the confidence.
 
     Parameters
     ----------
@@ -188,7 +189,7 @@ def reliability(confidence: NDArray[np.floating], hits: NDArray[np.bool_], *, bi
     hits : (n,) bool
         Whether the winning class was right.
     bins : int
-        Number of equal bins of [0, 1]; a bin holds its upper edge, the first also 0.
+        Number of equal bins of [0, 1]; a bin includes its upper edge, and the first bin also includes 0.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Counting floating-point operations: of transforms while they run, of networks from their graphs."""
+"""Counting floating-point operations: transforms are counted while they run, networks from their graphs."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from unittest.mock import patch
 
 import numpy as np
 
-#: Transforms that are counted, by how much of a complex transform of the same length each is.
+#: Names of the transforms that are counted: complex ones, and real ones that cost half as much for the same length.
 _COMPLEX, _REAL = ("fft", "ifft"), ("rfft", "irfft", "hfft", "ihfft", "dct", "idct")
 
 
 class Counter:
-    """How many operations were counted so far."""
+    """Number of operations counted until now."""
 
     total = 0.0
 
 
 @contextmanager
 def counted_transforms() -> Iterator[Counter]:
-    """Count the transforms made inside, 5 N log2 N for a complex one of length N and half of it for a real one.
+    """Count the operations of transforms: 5 N log2 N for a complex one of length N, half of this for a real one.
 
-    What is counted is what ran, not what ought to: SciPy's and NumPy's functions are watched.
+    The count is of transforms that really ran within the ``with`` block: SciPy's and NumPy's functions are wrapped.
 
     Yields
     ------
@@ -57,9 +57,9 @@ def counted_transforms() -> Iterator[Counter]:
 
 
 def network_operations(onnx_bytes: bytes) -> float:
-    """Operations of one record through a graph: two a multiplication and addition, one a comparison of a tree.
+    """Count the operations of one record through a graph: two per multiply-add, one per comparison in a tree.
 
-    Convolutions, matrix products and tree ensembles are counted; what is added element by element is not.
+    Convolutions, matrix products, linear classifiers and tree ensembles are counted; element-wise operations are not.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def _attribute(node: Any, name: str) -> list[Any]:
 
 
 def _comparisons(node: Any) -> float:
-    """Mean depth of the leaves, over all trees, plus one addition a tree."""
+    """Sum over all trees the mean depth of the tree's leaves plus one addition."""
     trees, ids = _attribute(node, "nodes_treeids"), _attribute(node, "nodes_nodeids")
     low, high = _attribute(node, "nodes_truenodeids"), _attribute(node, "nodes_falsenodeids")
     modes = [bytes(mode) for mode in _attribute(node, "nodes_modes")]

@@ -42,7 +42,7 @@ def draw_page(report: Mapping[str, Any]) -> str:
     Returns
     -------
     str
-        One self-contained HTML document; the same bytes for the same content.
+        One self-contained HTML document; equal content gives equal bytes.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def draw_page(report: Mapping[str, Any]) -> str:
 
 
 def _legend(named: Mapping[str, Look]) -> list[tuple[str, int, Markup]]:
-    """Name, number of the colour and outline of the marker."""
+    """Give name, colour number and marker outline of each entry."""
     return [(name, look.number, Markup(_OUTLINES[look.outline])) for name, look in named.items()]
 
 

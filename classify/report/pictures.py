@@ -1,8 +1,8 @@
 """The pictures of a dwell that the front compares, all on one velocity axis and of one small size.
 
-A picture is what a small network reads: levels in decibels, channels first. Whatever its transform costs and however
-large the transform is, it ends on the axis that all radars share, so that networks of one anatomy can be set against
-one another. To put another representation on the front, add a line to `PICTURES`.
+A picture is what a small network reads: levels in decibels, channels first. Whatever the transform behind it costs and
+however large it is, the picture ends on the axis that all radars share, so that networks of one architecture can be
+compared. To put another representation on the front, add a line to `PICTURES`.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ STFT_SETTINGS = ((80, 0.9), (200, 0.9), (20, 0.9), (80, 0.5))
 #: Window of the cadence-velocity diagram [s], the paper's middle one.
 CADENCE_WINDOW_S = 4e-3
 
-#: Samples worked on at a time: a short window's STFT is hundreds of times larger than the record.
+#: Samples processed at a time: an STFT with a short window is hundreds of times larger than the record.
 _BLOCK_SAMPLES = 1 << 16
 
-#: Frames of an STFT that are worked on at a time.
+#: Approximate number of STFT frames that are transformed at a time, so that they stay in the cache.
 _CACHED_FRAMES = 256
 
 Maker = Callable[[NDArray[np.complex64], Radar], NDArray[np.float32]]
@@ -45,9 +45,9 @@ class Picture:
     Attributes
     ----------
     words : str
-        What people call it.
+        Its usual name.
     shape : tuple of int
-        Of one record: channels and bins of velocity (or period), or channels, these bins and frames.
+        Shape of one record: (channels, bins of velocity or period), or (channels, such bins, frames).
     make : callable
         From samples (n, pulses) and their radar to float32 (n, *shape) [dB].
     has_velocity : bool
@@ -61,20 +61,20 @@ class Picture:
 
 
 def spectrum_picture(iq: NDArray[np.complex64], radar: Radar, *, bins: int = AXIS_BINS) -> NDArray[np.float32]:
-    """One FFT over the whole dwell: mean and peak level of each velocity bin.
+    """Make a picture of one FFT over the whole dwell: mean and peak level of each velocity bin.
 
     Parameters
     ----------
     iq : (n, pulses) complex64
     radar : Radar
-        Theirs.
+        Radar of the records.
     bins : int
-        Velocity bins.
+        Number of velocity bins.
 
     Returns
     -------
     (n, 2, bins) float32
-        Over the noise floor [dB].
+        Levels over the noise floor [dB].
     """
     spectrum = doppler_spectrum(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz, window=HANN)
     pool = pooling(spectrum.bins, radar.carrier_hz, radar.prf_hz, bins)
@@ -82,22 +82,22 @@ def spectrum_picture(iq: NDArray[np.complex64], radar: Radar, *, bins: int = AXI
 
 
 def stft_picture(iq: NDArray[np.complex64], radar: Radar, *, window: int, overlap: float) -> NDArray[np.float32]:
-    """One of the paper's STFTs, pooled to velocity bins and frames.
+    """Make one of the paper's STFTs, pooled to velocity bins and frames.
 
     Parameters
     ----------
     iq : (n, pulses) complex64
     radar : Radar
-        Theirs.
+        Radar of the records.
     window : int
-        Window [samples]; a shorter dwell is one window.
+        Window [samples]; a dwell shorter than this is one window.
     overlap : float
         Share of a window that the next one covers.
 
     Returns
     -------
     (n, 1, velocity bins, frames) float32
-        Over the median of the picture [dB].
+        Levels over the median of the record's STFT power [dB].
     """
     pool = pooling(STFT_BINS, radar.carrier_hz, radar.prf_hz, IMAGE_BINS)
     out = np.empty((len(iq), 1, IMAGE_BINS, IMAGE_FRAMES), np.float32)
@@ -109,14 +109,14 @@ def stft_picture(iq: NDArray[np.complex64], radar: Radar, *, window: int, overla
 
 
 def _pooled_power(some: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """Mean power spectra of neighbouring frames, `IMAGE_FRAMES` in all; too few frames are shown several times."""
+    """Average the power spectra of neighbouring frames to `IMAGE_FRAMES` in all; too few frames are repeated."""
     count = len(some)
     starts = np.arange(IMAGE_FRAMES) * count // IMAGE_FRAMES
     if count < IMAGE_FRAMES:
         return _squares(transformed(some))[starts]
     ends = np.append(starts[1:], count)
     pooled = np.empty((IMAGE_FRAMES, STFT_BINS), np.float32)
-    # A few pools at a time: a whole STFT of a short window leaves every cache.
+    # A few pools at a time: the whole STFT of a short window fits no cache.
     step = max(1, IMAGE_FRAMES * _CACHED_FRAMES // count)
     for first in range(0, IMAGE_FRAMES, step):
         part = slice(first, first + step)
@@ -127,7 +127,7 @@ def _pooled_power(some: NDArray[np.complex64]) -> NDArray[np.float32]:
 
 
 def cadence_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
-    """Cadence-velocity diagram: how fast each velocity's level swings, (n, 1, velocity bins, cadences) [dB]."""
+    """Make a cadence-velocity diagram: how fast each velocity's level varies, (n, 1, velocity bins, cadences) [dB]."""
     swings, _ = joint.cadence_velocity(_frames_of(iq, radar, CADENCE_WINDOW_S))
     few = _grouped(swings**2)
     level = np.median(few, axis=(1, 2), keepdims=True)
@@ -137,29 +137,29 @@ def cadence_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float
 
 
 def cepstral_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
-    """Cepstrogram: periods of the comb, evenly spaced in their logarithm, (n, 1, periods, frames) [dB]."""
+    """Make a cepstrogram: comb periods, evenly spaced in their logarithm, (n, 1, periods, frames) [dB]."""
     heights, _ = joint.cepstrogram(_frames_of(iq, radar, joint.HERM_WINDOW_S))
     few = _grouped(heights)
     edges = np.geomspace(1, few.shape[-1], IMAGE_BINS + 1)[:-1].astype(int)
-    # a comb's peak is narrow: the highest of a group of periods speaks for it
+    # A comb's peak is narrow, so a group of periods is represented by its highest value.
     return np.swapaxes(np.maximum.reduceat(few, edges, axis=-1), -1, -2)[:, None]
 
 
 def herm_picture(iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
-    """HERM lines: what stays in each velocity bin from long frame to long frame, (n, 1, velocity bins) [dB]."""
+    """Make HERM lines: what persists in each velocity bin from long frame to long frame, (n, 1, velocity bins) [dB]."""
     lines = 10 ** (joint.herm_lines_db(_frames_of(iq, radar, joint.HERM_WINDOW_S)) / 10)
     pool = pooling(lines.shape[-1], radar.carrier_hz, radar.prf_hz, AXIS_BINS)
     return pool.mean_db(lines.astype(np.float32, copy=False))[:, None]
 
 
 def _frames_of(iq: NDArray[np.complex64], radar: Radar, window_s: float) -> joint.Stft:
-    """Short-time spectra; a dwell shorter than the window is one frame."""
+    """Compute short-time spectra; a dwell shorter than the window is one frame."""
     window_s = min(window_s, radar.dwell_s)
     return joint.stft(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz, window_s=window_s, overlap=0.9)
 
 
 def _grouped(rows: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Mean of neighbouring rows (axis 1), `IMAGE_FRAMES` in all; too few rows are shown several times."""
+    """Average neighbouring rows (axis 1) to `IMAGE_FRAMES` in all; too few rows are repeated."""
     count = rows.shape[1]
     starts = np.arange(IMAGE_FRAMES) * count // IMAGE_FRAMES
     if count < IMAGE_FRAMES:
@@ -170,7 +170,7 @@ def _grouped(rows: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _squares(lines: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """Power of each line; the lines are written over."""
+    """Compute the power of each line; the input is overwritten."""
     parts = lines.view(np.float32)
     np.multiply(parts, parts, out=parts)
     squares: NDArray[np.float32] = parts[..., ::2] + parts[..., 1::2]
@@ -178,26 +178,26 @@ def _squares(lines: NDArray[np.complex64]) -> NDArray[np.float32]:
 
 
 def radar_numbers(radar: Radar, count: int) -> NDArray[np.float32]:
-    """What the radar allows to be seen, the same for each of so many records, shape (count, 4)."""
+    """Give four numbers that describe the radar, repeated for each of `count` records, shape (count, 4)."""
     columns = radar_columns(radar.carrier_hz, radar.prf_hz, radar.pulses)
     return np.tile(np.array(list(columns.values()), np.float32), (count, 1))
 
 
 def in_blocks(make: Maker, iq: NDArray[np.complex64], radar: Radar) -> NDArray[np.float32]:
-    """Make pictures of many records, some at a time, so that scratch memory stays small."""
+    """Make pictures of many records, a few at a time, so that scratch memory stays small."""
     step = max(1, _BLOCK_SAMPLES // radar.pulses)
     return np.concatenate([make(iq[at : at + step], radar) for at in range(0, len(iq), step)])
 
 
 def quantised(picture: NDArray[np.floating], bits: int) -> NDArray[np.floating]:
-    """What is left of levels that were kept in so many bits.
+    """Round levels to what storing them in a number of bits leaves.
 
     Parameters
     ----------
     picture : ndarray of float32
         Levels [dB].
     bits : int
-        32: as they are, float32; 16: float16; fewer: equal steps from -20 to 80 dB, levels beyond held at the ends.
+        32: float32, unchanged; 16: float16; fewer: equal steps from -20 to 80 dB, levels outside clipped to the ends.
 
     Returns
     -------

@@ -49,7 +49,7 @@ from .settings import ReportConfig, report_config
 
 # The paper's measured radar: X band, PRF 20 to 30 kHz, 80 ms.
 REFERENCE = Radar(carrier_hz=9.85e9, prf_hz=25e3, pulses=2000)
-# Purpose of the records that are timed, weighed and shown: apart from those that are scored.
+# Purpose of the records that are timed, weighed and shown; those that are scored have another purpose.
 REFERENCE_PURPOSE = "bench"
 
 
@@ -61,7 +61,7 @@ def measured_report(
     progress: Progress,
     account: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Score, time and weigh models, and everything they could read instead.
+    """Score, time and weigh models, and the other inputs that a model could read instead.
 
     Parameters
     ----------
@@ -69,10 +69,10 @@ def measured_report(
         Name to sealed ONNX model, at least one.
     config : ReportConfig
     parts : Parts
-        What was measured before an interruption.
+        Results measured before an interruption.
     progress : Progress
     account : mapping, optional
-        What `train.json` beside the models says.
+        Content of the `train.json` beside the models.
 
     Returns
     -------
@@ -160,7 +160,7 @@ def measured_report(
 
 
 def _in_eight_bits(given: Mapping[str, Given]) -> dict[str, Given]:
-    """The default model with its products in eight bits, where it is among those given: only for the front."""
+    """Give the default model with its multiplications in eight bits, if it is among those given; for the front only."""
     from bladewing.models.export import in_eight_bits
 
     if DEFAULT_MODEL not in given:
@@ -170,7 +170,7 @@ def _in_eight_bits(given: Mapping[str, Given]) -> dict[str, Given]:
 
 
 def _cascade(given: Mapping[str, Given], account: Mapping[str, Any] | None) -> dict[str, Given]:
-    """The cascade that the training tells of, where its two models are among those given."""
+    """Give the cascade that the training account describes, if both of its models are among those given."""
     stages = ((account or {}).get(CASCADE) or {}).get(STAGES_KEY, ())
     if not stages or not given.keys() >= set(stages):
         return {}
@@ -180,7 +180,7 @@ def _cascade(given: Mapping[str, Given], account: Mapping[str, Any] | None) -> d
 
 
 def _forms(reference: Records) -> dict[str, NDArray[np.generic]]:
-    """The reference records in each form they can be kept in."""
+    """Give the reference records in each form that they can be stored in."""
     carrier_hz, prf_hz = REFERENCE.carrier_hz, REFERENCE.prf_hz
     forms: dict[str, NDArray[np.generic]] = {"raw IQ": reference.iq}
     forms |= model_inputs(reference.iq, carrier_hz=carrier_hz, prf_hz=prf_hz, names=tuple(INPUT_SHAPES))
@@ -189,7 +189,7 @@ def _forms(reference: Records) -> dict[str, NDArray[np.generic]]:
 
 
 def _training(account: Mapping[str, Any] | None) -> dict[str, Any] | None:
-    """What the page and the model card tell of the training, None where there is no account of it."""
+    """Give what page and model card say about the training; None if there is no account of it."""
     if account is None:
         return None
     return {
@@ -202,7 +202,7 @@ def _training(account: Mapping[str, Any] | None) -> dict[str, Any] | None:
 
 
 def _describe(name: str, files: tuple[bytes, ...], classifier: Classifier) -> dict[str, Any]:
-    """Tell what a model is: one file, or of a cascade the two that others tell of."""
+    """Describe a model of one file, or a cascade of two files that are described as models too."""
     return {
         "name": name,
         "bytes": sum(map(len, files)),
@@ -226,12 +226,13 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
     Returns
     -------
     dict of str to bytes
-        File stem to content: the known ones from cheap to dear, then others by name.
+        File stem to content: known models from cheap to dear, then others by name.
 
     Raises
     ------
     BadInput
-        If the folder does not exist, or holds no model, one that cannot be used or one of a name that the report needs.
+        If the folder does not exist, holds no model, a model that cannot be used, or one with a name that the report
+        uses itself.
     """
     if folder is None:
         found = {name: read_model(name)[0] for name in model_names()}
@@ -243,7 +244,7 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
         except PermissionError as error:
             raise unreadable(folder, error, "give a folder that can be read") from None
         found = {path.stem: read_model(str(path))[0] for path in folder.glob("*.onnx")}
-    for name, content in found.items():  # what cannot be used is told before anything is measured, by its file
+    for name, content in found.items():  # a model that cannot be used is reported by its file before any measuring
         Classifier(content, source=name if folder is None else str(folder / f"{name}.onnx"))
     own = {*PICTURES, FEATURES, CASCADE, EIGHT_BITS}
     if taken := sorted(found.keys() & own):
@@ -256,12 +257,12 @@ def load_models(folder: Path | None) -> dict[str, bytes]:
 
 
 def training_account(folder: Path | None) -> dict[str, Any] | None:
-    """Read what `train.json` beside the models says of their training; None where there is none.
+    """Read the account of the training from `train.json` beside the models; None if there is no such file.
 
     Raises
     ------
     BadInput
-        It cannot be read, is not JSON, or not the account of a training.
+        If the file cannot be read, is not JSON, or is not the account of a training.
     """
     file = (SHIPPED if folder is None else folder).joinpath(ACCOUNT)
     try:
@@ -293,8 +294,8 @@ def run_report(
 ) -> dict[str, Any]:
     """Measure the models on fresh synthetic records and write ``report.json``, ``report.html`` and ``model-card.md``.
 
-    The files change together after everything is measured and drawn: interrupted at any moment, the old ones or the
-    new ones stand whole, and the next run of the same report goes on where this one stopped.
+    The files are replaced together after everything is measured and drawn. If the run is interrupted at any moment, the
+    folder holds either all old or all new files, and the next run of the same report continues where this one stopped.
 
     Parameters
     ----------
@@ -303,7 +304,7 @@ def run_report(
     models : Path or None
         Folder of .onnx files; None: the shipped ones.
     quick : bool
-        A tenth of the records and shorter timings.
+        Fewer records and shorter timings, see `settings.QUICK`.
     seed : int, optional
         Root seed of the test records, >= 0.
     config : Path, optional
@@ -339,7 +340,7 @@ def run_report(
         }
         extremes = {} if stability is None else {"stability": stability}
         text = _json({"schema_version": SCHEMA_VERSION, "made": made, **body, **extremes})
-        # The page is drawn from the very text that is stored, so that whoever has the file can draw it again.
+        # The page is drawn from exactly the text that is stored, so that anyone with the file can draw it again.
         report: dict[str, Any] = json.loads(text)
         write_together(
             out, {"report.json": text, "report.html": draw_page(report), "model-card.md": model_card(report)}
@@ -353,7 +354,7 @@ def run_report(
 
 
 def _of(settings: ReportConfig, models: Mapping[str, bytes], account: Mapping[str, Any] | None) -> dict[str, Any]:
-    """All that the results depend on."""
+    """Collect everything that the results depend on."""
     return {
         "machine": {name: value for name, value in describe_machine().items() if name != "load"},
         "cascade": (account or {}).get(CASCADE),
@@ -368,13 +369,13 @@ def _of(settings: ReportConfig, models: Mapping[str, bytes], account: Mapping[st
 
 
 def _json(report: Mapping[str, Any]) -> str:
-    """Strict JSON for people too: indented, but a list of numbers stays on one line."""
+    """Write strict JSON that people can read too: indented, but a list of numbers stays on one line."""
     text = json.dumps(report, indent=1, allow_nan=False, ensure_ascii=False)
     return re.sub(r"\[\s+([-+.\deE,\s]+?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", text) + "\n"
 
 
 def _command(out: Path, models: Path | None, *, quick: bool, seed: int | None, config: Path | None) -> str:
-    """The command line that does the same again."""
+    """Give the command line that repeats this run."""
     import shlex
 
     words = ["bladewing", "report", "--out", str(out)]

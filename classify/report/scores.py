@@ -17,16 +17,16 @@ from . import metrics
 DECLINED = -1
 FALSE_ALARM_RATE = 1e-2
 SNR_STEP_DB = 5.0
-#: Beyond lie records that hardly have noise, and moving parts that nobody could see.
+#: SNRs that are sliced. Above lie records with hardly any noise, below micro-motion that nobody could detect.
 SNR_RANGE_DB = (-20.0, 50.0)
 BETA_STEP_DEG = 10.0
-#: The dwell rate that false UAVs are quoted at: one range cell looked at without a pause, a dwell at a time [1/h].
+#: Dwells per hour for which false UAVs are quoted: one range cell observed without a pause, dwell after dwell [1/h].
 DWELLS_PER_HOUR = 3600 / DWELL_S
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What is true of the test records, one entry a record.
+    """Truth of the test records, one entry a record.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Truth:
     kind : (n,) str
         Sub-kind, e.g. "quadcopter" or "flock".
     snr_db : (n,) float
-        Micro-motion power over noise, a sample [dB]; NaN where there is none.
+        Micro-motion power over noise power in one sample [dB]; NaN where there is no micro-motion.
     dwell_s : (n,) float
         Length of the record [s].
     radar : (n,) int
@@ -57,7 +57,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Answers:
-    """What one model said of the same records.
+    """Answers of one model on the same records.
 
     Attributes
     ----------
@@ -74,13 +74,13 @@ class Answers:
 
 
 def describe_records(truth: Truth) -> dict[str, Any]:
-    """Count what the test set holds.
+    """Count the records of the test set.
 
     Returns
     -------
     dict
-        ``total``, ``radars``, ``by_class`` and ``by_kind`` counts, ``without_snr``, the SNRs [dB] between which nine in
-        ten lie, and the extremes of the dwell [s].
+        ``total``, ``radars``, ``by_class`` and ``by_kind`` counts, ``without_snr``, ``snr_db`` (the 5 % and 95 %
+        quantiles [dB], or None) and ``dwell_s`` (the shortest and the longest [s]).
     """
     snr_db = truth.snr_db[np.isfinite(truth.snr_db)]
     kinds, counts = np.unique(truth.kind, return_counts=True)
@@ -96,10 +96,10 @@ def describe_records(truth: Truth) -> dict[str, Any]:
 
 
 def score(truth: Truth, answers: Answers) -> dict[str, Any]:
-    """Every score of one model on the test records.
+    """Compute every score of one model on the test records.
 
-    Scores count the records that the model saw; the refused ones are counted apart. Unless named otherwise an answer
-    is the class of highest probability, whether or not the acceptance thresholds would have withheld it.
+    Scores are over the records that the model saw; refused ones are only counted. Unless stated otherwise an answer is
+    the class of highest probability, whether or not the acceptance thresholds would have withheld it.
 
     Parameters
     ----------
@@ -112,8 +112,8 @@ def score(truth: Truth, answers: Answers) -> dict[str, Any]:
     -------
     dict
         Plain numbers, lists and dictionaries, ready for JSON. ``refused`` (records), ``accuracy``, ``recall`` by class
-        and ``balanced_accuracy`` (rates); ``design_effect``; ``confusion`` (counts, true class down; "accepted" has
-        "unknown" as its last column); ``uav_at_pfa`` (see `metrics.detection_at`); ``false_uav`` (rates over the
+        and ``balanced_accuracy`` (rates); ``design_effect``; ``confusion`` (counts, a row per true class; "accepted"
+        has "unknown" as its last column); ``uav_at_pfa`` (see `metrics.detection_at`); ``false_uav`` (rates over the
         records that are no UAV: by the most probable class, and after acceptance); ``reliability``; ``by_snr`` [dB]
         and ``by_dwell`` [s] (slices [from, to) with the rate of "all" and of each class); ``by_beta`` [degree] (of
         UAVs: the rate of "answered" right and of "found" at the false-alarm rate); ``false_per_hour``; ``by_kind``;
@@ -154,7 +154,7 @@ def score(truth: Truth, answers: Answers) -> dict[str, Any]:
 
 
 def snr_edges(snr_db: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Edges of equal steps that hold every SNR within `SNR_RANGE_DB`; none where there is none."""
+    """Give edges in steps of `SNR_STEP_DB` around all SNRs within `SNR_RANGE_DB`; if none, one edge: no slice."""
     low, high = SNR_RANGE_DB
     within = snr_db[(snr_db >= low) & (snr_db < high)]
     if within.size == 0:
@@ -166,7 +166,7 @@ def snr_edges(snr_db: NDArray[np.float64]) -> NDArray[np.float64]:
 def _confusion(
     label: NDArray[np.intp], best: NDArray[np.intp], accepted: NDArray[np.intp], classes: int
 ) -> dict[str, list[list[int]]]:
-    """Counts with the true class down and the answer across; ``accepted`` has "unknown" as its last column."""
+    """Count answers: a row per true class, a column per answer; "unknown" is the last column of ``accepted``."""
     table = np.zeros((classes, classes), int)
     np.add.at(table, (label, best), 1)
     withheld = np.zeros((classes, classes + 1), int)
@@ -181,7 +181,7 @@ def _sliced(
     values: NDArray[np.float64],
     edges: NDArray[np.float64],
 ) -> list[dict[str, Any]]:
-    """Accuracy in each slice [from, to) of a quantity, over all records and a class; NaN values fall in no slice."""
+    """Give the accuracy in each slice [from, to) of a quantity, overall and by class; NaN values are in no slice."""
     label = truth.label[seen]
     slices = []
     for low, high in pairwise(edges):
@@ -193,7 +193,7 @@ def _sliced(
 
 
 def _per_hour(share: metrics.Rate) -> dict[str, float | None]:
-    """So many an hour, at `DWELLS_PER_HOUR`, where each dwell stands for itself."""
+    """Turn a share of dwells into a number per hour at `DWELLS_PER_HOUR`, every dwell being decided by itself."""
     return {key: None if share[key] is None else share[key] * DWELLS_PER_HOUR for key in ("value", "low", "high")}
 
 
@@ -203,7 +203,7 @@ def _by_beta(
     probability: NDArray[np.float64],
     threshold: float | None,
 ) -> list[dict[str, Any]]:
-    """Slices of the UAVs by the angle at which their rotors are seen."""
+    """Give the rates of UAVs in slices of beta, the angle between line of sight and rotor plane."""
     if threshold is None or not np.isfinite(beta_rad).any():
         return []
     slices = []
@@ -216,7 +216,7 @@ def _by_beta(
 
 
 def _one_two_five(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Edges 1, 2, 5, 10, ... that hold every value (positive, any scale)."""
+    """Give edges from the series 1, 2, 5, 10, ... that enclose every value (positive, any scale)."""
     decades = range(math.floor(math.log10(values.min())), math.ceil(math.log10(values.max())) + 1)
     series = np.array([float(f"{step}e{decade}") for decade in decades for step in (1, 2, 5)])
     first = int(np.searchsorted(series, values.min(), side="right")) - 1
@@ -227,7 +227,7 @@ def _one_two_five(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def _by_kind(
     truth: Truth, seen: NDArray[np.bool_], best: NDArray[np.intp], accepted: NDArray[np.intp]
 ) -> list[dict[str, Any]]:
-    """How each sub-kind was called, in the order of the classes."""
+    """Give the rates of each answer for every sub-kind, in the order of the classes."""
     label, kind = truth.label[seen], truth.kind[seen]
     rows = []
     for number, name in enumerate(truth.classes):
@@ -242,7 +242,7 @@ def _by_kind(
 
 
 def _acceptance(truth: Truth, seen: NDArray[np.bool_], accepted: NDArray[np.intp]) -> dict[str, Any]:
-    """Coverage, and accuracy of what was accepted, over the records seen."""
+    """Give the share accepted (coverage) and the accuracy of what was accepted, over the records seen."""
     label, given = truth.label[seen], accepted != DECLINED
     hits = accepted == label
     return {

@@ -12,15 +12,15 @@ from bladewing.models import LADDER as _KNOWN
 from ..ladder import CASCADE
 from .svg import MARKERS, SERIES
 
-# From cheap to dear, as the tables list them. A known model keeps its look whatever else is on the page.
+# Known models from cheap to dear, in the tables' order. A known model keeps its look whatever else is on the page.
 LADDER = (*(name for name in _KNOWN if name != TEACHER), CASCADE)
 
-#: What the default model is called with its products in eight bits: it is tried on the front alone.
+#: Name of the default model with its multiplications in eight bits; only the front includes it.
 EIGHT_BITS = f"{DEFAULT_MODEL}-int8-trial"
 
 _MODELS = {name: number for number, name in enumerate((*LADDER, EIGHT_BITS))}
-# Of what is trained in a report, by family (all STFTs are one): where the palette ends, the colour of a model that is
-# not shipped and reads the like.
+# Colour number of each family that the report trains (all STFTs are one family). The palette is too short to give each
+# its own: the first four share the colour of a model that is not shipped and reads similar inputs.
 _FAMILIES = {
     "spectrum": _MODELS["features-linear"],
     "features": _MODELS["features-boosted"],
@@ -41,18 +41,20 @@ class Look:
 
     @property
     def colour(self) -> str:
-        """The stand-in of `svg`."""
+        """Stand-in colour, see `svg`."""
         return SERIES[self.number]
 
     @property
     def marker(self) -> str:
-        """Matplotlib's name of the marker."""
+        """Name of the marker in matplotlib."""
         return MARKERS[self.outline]
 
 
 def looks(models: Sequence[str]) -> dict[str, Look]:
-    """Give each model its look; strangers take the colours that no known model on the page has, in turn, with the last
-    marker, then the one before it.
+    """Give each model its look.
+
+    Unknown models take in turn the colours that no known model on the page has, all with the last marker; when the
+    colours are used up, they start again with the marker before it.
 
     Parameters
     ----------
@@ -73,8 +75,8 @@ def looks(models: Sequence[str]) -> dict[str, Look]:
 def choice_looks(choices: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], Look]:
     """Give each choice of the front its look, by name and kind.
 
-    Models keep theirs, and a family of what was trained here has a colour of its own on every page: no other's, and no
-    shipped model's. Settings of a family, and what shares a colour for all that, differ by their marker.
+    Models keep their look. Each family trained here has one colour on every page, which no other family and no shipped
+    model has. Choices of one family, and any others that share a colour, differ by their marker.
 
     Parameters
     ----------
@@ -93,7 +95,8 @@ def choice_looks(choices: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], 
         if row["kind"] != "model":
             family = row["name"].split("-")[0]
             alone = sum(name.split("-")[0] == family for name in others) == 1
-            # each its own marker too, from the last backwards: colours are not all that tells them apart
+            # A family with a single choice gets a marker of its own too, counted from the last: colour alone is not
+            # enough to tell choices apart.
             first, step = (-1 - (known.index(family) if family in known else 0), -1) if alone else (0, 1)
             outlines = ((first + step * place) % len(MARKERS) for place in range(len(MARKERS)))
             possible = (Look(_FAMILIES.get(family, _LAST), outline) for outline in outlines)

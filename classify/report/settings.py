@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from ..limits import SEEDS
 from ..settings_file import build_settings
 
-#: What `--quick` changes: enough to see every figure, with wide intervals.
+#: Settings under `--quick`: enough records to draw every figure, but with wide intervals.
 QUICK: dict[str, Any] = {
     "records": 2400,
     "reference_records": 128,
@@ -43,11 +43,11 @@ class ReportConfig(BaseModel):
     chain_s: Seconds = 30.0
     #: Time to spend on FFT against STFT, for each record length [s].
     stft_s: Seconds = 30.0
-    #: Rounds of the timings of the models, however long they take.
+    #: Fewest rounds of the timings of the models, however long they take.
     least_rounds: Annotated[int, Field(ge=1, le=100_000)] = 300
-    #: Repeats of FFT and STFT; the paper made 1000.
+    #: Fewest repeats of the FFT and STFT timings, however long they take; the paper made 1000.
     repeats: Annotated[int, Field(ge=1, le=1000)] = 1000
-    #: Records that each network of the front is trained on, all dwells together.
+    #: Training records of each network of the front, all dwells together.
     front_train: Annotated[int, Field(ge=210, le=10_000_000)] = 21_000
     #: Test records of each dwell of the front.
     front_test: Annotated[int, Field(ge=6, le=10_000_000)] = 3000
@@ -55,7 +55,7 @@ class ReportConfig(BaseModel):
     front_epochs: Annotated[int, Field(ge=1, le=1000)] = 12
     #: Time to spend on the timings of each dwell of the front and batch size [s].
     front_s: Seconds = 5.0
-    #: Records that the model is trained on out of which each family is left in turn; as many test it.
+    #: Training records of the left-out-family comparison, before a family is removed; as many records test it.
     family_train: Annotated[int, Field(ge=600, le=10_000_000)] = 24_000
 
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# zlib's own default: what most container formats do when told to compress.
+# zlib's own default level, which most container formats use when told to compress.
 ZLIB_LEVEL = 6
 RECORDS_QUOTED = 1_000_000
 
 
 def weigh(forms: Mapping[str, NDArray[np.generic]]) -> list[dict[str, Any]]:
-    """Bytes a record of each form, as it is and compressed.
+    """Give the bytes per record of each form, uncompressed and compressed.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the page says in plain sentences: what fails first, then what it can do, then what it costs."""
+"""The page's plain sentences: first what fails, then what the model can do, then what an answer costs."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from bladewing.models import DEFAULT_MODEL
 
 from .words import MINUS, batch_words, count, micros, millis, number, percent, size, spoken
 
-# Fewer records than this are no ground for a sentence.
+# Kinds and slices with fewer records than this are not mentioned in a sentence.
 LEAST_NAMED = 20
-# What a reader may call reliable.
+# Share of UAVs from which on the model counts as reliable.
 GOOD_SHARE = 0.9
 
 
 def headline_model(report: Mapping[str, Any]) -> str:
-    """Name the model the summary speaks of: the default one, else the most accurate."""
+    """Name the model that the summary is about: the default one, else the most accurate."""
     names = [model["name"] for model in report["models"]]
     if DEFAULT_MODEL in names:
         return DEFAULT_MODEL
@@ -24,7 +24,7 @@ def headline_model(report: Mapping[str, Any]) -> str:
 
 
 def sentences(report: Mapping[str, Any]) -> list[tuple[str, list[str]]]:
-    """Say what the report found.
+    """Put the report's findings into sentences.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def _costs(report: Mapping[str, Any]) -> Iterator[str]:
 
 
 def front_budgets(report: Mapping[str, Any], *, batch: int | None = None) -> list[str]:
-    """One sentence a batch size (or of one) and budget: what is the most accurate choice within it."""
+    """Name in one sentence per batch size (or for the one given) and budget the most accurate choice within it."""
     lines = []
     for one in report["front"]["budgets"]:
         if batch not in (None, one["batch"]):
@@ -167,7 +167,7 @@ def _with_interval(rate: Mapping[str, Any]) -> str:
 
 
 def _best_other(report: Mapping[str, Any], name: str, *, clearly: bool) -> Iterator[str]:
-    """Name the most accurate model, if it is another and does (or does not) lie clear of this one's interval."""
+    """Name the most accurate model if it is another one and its interval lies (or does not lie) above this one's."""
     accuracy = {one: found["balanced_accuracy"] for one, found in report["scores"].items()}
     best = max(accuracy, key=lambda one: accuracy[one]["value"] or 0.0)
     if best == name or accuracy[name]["value"] is None:
@@ -195,7 +195,7 @@ def _commonest_mistake(classes: Sequence[str], table: Sequence[Sequence[int]]) -
 
 
 def _weak_end(slices: Sequence[Mapping[str, Any]], where: str, scale: float, unit: str) -> Iterator[str]:
-    """Say how accurate the answers are in the lowest slice that holds enough records."""
+    """Say how accurate the answers are in the lowest slice with enough records."""
     usable = [one for one in slices if _enough(one["all"])]
     if usable:
         span = f"{scale * usable[0]['from']:g} to {scale * usable[0]['to']:g} {unit}".replace("-", MINUS)
@@ -203,7 +203,7 @@ def _weak_end(slices: Sequence[Mapping[str, Any]], where: str, scale: float, uni
 
 
 def _good_from(slices: Sequence[Mapping[str, Any]]) -> float | None:
-    """Lower edge of the SNR from which on every usable slice finds nine UAVs in ten."""
+    """Give the SNR from which on every slice with enough records finds at least nine UAVs in ten, or None."""
     usable = [one for one in slices if _enough(one["uav"])]
     good = None
     for one in reversed(usable):

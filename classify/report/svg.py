@@ -1,6 +1,6 @@
-"""Matplotlib figures as inline SVG: the same bytes for the same numbers, in the page's own colours.
+"""Matplotlib figures as inline SVG in the page's own colours; equal numbers give equal bytes.
 
-Figures are drawn in stand-in colours that become CSS variables, so that one drawing serves light and dark pages.
+Figures are drawn in stand-in colours that are then replaced by CSS variables: one drawing suits light and dark pages.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-# Stand-in colour -> what the page puts there. Series are the page's --s0, --s1, ...
+# Stand-in colours, and the CSS that replaces each. The series' colours are the page's variables --s0, --s1, ...
 INK, GRID, MUTED, PAPER = "#010101", "#020202", "#030303", "#040404"
 SERIES = tuple(f"#0a00{number:02x}" for number in range(11))
 _CSS = {INK: "currentColor", GRID: "var(--grid)", MUTED: "var(--muted)", PAPER: "var(--paper)"} | {
@@ -25,10 +25,11 @@ _CSS = {INK: "currentColor", GRID: "var(--grid)", MUTED: "var(--muted)", PAPER: 
 }
 MARKERS = ("o", "s", "D", "^", "v", "P", "X", "*", "<", ">")
 
-# 96 CSS pixels an inch. One wide panel fills a phone and three fill a desk's width; four narrow ones do.
+# Widths of panels [inch] of 96 CSS pixels. One wide panel fills a phone's width; three wide or four narrow ones fill a
+# desktop's.
 WIDE_IN, NARROW_IN = 3.75, 3.0
 
-# Any: matplotlib types every one of its settings.
+# Typed Any because matplotlib has a type of its own for every setting's name.
 _STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "bladewing",
@@ -66,7 +67,7 @@ class Panel:
     Attributes
     ----------
     title : str
-        Shown above it.
+        Shown above the drawing.
     svg : str
         The drawing, an ``<svg>`` element labelled with what it shows in words.
     """
@@ -76,7 +77,7 @@ class Panel:
 
 
 def banded(axes: Axes, x: Sequence[float], rates: Sequence[Mapping[str, Any]], colour: str, marker: str) -> None:
-    """Draw a line of rates with their intervals as a band."""
+    """Draw a line of rates, with their intervals as a band around it."""
     low, high = [one["low"] for one in rates], [one["high"] for one in rates]
     axes.fill_between(x, low, high, color=colour, alpha=0.1, linewidth=0)
     axes.plot(x, [one["value"] for one in rates], color=colour, marker=marker)
@@ -102,7 +103,7 @@ def panel(figure: Figure, *, name: str, title: str, alt: str) -> Panel:
     Parameters
     ----------
     figure : Figure
-        Made within `drawing`, still inside its ``with``.
+        Made by `drawing`, whose ``with`` block must still be open.
     name : str
         Unique on the page; letters, digits and hyphens.
     title, alt : str
@@ -124,7 +125,7 @@ def panel(figure: Figure, *, name: str, title: str, alt: str) -> Panel:
 
 
 def _own_ids(text: str, name: str) -> str:
-    """Drop the ids nothing points to, and prefix the others: ids are unique within a page, not within a drawing."""
+    """Remove ids that nothing refers to and prefix the others with the name, so that ids are unique within the page."""
     used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
 
     def renamed(match: re.Match[str]) -> str:

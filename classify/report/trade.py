@@ -1,4 +1,4 @@
-"""Accuracy against cost: which models nothing beats, and what a time budget buys."""
+"""Accuracy against cost: which models no other beats, and what a time budget buys."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ def weigh_up(scores: Mapping[str, Mapping[str, Any]], cost: Sequence[Mapping[str
     -------
     list of dict
         One a batch size: ``batch``, ``points`` (``{"model", "cost_us", "balanced_accuracy", "front"}``, cheapest
-        first) and ``budgets`` (``{"budget_us", "model", "cost_us", "balanced_accuracy"}``: the most accurate model
-        whose median cost keeps to the budget, None if none does; ``cheapest``, the cheapest model's name).
+        first; ``front``: no other model beats it) and ``budgets`` (``{"budget_us", "model", "cost_us",
+        "balanced_accuracy", "cheapest"}``: the most accurate model whose median cost keeps to the budget, None if none
+        does, and the name of the cheapest model).
     """
     weighed = []
     for part in cost:
@@ -43,7 +44,7 @@ def weigh_up(scores: Mapping[str, Mapping[str, Any]], cost: Sequence[Mapping[str
 
 
 def _best_within(points: Sequence[Mapping[str, Any]], budget_us: float) -> dict[str, Any]:
-    """Most accurate point that costs no more than the budget; of equals the cheapest."""
+    """Give the most accurate point that costs no more than the budget; of equally accurate ones the cheapest."""
     affordable = [point for point in points if point["cost_us"] <= budget_us]
     if not affordable:
         cheapest = points[0]["model"] if points else None

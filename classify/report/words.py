@@ -15,30 +15,30 @@ def percent(value: float | None) -> str:
 
 
 def number(value: float) -> str:
-    """Write a number with three digits that count, and a true minus sign."""
+    """Write a number with three significant digits and a true minus sign."""
     value = three_digits(value)
     text = f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
     return text.replace("-", MINUS)
 
 
 def three_digits(value: float) -> float:
-    """Round to the three digits that are shown, so that the unit is chosen for what is shown."""
+    """Round to the three significant digits that are shown, so that the unit fits the rounded value."""
     return float(f"{value:.3g}")
 
 
 def count(value: int) -> str:
-    """Write a whole number in full, thousands apart from five digits on."""
+    """Write a whole number in full; from five digits on, with a space between the thousands."""
     return f"{value:,}".replace(",", "\u202f") if abs(value) >= 10_000 else str(value)
 
 
 def limits(values: Sequence[float]) -> str:
-    """Least and largest of some thresholds [%], a probability's; never, where none is reached."""
+    """Write the range of some probability thresholds [%]; a threshold above 1 is never reached: "never"."""
     low, high = (f"{100 * value:.0f}" if value <= 1 else "never" for value in (min(values), max(values)))
     return low if low == high else f"{low}\u2013{high}"
 
 
 def micros(value: float) -> str:
-    """Write a time [us]."""
+    """Write a time [us] in microseconds, or in milliseconds from 1000 us on."""
     return f"{number(value)}{NBSP}µs" if three_digits(value) < 1000 else f"{number(value / 1000)}{NBSP}ms"
 
 
@@ -52,7 +52,7 @@ def size(value: float) -> str:
 
 
 def spoken(name: str) -> str:
-    """Write a name of the code as words."""
+    """Write a name from the code as words: spaces for underscores."""
     return name.replace("_", " ")
 
 
@@ -67,7 +67,7 @@ def millis(value_s: float) -> str:
 
 
 def large(value: float) -> str:
-    """Write a large count with the prefix of its thousands."""
+    """Write a large count with the prefix k, M or G."""
     for prefix in ("", "k", "M"):
         if three_digits(value) < 1000:
             return number(value) + (f"{NBSP}{prefix}" if prefix else "")

@@ -1,4 +1,4 @@
-"""How far every stage's numbers hold: errors against a more precise oracle as one parameter goes to its extreme."""
+"""Numerical stability of every stage: errors against a more precise reference as one parameter goes to its extremes."""
 
 from .run import run_stability
 

@@ -1,4 +1,4 @@
-"""One cell of the stability table: a stage, a parameter at a value, the error there, and the guard that acts."""
+"""One cell of the stability table: a stage, a parameter at one value, the error there, and the guard against it."""
 
 import math
 import warnings
@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-#: What a measurement gives: the error, or NaN with the reason why there is no number.
+#: Result of a measurement: the error, or NaN with the reason why there is no number.
 Outcome = float | tuple[float, str]
 
 
@@ -17,21 +17,21 @@ class Cell:
     Parameters
     ----------
     stage, parameter, value : str
-        What was computed, what was moved, and where to (with its unit).
+        What was computed, which parameter was varied, and its value (with the unit).
     error : float or None
-        The error there; None where the stage says that there is no number.
+        The error there; None where the stage gives no number.
     measure : str
-        What the error is of, and its unit.
+        The quantity that the error is of, and its unit.
     limit : float
-        What the error must not exceed.
+        Largest error allowed.
     guard : str
-        What acts at this extreme.
+        What keeps the numbers right at this extreme.
     said : str
-        The stage's reason where there is no number.
+        The stage's reason where it gives no number.
     warned : str
-        A warning from inside a library, or an exception that is no refusal; there must be none.
+        A warning from inside a library, or an exception that is no refusal. The cell holds only if this is empty.
     silent : bool
-        Whether a reason instead of a number is an answer here.
+        Whether a reason instead of a number is allowed here.
     """
 
     stage: str
@@ -47,12 +47,12 @@ class Cell:
 
     @property
     def holds(self) -> bool:
-        """Whether the error is within its limit, or there is a reason where it may be; and nothing warned."""
+        """Whether the error is within its limit, or a reason stands where one is allowed; and nothing warned."""
         answered = self.silent and bool(self.said) if self.error is None else self.error <= self.limit
         return answered and not self.warned
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, ready for JSON."""
+        """Give the cell as plain values, ready for JSON."""
         return {**self.__dict__, "holds": self.holds}
 
 
@@ -68,20 +68,21 @@ def sweep(
     *,
     silent: Collection[Any] = (),
 ) -> Iterator[Cell]:
-    """Measure one stage along one parameter; whatever a stage does wrong becomes a cell that does not hold.
+    """Measure one stage along one parameter; any fault of the stage becomes a cell that does not hold.
 
     Parameters
     ----------
     stage, parameter, measure, limit, guard
         As in `Cell`.
     values : iterable
-        Where the parameter goes.
+        Values of the parameter.
     error_at : callable
-        The error at a value. Where `guard` says that the stage refuses, a ValueError of one line is its word.
+        Gives the error at a value. If `guard` holds the word "refused", a ValueError counts as the stage's refusal.
     show : callable
-        The value as text, with its unit.
+        Gives the value as text, with its unit.
     silent : collection
-        Values at which a reason instead of a number is an answer; where `guard` says that the stage refuses, the only.
+        Values at which a reason instead of a number is allowed. If `guard` holds the word "refused", the stage must
+        give a reason there.
     """
     refuses = "refused" in guard
     for value in values:
@@ -103,7 +104,7 @@ def sweep(
         if caught and not warned:
             warned = f"{caught[0].category.__name__}: {caught[0].message}"
         if error is not None and not math.isfinite(error):
-            error = None if math.isnan(error) else 1e300  # an infinity is no answer
+            error = None if math.isnan(error) else 1e300  # an infinite error: over any limit, but JSON can hold it
         number = None if error is None else float(error)
         may = value in silent
         yield Cell(stage, parameter, show(value), number, measure, limit, guard, said, warned, may)

@@ -1,4 +1,4 @@
-"""The whole chain at the extremes: answers of the shipped model as gain and range go where no radar is."""
+"""The whole chain at the extremes: answers of the shipped model at gains and ranges beyond those of any radar."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -22,7 +22,7 @@ _REASON = "no guess: 'unknown' with the reason"
 
 
 def cells(quick: bool) -> Iterator[Cell]:
-    """Every cell of the chain; `quick` takes a tenth of the records."""
+    """Measure every cell of the chain; `quick` takes a tenth of the records."""
     classifier = Classifier.load()
     count = 600 if quick else 6000
     reference = _accuracy(classifier, 1.0, count)
@@ -78,7 +78,7 @@ def _records(count: int) -> tuple[tuple[float, float, NDArray[np.complex64], NDA
 
 
 def _accuracy(classifier: Classifier, gain: float, count: int) -> float:
-    """Balanced accuracy of the most probable class, 0 to 1."""
+    """Give the balanced accuracy of the most probable class, 0 to 1."""
     right: list[list[float]] = [[] for _ in CLASSES]
     for carrier_hz, prf_hz, iq, labels in _records(count):
         scaled = (iq * np.float64(gain)).astype(np.complex64)
@@ -89,10 +89,10 @@ def _accuracy(classifier: Classifier, gain: float, count: int) -> float:
 
 
 def _scene_answers(classifier: Classifier, range_m: float, seeds: range) -> NDArray[np.bool_]:
-    """Whether each rendering's most probable class is "uav", the scenes put at about this range.
+    """Tell for each rendering whether its most probable class is "uav", the targets being at about this range.
 
-    Whole half wavelengths away from the nearest one: the phases between target and surroundings are the same there, so
-    that an answer changes by what the numbers lose alone.
+    The distance to `_NEAR_M` is a whole number of half wavelengths. The phases between target and surroundings are
+    then the same at every range, so that answers change only by the loss of numerical precision.
     """
     answers = []
     for name in _SCENES:

@@ -1,4 +1,4 @@
-"""Stages of the models: network in float32, int8 and ONNX against float64, softmax against mpmath."""
+"""Stages of the models: networks in float32, int8 and ONNX against float64, softmax against mpmath."""
 
 import copy
 from collections.abc import Callable, Iterator
@@ -29,7 +29,7 @@ _NETS: tuple[tuple[type[EvidenceNet], tuple[str, ...]], ...] = (
 
 
 def cells(quick: bool) -> Iterator[Cell]:
-    """Every cell of these stages; `quick` leaves out the second network."""
+    """Measure every cell of these stages; `quick` leaves out the second network."""
     yield from _softmax()
     for make, names in _NETS[: 1 if quick else 2]:
         yield from _network(make, names)
@@ -63,7 +63,7 @@ def _softmax() -> Iterator[Cell]:
 
 
 def _network(make: Any, names: tuple[str, ...]) -> Iterator[Cell]:
-    """One network with drawn weights, standardised by real records, in every form it is run in."""
+    """Measure one network with random weights, standardised on simulated records, in every form in which it runs."""
     radar = Radar(9.85e9, 25e3, 1000)
     inputs = model_inputs(
         draw_records(radar, 48, 0, purpose="bench").iq,
@@ -85,7 +85,7 @@ def _network(make: Any, names: tuple[str, ...]) -> Iterator[Cell]:
     forms: dict[str, tuple[float, Callable[[Inputs], NDArray]]] = {
         "float32": (1e-4, lambda given: softmax(network_scores(net, given))),
         "ONNX": (1e-4, _runner(onnx_bytes)),
-        # coarse by design: eight bits of weights and activations
+        # The limit is coarse by design: weights and activations have eight bits.
         "int8": (0.1, _runner(in_eight_bits(onnx_bytes))),
     }
     for form, (limit, run) in forms.items():

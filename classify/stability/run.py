@@ -1,4 +1,4 @@
-"""The work behind `bladewing stability`: every stage to its extremes, and the table of what holds there."""
+"""The work behind `bladewing stability`: take every stage to its extremes and write the table of what holds there."""
 
 import html
 import json
@@ -24,7 +24,7 @@ def run_stability(out: Path, *, quick: bool = False, progress: bool = True) -> d
     Parameters
     ----------
     out : Path
-        Folder for the three files; made if it is missing. They change together at the end.
+        Folder for the three files; made if it is missing. The files are replaced together at the end.
     quick : bool
         Leave out what takes minutes.
     progress : bool
@@ -62,7 +62,7 @@ def run_stability(out: Path, *, quick: bool = False, progress: bool = True) -> d
 
 
 def worst_of_each(folder: Path) -> list[dict[str, Any]] | None:
-    """The worst cell of every stage and parameter of a table written earlier, for the report.
+    """Read the worst cell of every stage and parameter from a table written earlier, for the report.
 
     Parameters
     ----------
@@ -72,13 +72,13 @@ def worst_of_each(folder: Path) -> list[dict[str, Any]] | None:
     Returns
     -------
     list of dict or None
-        The cell nearest to its limit, with ``cells`` and ``held``: how many there are, and how many hold. None where
-        there is no table.
+        A cell that does not hold, else the one nearest to its limit; with ``cells`` and ``held``: the number of cells
+        of this stage and parameter, and how many of them hold. None where there is no table.
 
     Raises
     ------
     BadInput
-        The file is not such a table.
+        If the file is not such a table.
     """
     path = folder / "stability.json"
     try:
@@ -114,7 +114,7 @@ def _parts() -> dict[str, Callable[[bool], Iterator[Cell]]]:
 
 
 def _shown(cell: Cell) -> str:
-    """The error, or why there is none."""
+    """Write the error, or the reason why there is none, and any warning."""
     text = cell.said if cell.error is None else f"{cell.error:.2g}"
     return f"{text or 'no number and no reason'}{f' ({cell.warned})' if cell.warned else ''}"
 
@@ -127,7 +127,7 @@ def _row(cell: Cell) -> tuple[str, ...]:
 
 
 def markdown(cells: list[Cell]) -> str:
-    """The table, a section a stage."""
+    """Write the table in Markdown, one section per stage and quantity."""
     lines = ["# Stability", "", "Errors against a more precise oracle; a reason stands where there is no number.", ""]
     for (stage, measure), group in groupby(cells, key=lambda cell: (cell.stage, cell.measure)):
         lines += [
@@ -143,7 +143,7 @@ def markdown(cells: list[Cell]) -> str:
     return "\n".join(lines)
 
 
-#: The page is read by daylight and at night; its tables scroll where they are wider, and a shade at the right says so.
+#: CSS of the page, for light and dark screens. Tables wider than the screen scroll; a shade at the right shows this.
 _STYLE = (
     ":root{--paper:#fff;--ink:#1b1f24;--muted:#66707a;--line:#d9dee4;--shade:#9aa4ae80;--no:#fbe3e0;--link:#005a8f;"
     "color-scheme:light}"
@@ -163,7 +163,7 @@ _STYLE = (
 
 
 def page(cells: list[Cell]) -> str:
-    """The table as one HTML page without any request outside."""
+    """Write the table as one HTML page that loads nothing from elsewhere."""
     stages = [(named, list(group)) for named, group in groupby(cells, key=lambda cell: (cell.stage, cell.measure))]
     parts = [
         "<!doctype html><html lang=en><meta charset=utf-8>"
@@ -172,7 +172,7 @@ def page(cells: list[Cell]) -> str:
         f"<p>Every stage at its extremes: errors against a more precise oracle, what is allowed, and what guards the "
         f"numbers there. {_held(cells)} hold.</p><nav>",
     ]
-    for stage, alike in groupby(enumerate(stages), key=lambda part: part[1][0][0]):  # one may have several measures
+    for stage, alike in groupby(enumerate(stages), key=lambda part: part[1][0][0]):  # a stage may have several measures
         (number, (_, some)), *more = alike
         every = [*some, *(cell for _, (_, others) in more for cell in others)]
         parts.append(f"<a href='#s{number}'>{html.escape(stage)}: {_held(every)}</a>")
@@ -187,7 +187,7 @@ def page(cells: list[Cell]) -> str:
             parts.append(f"<tr{'' if cell.holds else ' class=no'}>")
             for column, (head, text) in enumerate(zip(_HEADS, row, strict=True)):
                 span = spans[column][n] if column in spans else 1
-                whole = head == "error" and cell.error is not None and not cell.warned  # a reason may break, no number
+                whole = head == "error" and cell.error is not None and not cell.warned  # a number's line must not break
                 if span:
                     told = f" rowspan={span}" if span > 1 else ""
                     kind = "number" if whole else head
@@ -201,7 +201,7 @@ def _held(cells: list[Cell]) -> str:
 
 
 def _spans(texts: Sequence[Hashable]) -> list[int]:
-    """How many rows a cell spans that says what those below it say; 0 for those.
+    """Give the rows that each cell of a column spans: the first of equal neighbours their number, the others 0.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Stages of the features against the same arithmetic in long double, exact invariances and known truth."""
+"""Stages of the features, checked against the same arithmetic in long double, exact invariances and known truth."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -34,12 +34,12 @@ _WAVELENGTH_M = SPEED_OF_LIGHT_MPS / _CARRIER_HZ
 _SCALE_GUARD = "scaled by a power of two to [0.5, 1) first: no digit changes, no square overflows or vanishes"
 _COUNTS = (2, 3, 16, 127, 1000, 1021, 8191, 65536)
 
-# Records of `ODD` in which a rotor stands, and its chopping frequency [Hz].
+# Names of the records in `ODD` that contain a rotor, and its chopping frequency [Hz].
 _ODD_ROTORS, _ODD_CHOPPING_HZ = ("clipped to one bit", "I only"), 200.0
 
 
 def cells(quick: bool) -> Iterator[Cell]:
-    """Every cell of these stages; `quick` leaves out the dear ones."""
+    """Measure every cell of these stages; `quick` leaves out the slow ones."""
     yield from _spectra(quick)
     yield from _shapes(quick)
     yield from _combs()
@@ -49,7 +49,7 @@ def cells(quick: bool) -> Iterator[Cell]:
 def rotor_record(
     pulses: int = 2000, *, snr_db: float = 20.0, chopping_hz: float = _ODD_CHOPPING_HZ
 ) -> NDArray[np.complex64]:
-    """A body line, a comb of a two-bladed rotor about it, and noise of unit power."""
+    """Make a record: a body line, the comb of a two-bladed rotor about it, and noise of unit power."""
     rng = np.random.default_rng(0)
     t = np.arange(pulses) / _PRF_HZ
     comb = np.exp(1j * 40 * np.cos(np.pi * chopping_hz * t)) + np.exp(-1j * 40 * np.cos(np.pi * chopping_hz * t))
@@ -58,7 +58,7 @@ def rotor_record(
     return (signal + noise[0] + 1j * noise[1]).astype(np.complex64)
 
 
-#: Records that no target makes: name to a function of the number of pulses.
+#: Records that no ordinary target gives: name to a function of the number of pulses.
 ODD: dict[str, Callable[[int], NDArray[np.complex64]]] = {
     "all zero": lambda pulses: np.zeros(pulses, np.complex64),
     "constant": lambda pulses: np.full(pulses, 0.3 - 0.7j, np.complex64),
@@ -74,13 +74,13 @@ ODD: dict[str, Callable[[int], NDArray[np.complex64]]] = {
 
 
 def _noise_on(level: float, pulses: int) -> NDArray[np.complex64]:
-    """A constant level and noise of power 2."""
+    """Make a constant level and noise of power 2."""
     rng = np.random.default_rng(0)
     return (level + rng.normal(size=pulses) + 1j * rng.normal(size=pulses)).astype(np.complex64)
 
 
 def _exact_power(iq: NDArray[np.complex64], window: Window) -> NDArray[np.longdouble]:
-    """`centred_power` in long double, of the same samples and window."""
+    """Compute `centred_power` in long double, from the same samples and window."""
     pulses = iq.shape[-1]
     taper = window.taper(pulses).astype(np.longdouble)
     taper /= np.sqrt(np.sum(taper**2))
@@ -89,7 +89,7 @@ def _exact_power(iq: NDArray[np.complex64], window: Window) -> NDArray[np.longdo
 
 
 def _power_error(iq: NDArray[np.complex64], window: Window) -> float:
-    """Largest error of a bin's power, over the larger of that power and the mean of all."""
+    """Give the largest error of a bin's power, over the larger of that power and 1e-6 of the mean of all bins."""
     scaled = iq * unit_scale(iq)
     exact = _exact_power(scaled, window)
     away = np.abs(centred_power(scaled, window=window) - exact)
@@ -97,7 +97,7 @@ def _power_error(iq: NDArray[np.complex64], window: Window) -> float:
 
 
 def _floor_error(iq: NDArray[np.complex64], window: Window) -> float:
-    """Error of the noise floor [dB]."""
+    """Give the error of the noise floor [dB]."""
     spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ, window=window)
     exact = _exact_power(iq * unit_scale(iq), window)
     level = max(float(noise_floor(exact, window)), float(exact.mean()) * float(LEAST_FLOOR))  # type: ignore[arg-type]
@@ -106,7 +106,7 @@ def _floor_error(iq: NDArray[np.complex64], window: Window) -> float:
 
 
 def _through_either(error: Callable[[NDArray[np.complex64], Window], float], iq: NDArray[np.complex64]) -> float:
-    """The larger error of the two windows."""
+    """Give the larger of the errors with the two windows."""
     return max(error(iq, window) for window in (HANN, KAISER))
 
 
@@ -150,24 +150,24 @@ def _sweeps(
 
 
 def _scaled(iq: NDArray[np.complex64], gain: float) -> NDArray[np.complex64]:
-    """A record of that largest part."""
+    """Scale a record so that its largest real or imaginary part is `gain`."""
     largest = float(np.abs(iq.view(np.float32)).max())
     return (iq.astype(np.complex128) * (gain / largest)).astype(np.complex64)
 
 
 def _long(spectrum: Spectrum) -> Spectrum:
-    """The same spectrum in long double, for stages that keep the type they are given."""
+    """Give the same spectrum in long double, for stages that keep the type of their input."""
     return replace(spectrum, relative_power=spectrum.relative_power.astype(np.longdouble))
 
 
 def _notched(iq: NDArray[np.complex64]) -> tuple[Spectrum, NDArray[np.bool_]]:
-    """A record's spectrum, and where it counts."""
+    """Give a record's spectrum and the mask of the bins outside the notches."""
     spectrum = doppler_spectrum(iq, carrier_hz=_CARRIER_HZ, prf_hz=_PRF_HZ, window=HANN)
     return spectrum, notch_mask(spectrum, strongest_bin(spectrum))
 
 
 def _exact_cepstrum(spectrum: Spectrum, mask: NDArray[np.bool_]) -> NDArray[np.longdouble]:
-    """`cepstrum` in long double, of the same powers."""
+    """Compute `cepstrum` in long double, from the same powers."""
     power = np.maximum(spectrum.relative_power.astype(np.longdouble), np.longdouble(1))
     level = np.minimum(10 * np.log10(power), CLIP_DB) * mask
     level -= mask * (level.sum() / max(1, np.count_nonzero(mask)))
@@ -181,7 +181,7 @@ def _cepstrum_error(iq: NDArray[np.complex64]) -> float:
 
 
 def _cadence_error(iq: NDArray[np.complex64]) -> float:
-    """`cadence_db` against the same steps in long double, as powers."""
+    """Compare `cadence_db` with the same steps in long double, as powers."""
     spectrum, mask = _notched(iq)
     plan = cadence_plan(spectrum.pulses, spectrum.prf_hz, spectrum.window)
     power = np.abs(fft.ifft(spectrum.transform.astype(np.clongdouble) * mask))[plan.span] ** 2 * plan.per_taper
@@ -194,7 +194,7 @@ def _cadence_error(iq: NDArray[np.complex64]) -> float:
 
 
 def _comb_heights_error(iq: NDArray[np.complex64]) -> float:
-    """`comb_heights` against long double, of the same powers; the deviation of noise is about a half."""
+    """Compare `comb_heights` with long double on the same powers; noise has a standard deviation of about 0.5 there."""
     spectrum, mask = _notched(iq)
     plan = comb_plan(spectrum.bins, spectrum.pulses, _CARRIER_HZ, _PRF_HZ)
     if plan is None:
@@ -205,7 +205,7 @@ def _comb_heights_error(iq: NDArray[np.complex64]) -> float:
 
 
 def _band_error(iq: NDArray[np.complex64]) -> float:
-    """Edges of the energy band against long double, in bins."""
+    """Compare the edges of the energy band and of the threshold band with long double [bins]."""
     edges = []
     spectrum, mask = _notched(iq)
     for one in (spectrum, _long(spectrum)):
@@ -276,7 +276,7 @@ def _shape_sweeps(
 
 
 def _comb_error(iq: NDArray[np.complex64], chopping_hz: float, carrier_hz: float = _CARRIER_HZ) -> Outcome:
-    """Error of the measured chopping frequency, or the reason why there is none."""
+    """Give the relative error of the measured chopping frequency, or the reason why there is none."""
     found = measure(iq, carrier_hz=carrier_hz, prf_hz=_PRF_HZ)
     if np.isfinite(found.chopping_hz):
         return abs(float(found.chopping_hz) / chopping_hz - 1)
@@ -339,7 +339,7 @@ def _difference(one: dict[str, NDArray[np.float32]], other: dict[str, NDArray[np
 
 
 def _finite(inputs: dict[str, NDArray[np.float32]]) -> float:
-    """0 where every input is finite."""
+    """Count the input values that are not finite; 0 is right."""
     return float(sum(np.count_nonzero(~np.isfinite(values)) for values in inputs.values()))
 
 

@@ -19,14 +19,14 @@ _BLADE_GUARD = "angle reduced in float64; the error of a float32 phase falls wit
 
 
 def cells(quick: bool) -> Iterator[Cell]:
-    """Every cell of these stages; `quick` leaves out the dear ones."""
+    """Measure every cell of these stages; `quick` leaves out the slow ones."""
     yield from _phases()
     yield from _blades()
     yield from _lines(quick)
 
 
 def _phase_error(range_m: np.ndarray, carrier_hz: float) -> float:
-    """Largest error of the two-way phasor, the range taken as it is."""
+    """Give the largest error of the two-way phasor; the float64 range is taken as exact."""
     found = range_phasor(range_m, SPEED_OF_LIGHT_MPS / carrier_hz)
     worst = 0.0
     with mpmath.workdps(_DIGITS):
@@ -84,11 +84,11 @@ def _phases() -> Iterator[Cell]:
 def _blade_error(
     gamma: float = 100.0, *, rpm: float = 6000.0, beta_rad: float = 0.0, blades: int = 2, dwell_s: float = 0.08
 ) -> float:
-    """Largest error of a rotor's echo, relative to the sum of its blades' amplitudes."""
+    """Give the largest error of a rotor's echo, relative to the sum of its blades' amplitudes."""
     wavelength = SPEED_OF_LIGHT_MPS / _CARRIER_HZ
     length = gamma * wavelength / (4 * np.pi)
     times = np.linspace(0, dwell_s, 41)
-    if rpm and gamma:  # and about the flash, where the blade stands across and its phase passes through zero
+    if rpm and gamma:  # more times around the flash, where the blade is broadside and its phase passes through zero
         across = np.pi / 2 - 0.3 + np.array([-3.0, -1.0, -0.1, 0.0, 0.1, 1.0, 3.0]) / max(gamma, 10.0)
         times = np.append(times, across / (2 * np.pi * rpm / 60))
     angle = RotorMotion(rpm / 60, 0.3).angle_rad(times)
@@ -169,7 +169,10 @@ def _blades() -> Iterator[Cell]:
 
 
 def _bessel(gamma: float, order: int) -> float:
-    """J_m by the trapezoid rule, in long double: it converges faster than any power once it has a point a phase."""
+    """Compute J_m by the trapezoid rule in long double.
+
+    The rule's error falls faster than any power of its number of points once that number exceeds gamma + order.
+    """
     count = 1 << max(8, int(np.ceil(np.log2(2 * (gamma + order) + 200))))
     tau = 2 * np.arctan(np.longdouble(1)) * 4 * np.arange(count, dtype=np.longdouble) / count
     return float(np.cos(np.longdouble(gamma) * np.sin(tau) - order * tau).mean())
@@ -182,7 +185,7 @@ def _line_error(gamma: float) -> float:
 
 
 def _mean_line_error(gamma: float) -> float:
-    """The lines of a whole blade carry its mean power: their sum against the closed form's average over angle."""
+    """Compare the summed power of a whole blade's lines with the closed form's mean power over the angle; relative."""
     highest = highest_order(gamma)
     lines = blade_coefficients(0.0, gamma, highest)
     angle = np.linspace(0, 2 * np.pi, 2 * highest + 64, endpoint=False)

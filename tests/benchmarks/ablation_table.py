@@ -20,7 +20,7 @@ from sklearn.metrics import log_loss
 
 from .baselines_table import judged
 
-#: What the measurements of each group are called.
+#: Group of measurements to a test of whether a measurement's name belongs to it.
 GROUPS: dict[str, Callable[[str], bool]] = {
     "comb (chopping frequency, its strength)": lambda name: name.startswith("chopping"),
     "spread (smearing index)": lambda name: name == "smearing_index",
@@ -30,7 +30,7 @@ GROUPS: dict[str, Callable[[str], bool]] = {
     "change over the dwell": lambda name: name.startswith(("change_", "centroid_", "busy_")),
 }
 
-#: Inputs of each trial; "levels" and "change" are the spectrum's first channels.
+#: Inputs of each trial. "levels" are the spectrum's first channels; "change" are these and the next one.
 TRIALS = {
     "levels": ("levels",),
     "levels, change": ("change",),
@@ -46,12 +46,12 @@ TRIALS = {
 
 DRAWN = TRIALS["all"]
 
-#: The trial that is told classes alone; the others are told kinds too, as the shipped networks are.
+#: Name of the trial whose network is trained on classes alone; the others learn kinds too, as the shipped networks do.
 CLASSES_TOLD = "all, told classes and no kinds"
 
 
 def inputs_of(part: Gathered, names: tuple[str, ...], held: NDArray[np.bool_]) -> dict[str, NDArray]:
-    """The named inputs, measurements that are `held` at zero."""
+    """Give the named inputs; measurements marked in `held` are set to zero."""
     spectrum = part.inputs["spectrum"]
     given = part.inputs | {"levels": spectrum[:, :LEVEL_CHANNELS], "change": spectrum[:, : LEVEL_CHANNELS + 1]}
     given["features"] = np.where(held, np.float32(0), given["features"])
@@ -67,7 +67,7 @@ def trial(
     *,
     kinds: bool = True,
 ) -> tuple[float, float, float, float]:
-    """Balanced accuracy, half its 95 % interval, UAVs found at 1 % and nats a record of one network."""
+    """Train one network; give balanced accuracy, half its 95 % interval, UAVs found at 1 % and nats per record."""
     train, validate, test = (inputs_of(sets[purpose], names, held) for purpose in ("train", "validate", "bench"))
     shapes = {name: values.shape[1:] for name, values in train.items()}
     net = SpectrumNet(shapes, seed=seed, **({"kinds": CLASS_OF_KIND} if kinds else {}))

@@ -1,6 +1,6 @@
 """What a user would pick instead: a ResNet-18 on spectrogram pictures, MiniRocket on the spectrum, the paper's rule.
 
-Each is prepared as its users do it: from samples to what it reads, trained on records, and asked for scores.
+Each is prepared as its users would: samples are turned into what it reads, it is trained on records, and gives scores.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ from torch import Tensor, nn
 Samples = NDArray[np.complex64]
 Arrays = NDArray[np.float32]
 
-#: Window and overlap of the spectrogram, the paper's first setting in samples; the picture's side.
+#: WINDOW [samples], OVERLAP: the spectrogram's, the paper's first setting; SIDE: the picture's side [pixels].
 WINDOW, OVERLAP, SIDE = 80, 0.9, 64
 
 #: The paper's threshold over the floor for measured data [dB].
@@ -31,7 +31,7 @@ RULE_DB = 20.0
 
 @dataclass(frozen=True)
 class Baseline:
-    """A pipeline: samples of one radar to what is read, training, and scores (n, 3)."""
+    """A pipeline: its name, a function from one radar's samples to what it reads, and a training; scores are (n, 3)."""
 
     words: str
     read: Callable[[Samples, Radar], Arrays]
@@ -39,7 +39,7 @@ class Baseline:
 
 
 def spectrogram(iq: Samples, radar: Radar) -> Arrays:
-    """Picture of SIDE x SIDE levels [dB over its own median], whatever the radar: frequency over the PRF, time."""
+    """Make pictures of SIDE x SIDE levels [dB over their own median] for any radar: frequency over the PRF, time."""
     window = min(WINDOW, iq.shape[-1] // 2)
     hop = max(1, round(window * (1 - OVERLAP)))
     frames = np.lib.stride_tricks.sliding_window_view(iq, window, axis=-1)[:, ::hop]
@@ -126,7 +126,7 @@ def train_resnet(pictures: Arrays, labels: NDArray[np.int64], epochs: int) -> Ca
 
 
 def levels(iq: Samples, radar: Radar) -> Arrays:
-    """The product's own spectrum on the velocity axis, three channels: the best that MiniRocket could be given."""
+    """Give the product's own spectrum on the velocity axis, the best input that MiniRocket could be given."""
     return model_inputs(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz, names=("spectrum",))["spectrum"]
 
 
@@ -147,9 +147,9 @@ def train_minirocket(series: Arrays, labels: NDArray[np.int64], _: int) -> Calla
 
 
 def rule_values(iq: Samples, radar: Radar) -> Arrays:
-    """What the paper reads off a spectrum: the band over its threshold [m/s] and the distance of the first lines [Hz].
+    """Read off a spectrum what the paper does: the band over its threshold [m/s] and the spacing of two lines [Hz].
 
-    The band is that of the threshold rule; the lines are the first two local maxima over the threshold on the positive
+    The band is that of the threshold rule. The lines are the first two local maxima over the threshold on the positive
     side of the strongest line.
     """
     spectrum = doppler_spectrum(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
@@ -169,7 +169,7 @@ def rule_values(iq: Samples, radar: Radar) -> Arrays:
 
 
 def train_rule(values: Arrays, labels: NDArray[np.int64], _: int) -> Callable[[Arrays], NDArray[np.floating]]:
-    """Thresholds on band and line distance; the paper names none, so the best of up to eight leaves are taken."""
+    """Train thresholds on band and line spacing: the paper names none, so a tree of up to eight leaves is fitted."""
     from sklearn.tree import DecisionTreeClassifier
 
     return DecisionTreeClassifier(max_leaf_nodes=8, random_state=0).fit(values, labels).predict_proba

@@ -29,7 +29,7 @@ TIMED = Radar(9.85e9, 25e3, 2048)
 
 
 def gathered(purpose: str, count: int) -> tuple[Gathered, dict[str, NDArray[np.float32]]]:
-    """Records of every radar: our inputs of them, and what each baseline reads."""
+    """Draw records of any radar; give our models' inputs, and what each baseline reads."""
     names = tuple(dict.fromkeys(name for model in OURS for name in LADDER[model].inputs))
     theirs: dict[str, list[NDArray]] = {name: [] for name in BASELINES}
     runs = []
@@ -43,7 +43,7 @@ def gathered(purpose: str, count: int) -> tuple[Gathered, dict[str, NDArray[np.f
 
 
 def judged(scores: NDArray[np.floating], labels: NDArray[np.int64]) -> tuple[float, float, float]:
-    """Balanced accuracy, half its 95 % interval, and the UAVs found at 1 % false alarms."""
+    """Give the balanced accuracy, half its 95 % interval, and the share of UAVs found at 1 % false alarms."""
     recall = np.array([np.mean(scores[labels == index].argmax(axis=1) == index) for index in range(3)])
     counts = np.bincount(labels, minlength=3)
     half = 1.96 * np.sqrt((recall * (1 - recall) / counts).sum()) / 3
@@ -55,7 +55,7 @@ def judged(scores: NDArray[np.floating], labels: NDArray[np.int64]) -> tuple[flo
 def costs_ffts(
     answers: dict[str, Callable[[NDArray[np.complex64]], object]], iq: NDArray[np.complex64], repeats: int
 ) -> dict[str, float]:
-    """Cost of each answer over the bare FFT of the same records."""
+    """Give the cost of each answer over that of the bare FFT of the same records."""
     calls = {name: repeated(partial(call, iq), repeats) for name, call in answers.items()}
     spent_s = cpu_seconds({"": repeated(partial(fft.fft, iq), 20 * repeats)} | calls, rounds=7)
     return {name: 20 * spent_s[name] / spent_s[""] for name in answers}

@@ -1,7 +1,8 @@
-"""`measure` and bodies whose own line does not tell them: python -m tests.benchmarks.bodies_table.
+"""Body velocities from `measure` where the body's own line does not show: python -m tests.benchmarks.bodies_table.
 
-Multirotors that hover before louder ground, rotors of nearly one rate, and lone rotors of which no body is seen. A body
-counts as wrong where it is off by more than five of its deviations and by more than 0.2 m/s. A quarter of an hour.
+Cases: multirotors that hover before stronger ground, rotors of nearly equal rates, and single rotors without a visible
+body. A body velocity counts as wrong where its error exceeds five of its standard deviations and 0.2 m/s. The run takes
+a quarter of an hour.
 """
 
 from collections.abc import Iterable
@@ -18,7 +19,7 @@ BLADE_M, ROTOR_DB = 0.1, 10.0
 
 @dataclass(frozen=True)
 class Case:
-    """A radar, so many rotors of two even blades and of rates within a spread about a middle, body and ground."""
+    """A radar, a body, ground, and rotors of two equal blades, their rates within a relative `spread` of a middle."""
 
     carrier_hz: float = 9.4e9
     prf_hz: float = 10e3
@@ -31,7 +32,7 @@ class Case:
     spread: float = 0.02
 
     def record(self, seed: int) -> np.ndarray:
-        """Samples; levels are over the noise of a sample, each rotor's alike."""
+        """Make the samples; levels are over the noise power of one sample, and all rotors have the same."""
         rng, per_m = np.random.default_rng(seed), 4 * np.pi * self.carrier_hz / SPEED_OF_LIGHT_MPS
         time_s = np.arange(self.pulses) / self.prf_hz
         moved_rad = per_m * self.velocity_mps * time_s
@@ -79,7 +80,7 @@ NEARLY_ONE = {
 
 
 def rows(cases: dict[str, Case], seeds: Iterable[int]) -> int:
-    """Print a row a case; how many bodies are wrong in all."""
+    """Print one row per case; return how many bodies are wrong in all."""
     total, seeds = 0, list(seeds)
     for name, case in cases.items():
         wrong, stds = 0, []
@@ -94,12 +95,12 @@ def rows(cases: dict[str, Case], seeds: Iterable[int]) -> int:
 
 
 def is_wrong(found_mps: float, std_mps: float, true_mps: float) -> bool:
-    """Whether a body is off by more than it says."""
+    """Whether a body velocity is off by more than 0.2 m/s and five of its standard deviations."""
     return bool(abs(found_mps - true_mps) > max(0.2, 5 * std_mps))
 
 
 def without_body(seed: int) -> tuple[np.ndarray, float, float]:
-    """A lone rotor of the paper's radar of which no body is seen, and the velocity of that and of the tips [m/s]."""
+    """Make a record of one rotor without a visible body; give it with the body's velocity and the tip speed [m/s]."""
     rng = np.random.default_rng(seed)
     rate_hz = rng.uniform(30, 80)
     tip_mps = rng.uniform(0.3, 0.62) * records.PRF_HZ / 4 * records.WAVELENGTH_M

@@ -15,17 +15,18 @@ from bladewing.simulate.catalogue import AIRFRAMES
 
 CARRIERS_HZ = (3.3e9, 9.85e9, 24.1e9, 77e9)
 
-#: Of the unambiguous span, the tips take so much; blades are so far below the catalogue's level [dB].
+#: FOLDS: range of the tip speed over the unambiguous velocity. LOWERED_DB: the UAV, body and blades, is below its level
+#: in the catalogue by one of these [dB].
 FOLDS, LOWERED_DB = (0.3, 0.8), (0.0, 0.0, 10.0, 20.0)
 
-#: The unambiguous velocity is at least this [m/s], so that the body's fits in it.
+#: The unambiguous velocity is at least this [m/s], so that the body's velocity is not folded.
 LEAST_SPAN_MPS = 22.0
 FASTEST_MPS, DWELL_S, MOST_PULSES = 20.0, 0.08, 6000
 
 
 @dataclass(frozen=True)
 class Found:
-    """One scene: errors of body [m/s] and tip speed [relative], with their deviations; NaN where nothing is given."""
+    """Errors in one scene: body velocity [m/s] and tip speed [relative], with deviations; NaN where none is given."""
 
     airframe: str
     body_mps: float
@@ -35,7 +36,7 @@ class Found:
 
 
 def drawn(rng: np.random.Generator, airframe: str, fastest_mps: float = FASTEST_MPS) -> tuple[Scene, float, float]:
-    """A scene with one UAV, its velocity [m/s] and the speed of its fastest tip along the line of sight [m/s]."""
+    """Draw a scene with one UAV, its velocity [m/s] and its fastest tip's speed along the line of sight [m/s]."""
     fields = AIRFRAMES[airframe].fields
     lowered_db, beta_deg, velocity_mps = rng.choice(LOWERED_DB), rng.uniform(0, 60), rng.uniform(-1, 1) * fastest_mps
     rotors = [
@@ -58,7 +59,7 @@ def drawn(rng: np.random.Generator, airframe: str, fastest_mps: float = FASTEST_
 
 
 def table(scenes: int, seed: int, fastest_mps: float) -> list[Found]:
-    """Measure so many scenes, the airframes in turn."""
+    """Measure a number of scenes, taking the airframes in turn."""
     out = []
     for number in range(scenes):
         rng = np.random.default_rng((seed, number))
@@ -80,7 +81,7 @@ def table(scenes: int, seed: int, fastest_mps: float) -> list[Found]:
 
 
 def row(name: str, found: list[Found]) -> str:
-    """One line of the table."""
+    """Give one line of the table."""
     fields = ("body_mps", "body_std_mps", "tip", "tip_std")
     body, body_std, tip, std = (np.array([getattr(f, field) for f in found]) for field in fields)
     given = np.isfinite(tip)

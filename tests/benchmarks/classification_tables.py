@@ -31,10 +31,10 @@ from .independent_scenes import KINDS as SCENES
 from .independent_table import received_scenes
 
 SURE_LIMITS = [(one, one) for one in (0.0, 0.6, 0.7, 0.8, 0.9, 0.95, 1.01)] + [(0.95, 0.85), (0.97, 0.85), (0.99, 0.9)]
-"""Probabilities of "uav" and of the others from which on the first model of a cascade is sure."""
+"""Thresholds on the probability of the winning class ("uav", the others) from which the first model counts as sure."""
 
 SHARED_FFTS = 6.0
-"""What the networks' inputs have in common, over the bare FFT: the spectrum, the levels, the cadence."""
+"""Cost of what the networks' inputs share (the spectrum, the levels, the cadence), over that of the bare FFT."""
 
 PAPER_RADAR = Radar(9.85e9, 25e3, 2048)
 SNR_EDGES_DB = np.arange(-20, 33, 2)
@@ -44,7 +44,7 @@ RECORDINGS = Path(__file__).parents[3] / "shared" / "recordings"
 def drawn(
     radars: list[Radar], count: int, kind: str | None = None, purpose: str = "bench"
 ) -> Iterator[tuple[np.ndarray, dict]]:
-    """Records and truth of each radar in turn, `count` in all."""
+    """Draw records and truth of each radar in turn, `count` in all (rounded up to equal numbers)."""
     for number, radar in enumerate(radars):
         each = -(-count // len(radars))
         records = draw_records(radar, each, 7, purpose=purpose, start=number * each, kind=kind)
@@ -54,7 +54,7 @@ def drawn(
 def scored(
     classifier: Classifier, radars: list[Radar], count: int, kind: str | None = None, purpose: str = "bench"
 ) -> dict[str, np.ndarray]:
-    """Probabilities of many records beside their truth."""
+    """Give the answers on many records together with their truth."""
     parts = []
     for radar, (iq, truth) in zip(radars, drawn(radars, count, kind, purpose), strict=True):
         given = classifier.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
@@ -64,13 +64,13 @@ def scored(
 
 
 def over(given: Prediction) -> np.ndarray:
-    """What tells a UAV from noise alone; of models that tell of no noise, the probability of "uav"."""
+    """Give the score that separates UAVs from noise alone; without a noise output it is the probability of "uav"."""
     uav = given.probabilities[..., 0]
     return np.where(np.isnan(given.noise), uav, uav / (uav + given.noise))
 
 
 def ideal(radar: Radar, count: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
-    """Records of a kind through a receiver without faults, nothing behind the target, and their SNRs [dB]."""
+    """Draw records of a kind through a receiver without faults, without a background, and their SNRs [dB]."""
     rng = np.random.default_rng([7, list(KIND_CLASS).index(kind)])
     parts, snrs = [], []
     for _ in range(0, count, 250):
@@ -114,7 +114,7 @@ def ideal_detection(classifier: Classifier, count: int) -> None:
 
 
 def any_radars(count: int, pulses: int) -> list[Radar]:
-    """Radars of the envelope with that many pulses in a dwell."""
+    """Draw radars of the envelope with the given number of pulses in a dwell."""
     return [replace(draw_radar(7, "bench", group), pulses=pulses) for group in range(count)]
 
 
@@ -165,12 +165,12 @@ def recordings(classifier: Classifier, _: int) -> None:
         print(f"{group:10s} " + ", ".join(f"{name} {n} ({n / counts.total():.1%})" for name, n in counts.items()))
 
 
-#: Ways to say "unknown": the model's own thresholds, or prediction sets of a coverage, named UAV at a false-alarm rate.
+#: Rules for saying "unknown": the model's own thresholds, or prediction sets of a coverage and a UAV false-alarm rate.
 RULES = ({}, {"coverage": 0.9, "max_false_alarm": 0.01}, {"coverage": 0.8, "max_false_alarm": 0.01})
 
 
 def rules(classifier: Classifier, count: int) -> None:
-    """What each way to say "unknown" makes of measured recordings and of scenes of a simulator that is not ours."""
+    """What each rule for saying "unknown" gives on measured recordings and on scenes of an independent simulator."""
     scenes = max(count // 600, 1)
     truth: list[str] = []
     given: dict[str, list[tuple[np.ndarray, int]]] = {}
@@ -208,21 +208,21 @@ TRACK_S, DWELL_S, OF_RADAR = 2.5, 0.08, 24
 
 
 def track_radars(count: int) -> Iterator[Radar]:
-    """Radars that can hold a decision: to 40 m/s and more; PRFs to 25 kHz, so that a track fits a few MB."""
+    """Draw radars for tracks: unambiguous to 40 m/s or more; PRFs up to 25 kHz, so that a track fits in a few MB."""
     rng = np.random.default_rng(7)
     for _ in range(count):
         yield track_radar(rng)
 
 
 def track_radar(rng: np.random.Generator) -> Radar:
-    """One of them, from the next two numbers."""
+    """Draw one such radar from the next two random numbers."""
     carrier_hz = 2e9 * (35 / 2) ** rng.random()
     prf_hz = min(4 * carrier_hz / 299_792_458 * 40 * (200 / 40) ** rng.random(), 25e3)
     return Radar(carrier_hz, prf_hz, round(TRACK_S * prf_hz))
 
 
 def drawn_tracks(count: int) -> Iterator[tuple[Radar, np.ndarray, dict]]:
-    """Samples and truth of each radar's tracks, balanced over the classes."""
+    """Draw samples and truth of each radar's tracks, balanced over the classes."""
     for number, radar in enumerate(track_radars(-(-count // OF_RADAR))):
         records = draw_records(radar, OF_RADAR, 7, purpose="bench", start=number * OF_RADAR)
         yield radar, records.iq, {"label": records.labels, **records.truth}
@@ -288,7 +288,7 @@ def tracks(classifier: Classifier, count: int) -> None:
     )
     print(f"{'':16s} {'n':>6s} {'best':>8s} " + " ".join(f"{name:>8s}" for name in (*CLASSES, "unknown")))
     groups = {kind: every["kind"] == kind for group in KINDS.values() for kind in group}
-    # a mover no faster than birds is, as one line, what a bird that glides is
+    # A mover no faster than birds shows one line, just as a gliding bird does: the two cannot be told apart.
     faster = np.abs(every["velocity_mps"]) > LAWS["bird_speed_mps"].high
     groups |= {"slow movers": groups["mover"] & ~faster, "fast movers": groups["mover"] & faster}
     for kind, rows in groups.items():
@@ -298,7 +298,7 @@ def tracks(classifier: Classifier, count: int) -> None:
 
 
 def coverage(classifier: Classifier, count: int) -> None:
-    """Prediction sets against the acceptance thresholds, fitted on records of their own."""
+    """Prediction sets, fitted on separate records, against the model's acceptance thresholds."""
     parts = []
     for purpose in ("calibrate", "bench"):
         radars = [draw_radar(7, purpose, group) for group in range(count // 24)]
@@ -326,7 +326,7 @@ def coverage(classifier: Classifier, count: int) -> None:
 
 
 def cascade(classifier: Classifier, count: int) -> None:
-    """Whether to ask the fastest model first and this one only where that is unsure: accuracy against cost."""
+    """Accuracy against cost if the fastest model answers first and this one only where the fastest is unsure."""
     account = shipped_account()
     names = (by_place("fast", account), classifier.metadata["name"])
     radars = [draw_radar(7, "bench", group) for group in range(count // 24)]
@@ -339,7 +339,7 @@ def cascade(classifier: Classifier, count: int) -> None:
         asked = first["p"].max(axis=1) < np.array([uav, others, others])[first["p"].argmax(axis=1)]
         p = np.where(asked[:, None], second["p"], first["p"])
         given = figures(p, truth, classifier.rules.accept(first["pulses"]), 0.01)
-        # at best the second pays nothing for what the first has made, and neither pays to part the records
+        # The best case: the second model reuses the inputs that the first has made, and splitting the batch is free.
         shared, anew = (cheap + asked.mean() * cost for cost in (dear - SHARED_FFTS, dear))
         print(
             f"{uav:4.2f} {others:6.2f} {asked.mean():6.2f} | {given['balanced_accuracy']:8.4f} "

@@ -1,4 +1,4 @@
-"""Benchmarks run on one thread and print their tables at the end."""
+"""Run benchmarks on one thread and print their tables at the end."""
 
 from collections.abc import Iterator
 

@@ -17,7 +17,7 @@ def main() -> None:
     choices = [name for name, rung in LADDER.items() if "image" not in rung.inputs]
     parser.add_argument("--model", choices=choices, default=MODEL)
     options = parser.parse_args()
-    settings = TrainingConfig(records=options.records, seed=3, epochs=8)  # eight networks are trained
+    settings = TrainingConfig(records=options.records, seed=3, epochs=8)  # few epochs: eight models are trained
     found = left_out(settings, options.model)
     print(
         f"{found['model']}, {found['train_records']} training records, {found['test_records']} test records; "

@@ -27,9 +27,9 @@ TABLE = Path(__file__).parents[2] / "classify" / "fusion.py"
 SEED, RADARS = 2024, 160
 LENGTHS = (1, 2, 5, 12, 31)
 WHOLE = 31  # dwells of a track
-AFTER = (2, 5, 10, 12, 20, WHOLE)  # dwells after which the probabilities are to be right
-RIDGE = 1e-4  # keeps a weight that nothing depends on where it began
-MIDDLE_HZ = 2e9 * (35 / 2) ** 0.5  # of the carriers drawn, on their logarithm
+AFTER = (2, 5, 10, 12, 20, WHOLE)  # numbers of dwells after which the fit scores the probabilities
+RIDGE = 1e-4  # pulls a value that the tracks do not determine to 0: a weight or odds of 1, a correlation of a half
+MIDDLE_HZ = 2e9 * (35 / 2) ** 0.5  # geometric middle of the carriers drawn
 
 Arrays = dict[str, np.ndarray]
 
@@ -40,7 +40,7 @@ def _classifier(model: str | None) -> Classifier:
 
 
 def seen(model: str | None, group: int) -> Arrays:
-    """The tracks of one radar as the decision sees them: rows are tracks."""
+    """Draw the tracks of one radar and compute what the decision reads of them, one row per track."""
     radar = track_radar(np.random.default_rng((SEED, group)))
     shown = {"carrier_hz": radar.carrier_hz, "prf_hz": radar.prf_hz}
     records = draw_records(radar, OF_RADAR, SEED, purpose="calibrate", start=group * OF_RADAR)
@@ -57,22 +57,22 @@ def seen(model: str | None, group: int) -> Arrays:
 
 
 def means(tracks: Arrays, after: int, length: int) -> np.ndarray:
-    """Mean log-probability of the looks of a length after so many dwells, shape (tracks, 3)."""
+    """Give the mean log-probability of the looks of `length` dwells within the first `after` dwells, (tracks, 3)."""
     return np.log(np.maximum(tracks[f"p{length}"][:, : after // length].astype(np.float64), 1e-6)).mean(axis=1)
 
 
 def nats_a_track(p: np.ndarray, labels: np.ndarray) -> float:
-    """Mean negative log probability of the true class."""
+    """Give the mean negative log probability of the true class [nat]."""
     return float(-np.log(np.maximum(p[np.arange(len(labels)), labels], np.finfo(float).tiny)).mean())
 
 
 class Model:
-    """The pieces that are fitted, in one vector: logarithms of weights and odds, and the correlation's logit.
+    """The fitted values in one vector: the correlation's logit, then the logarithms of weights and odds.
 
     Parameters
     ----------
     lengths
-        Looks that count; the weight of the first is 1.
+        Lengths of the looks that count [dwells]; the weight of the first is 1.
     numbers
         Names of what the whole track shows, keys of `ODDS`.
     """
@@ -82,13 +82,13 @@ class Model:
         self.values = np.array([1.0, *[1.0] * (len(lengths) - 1), *[1.0] * len(numbers)])
 
     def read(self, values: np.ndarray) -> tuple[float, dict[int, float], dict[str, float]]:
-        """Correlation, weights and odds."""
+        """Turn the vector into correlation, weights and odds."""
         cut = len(self.lengths)
         weights = dict(zip(self.lengths, [1.0, *np.exp(values[1:cut])], strict=True))
         return float(1 / (1 + np.exp(-values[0]))), weights, dict(zip(self.numbers, np.exp(values[cut:]), strict=True))
 
     def fit(self, tracks: Arrays) -> "Model":
-        """Choose the values of least nats a track, mean over the times in `AFTER`."""
+        """Choose the values with the fewest nats a track, averaged over the times in `AFTER`."""
         held = {after: {n: means(tracks, after, n) for n in self.lengths if n <= after} for after in AFTER}
         shown = {name: tracks[name] for name in self.numbers}
 
@@ -101,7 +101,7 @@ class Model:
         return self
 
     def probabilities(self, tracks: Arrays) -> np.ndarray:
-        """Of whole tracks, shape (tracks, 3)."""
+        """Give the probabilities of whole tracks, shape (tracks, 3)."""
         held = {length: means(tracks, WHOLE, length) for length in self.lengths}
         return fused(held, WHOLE, {name: tracks[name] for name in self.numbers}, *self.read(self.values))
 
@@ -114,7 +114,7 @@ def fused(
     weights: dict[int, float],
     odds: dict[str, float],
 ) -> np.ndarray:
-    """What `fuse` gives for tracks without silent dwells, all at once, shape (tracks, 3)."""
+    """Compute what `fuse` gives for tracks without silent dwells, all tracks at once, shape (tracks, 3)."""
     total = sum(weights[length] * mean for length, mean in held.items())
     evidence = total / sum(weights[length] for length in held) * (after / (1 + (after - 1) * correlation))
     if after == WHOLE:
@@ -125,7 +125,7 @@ def fused(
 
 
 def checked(tracks: Arrays) -> None:
-    """Compare `fused` with the product's own `fuse`, at the constants as they are."""
+    """Compare `fused` with the product's own `fuse`, at the product's present constants."""
     held = {length: means(tracks, WHOLE, length) for length in LOOKS}
     odds = {name: factor for name, (_, factor) in ODDS.items()}
     rule = partial(decide, accept=(0.5,) * len(CLASSES))  # the labels are not compared
@@ -138,12 +138,12 @@ def checked(tracks: Arrays) -> None:
 
 
 def cut(tracks: Arrays, rows: np.ndarray) -> Arrays:
-    """Some of the tracks."""
+    """Select some of the tracks."""
     return {name: values[rows] for name, values in tracks.items()}
 
 
 def gains(tracks: Arrays) -> None:
-    """Print what each piece brings, fitted on one half of the band and tested on the other."""
+    """Print the gain from each piece, fitted on one half of the band and tested on the other."""
     pieces = {
         "dwells of 80 ms": Model((1,), ()),
         "and of 5 dwells": Model((1, 5), ()),
@@ -171,7 +171,7 @@ def gains(tracks: Arrays) -> None:
 
 
 def written(model: Model, source: str, tracks: Arrays) -> str:
-    """The file `TABLE`."""
+    """Give the text of the file `TABLE`."""
     correlation, weights, odds = model.read(model.values)
     looks = ", ".join(f"{length}: {weight:.2f}" for length, weight in weights.items())
     table = ", ".join(f'"{name}": ("{whose}", {odds[name]:.1f})' for name, (whose, _) in ODDS.items())
@@ -194,7 +194,7 @@ as wings lift it, one that sways as a walker's does."""
 
 
 def main() -> None:
-    """Draw, fit, print what each piece brings, and write the table."""
+    """Draw tracks, fit, print the gain from each piece, and write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--model", help="a shipped model's name or a file")
     parser.add_argument("--radars", type=int, default=RADARS, help=f"radars of {OF_RADAR} tracks each")

@@ -8,8 +8,8 @@ from .independent_echo import Radar, Scene, across, echo, level, unit, white
 
 
 def process(rng: np.random.Generator, radar: Radar, density: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """A Gaussian process of this density over radial velocity [m/s], folded into the span, unit power."""
-    count = 4 * radar.pulses  # cut from a longer one, whose ends meet
+    """Draw a Gaussian process with a power density over radial velocity [m/s], folded into the span; unit power."""
+    count = 4 * radar.pulses  # the whole series is periodic, so only a quarter of it is kept
     span = radar.wavelength_m * radar.prf_hz / 2
     velocity = -np.fft.fftfreq(count) * span
     power = sum(density(velocity + fold * span) for fold in range(-3, 4))
@@ -18,7 +18,7 @@ def process(rng: np.random.Generator, radar: Radar, density: Callable[[np.ndarra
 
 
 def ground(rng: np.random.Generator, radar: Radar, wind_mph: float | None = None) -> Scene:
-    """Billingsley: a steady part and an exponential one (his a and b), wind 2 to 30 mph."""
+    """Make ground after Billingsley: a steady and an exponential part (his ratio and shape); wind 2 to 30 mph."""
     wind = rng.uniform(2, 30) if wind_mph is None else wind_mph
     ratio = 489.8 * wind**-1.55 * (radar.carrier_hz / 1e9) ** -1.21
     slope = 1 / (0.1048 * (np.log10(wind) + 0.4147))
@@ -28,14 +28,14 @@ def ground(rng: np.random.Generator, radar: Radar, wind_mph: float | None = None
 
 
 def rain(rng: np.random.Generator, radar: Radar) -> Scene:
-    """A Gaussian of 0.5 to 3 m/s about the wind's radial velocity."""
+    """Make rain: a Gaussian spectrum with a deviation of 0.5 to 3 m/s about the wind's radial velocity."""
     mean, width = rng.uniform(-12, 12), rng.uniform(0.5, 3)
     echoes = process(rng, radar, lambda v: np.exp(-((v - mean) ** 2) / (2 * width**2)))
     return Scene(np.zeros_like(echoes), echoes)
 
 
 def sea(rng: np.random.Generator, radar: Radar) -> Scene:
-    """Bragg lines, wind-driven and breaking waves, each of a K-distributed texture that hardly moves in a dwell."""
+    """Make Bragg lines, wind-driven and breaking waves, K-distributed: each has a gamma texture, fixed in a dwell."""
     bragg = np.sqrt(9.81 * radar.wavelength_m / (4 * np.pi)) + 0.1
     wind = rng.uniform(3, 15) * np.cos(rng.uniform(0, np.pi))
     shape = rng.uniform(0.3, 8)
@@ -54,7 +54,7 @@ def sea(rng: np.random.Generator, radar: Radar) -> Scene:
 
 
 def person(rng: np.random.Generator, radar: Radar) -> Scene:
-    """A walker: trunk and head, and limbs of two segments that swing (after Chen and Boulic, much simplified)."""
+    """Make a walker: trunk and head, and swinging limbs of two segments (after Chen and Boulic, much simplified)."""
     speed, height = rng.uniform(0.8, 2.0), rng.uniform(1.6, 1.9)
     heading, start = rng.uniform(0, 2 * np.pi), rng.uniform(20, 400)
     ahead = np.array([np.cos(heading), np.sin(heading), 0])
@@ -83,7 +83,7 @@ def person(rng: np.random.Generator, radar: Radar) -> Scene:
 
 
 def vehicle(rng: np.random.Generator, radar: Radar) -> Scene:
-    """A car: a rigid cloud of scatterers, and four wheels whose rims turn (0 to twice its speed)."""
+    """Make a car: a rigid cloud of scatterers, and four wheels whose rims move at 0 to twice its speed."""
     speed, gain = rng.uniform(3, 35), rng.uniform(-1.5, 1.5)
     heading, start = rng.uniform(0, 2 * np.pi), rng.uniform(30, 800)
     ahead = np.array([np.cos(heading), np.sin(heading), 0])
@@ -103,7 +103,7 @@ def vehicle(rng: np.random.Generator, radar: Radar) -> Scene:
 
 
 def wind_turbine(rng: np.random.Generator, radar: Radar, points: int = 150, law: str | None = None) -> Scene:
-    """A tower and three blades of 25 to 60 m; a "cloud" of points over the chord, or a row of "points"."""
+    """Make a tower and three blades of 25 to 60 m: each a "cloud" of points over the chord, or a row of "points"."""
     law = law or str(rng.choice(["cloud", "points"]))
     length, tip_mps = rng.uniform(25, 60), rng.uniform(40, 85)
     start = np.array([rng.uniform(800, 6000), 0, rng.uniform(20, 90)])
@@ -126,6 +126,6 @@ def wind_turbine(rng: np.random.Generator, radar: Radar, points: int = 150, law:
 
 
 def noise(rng: np.random.Generator, radar: Radar) -> Scene:
-    """Nothing but the receiver."""
+    """Make an empty cell: nothing but the receiver's noise."""
     silence = np.zeros(radar.pulses, np.complex64)
     return Scene(silence, silence)

@@ -1,7 +1,7 @@
 """Echoes of point scatterers with exact ranges, exp(-4j pi R / wavelength), and a receiver of white noise.
 
-The ground floor of the scenes in `independent_scenes`: it shares no line with `bladewing.simulate`. The radar stands at
-the origin, x points to the target, z up.
+The basis of the scenes in `independent_scenes`; it shares no code with `bladewing.simulate`. The radar is at the
+origin, x points to the target, z up.
 """
 
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class Radar:
 class Scene:
     """Echoes without noise: the body (all that moves as a whole) and the micro-motion (blades, wings, limbs, wheels).
 
-    A process without parts (ground, sea, rain) is all micro-motion; a glider and noise have none.
+    Echoes without separate parts (ground, sea, rain) are all micro-motion; a gliding bird and noise have none.
     """
 
     body: np.ndarray
@@ -44,7 +44,7 @@ class Scene:
 
 
 def phasor(range_m: np.ndarray, radar: Radar) -> np.ndarray:
-    """Two-way phase of a range, complex64."""
+    """Give the two-way phasor of a range, complex64."""
     cycles = range_m * (-2 / radar.wavelength_m)
     cycles -= np.rint(cycles)
     angle = (2 * np.pi * cycles).astype(np.float32)
@@ -55,24 +55,24 @@ def phasor(range_m: np.ndarray, radar: Radar) -> np.ndarray:
 
 
 def echo(place_m: np.ndarray, radar: Radar, amplitude: np.ndarray | float = 1.0) -> np.ndarray:
-    """Sum over scatterers at `place_m` (scatterers, pulses, 3), of amplitudes that fit (scatterers, pulses)."""
+    """Sum the echoes of scatterers at `place_m` (scatterers, pulses, 3); `amplitude` fits (scatterers, pulses)."""
     parts = phasor(np.sqrt(np.sum(place_m**2, axis=-1)), radar)
     return np.sum(parts * np.asarray(amplitude, np.float32), axis=0)
 
 
 def unit(vector: np.ndarray) -> np.ndarray:
-    """The direction of vectors along the last axis."""
+    """Scale vectors along the last axis to unit length."""
     return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
 
 
 def across(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two directions that stand on an axis and on each other."""
+    """Give two directions perpendicular to a unit axis and to each other."""
     first = unit(np.cross(axis, [0.31, 0.95, 0.05]))
     return first, np.cross(axis, first)
 
 
 def level(echoes: np.ndarray, power_db: float) -> np.ndarray:
-    """Bring a series to a mean power [dB]; silence stays silent."""
+    """Scale a series to a mean power [dB]; an all-zero series stays so."""
     power = np.mean(np.abs(echoes) ** 2)
     return echoes if power == 0 else echoes * np.sqrt(10 ** (power_db / 10) / power)
 
@@ -83,9 +83,9 @@ def white(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def noise_power(scene: Scene, snr_db: float, of: str) -> float:
-    """Noise power a sample: `snr_db` under the whole target ("total"), or under its micro-motion ("micro") if any.
+    """Give the noise power per sample, `snr_db` below the whole target ("total") or its micro-motion ("micro", if any).
 
-    Infinite: none, but for an empty cell.
+    An infinite `snr_db` means no noise. An empty cell has unit noise power at any `snr_db`.
     """
     whole = np.mean(np.abs(scene.body + scene.micro) ** 2)
     moving = np.mean(np.abs(scene.micro) ** 2)
@@ -94,13 +94,13 @@ def noise_power(scene: Scene, snr_db: float, of: str) -> float:
 
 
 def received(scene: Scene, power: float, rng: np.random.Generator) -> np.ndarray:
-    """The scene in white noise of this power a sample."""
+    """Give the scene in white noise of this power per sample."""
     samples = scene.body + scene.micro + np.sqrt(power) * white(rng, len(scene.body))
     return samples.astype(np.complex64)
 
 
 def visible(scene: Scene, power: float) -> bool:
-    """Whether a spectrum shows the micro-motion: four bins of it at 10 dB over the noise and not under the body's."""
+    """Whether a spectrum shows the micro-motion: in four bins it is 10 dB over the noise and not below the body."""
     window = np.blackman(len(scene.body))
     window /= np.sqrt(np.sum(window**2))
     body, micro = (np.abs(np.fft.fft(window * part)) ** 2 for part in (scene.body, scene.micro))

@@ -1,9 +1,10 @@
-"""Scenes from a simulator that shares no line with `bladewing.simulate`: point scatterers, exp(-4j pi R / wavelength).
+"""Scenes from a simulator that shares no code with `bladewing.simulate`: point scatterers, exp(-4j pi R / wavelength).
 
 It is written the way published micro-Doppler simulators are (Chen, *The Micro-Doppler Effect in Radar*, 2011: rotors of
 scatterers, bird and walker of ellipsoids; Billingsley, *Low-Angle Radar Land Clutter*, 2002): every scatterer has a
-place in metres at every pulse and its echo its two-way phase. Nothing is taken from the product, so a model that
-only knows the product's own drawings shows it here. Radar at the origin, x to the target, z up.
+position in metres at every pulse, and its echo has the two-way phase of the range. Nothing is taken from the product,
+so a model that only fits the product's own simulator fails here. The radar is at the origin, x points to the target,
+z up.
 """
 
 from collections.abc import Callable
@@ -28,7 +29,7 @@ def rotor(
     rate_hz: float,
     law: str,
 ) -> np.ndarray:
-    """Blades that turn about `axis` at `hub_m` (pulses, 3), exact ranges.
+    """Make the echo of blades that turn about `axis` at `hub_m` (pulses, 3), with exact ranges.
 
     The laws of the literature: a "line" of evenly reflecting elements a quarter wavelength apart (Martin and Mulgrew),
     a handful of "points", the "tip" alone, and a line of which one side of the disc reflects less ("asymmetric").
@@ -49,7 +50,7 @@ def rotor(
         angle = 2 * np.pi * rate_hz * radar.time_s + start + 2 * np.pi * blade / blades
         direction = np.cos(angle)[:, None] * first + np.sin(angle)[:, None] * second
         towards = np.sum(hub_m * direction, axis=-1)
-        gain = 1 - weaker * (0.5 + 0.5 * np.sin(angle))  # which side of the disc that is hangs on `start`'s zero
+        gain = 1 - weaker * (0.5 + 0.5 * np.sin(angle))  # the weaker side of the disc is that of `second`
         for part in np.array_split(along, max(1, len(along) // 64)):
             ranges = np.sqrt(hub_squared + part[:, None] ** 2 + 2 * part[:, None] * towards)
             out += gain.astype(np.float32) * phasor(ranges, radar).sum(axis=0)
@@ -57,7 +58,7 @@ def rotor(
 
 
 def flight(rng: np.random.Generator, radar: Radar, speed_mps: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """A straight track (pulses, 3) at an elevation of 2 to 25 degrees, and its heading."""
+    """Draw a straight track (pulses, 3) that starts at an elevation of 2 to 25 degrees; give it with its heading."""
     elevation, heading = np.deg2rad(rng.uniform(2, 25)), rng.uniform(0, 2 * np.pi)
     start = rng.uniform(100, 1500) * np.array([np.cos(elevation), 0, np.sin(elevation)])
     ahead = unit(np.array([np.cos(heading), np.sin(heading), rng.normal(0, 0.05)]))
@@ -65,7 +66,7 @@ def flight(rng: np.random.Generator, radar: Radar, speed_mps: tuple[float, float
 
 
 def tilted(rng: np.random.Generator, most_deg: float) -> np.ndarray:
-    """A rotor's axis: vertical but for a tilt."""
+    """Draw a rotor's axis: vertical except for a tilt of at most `most_deg`."""
     tilt, towards = np.deg2rad(rng.uniform(0, most_deg)), rng.uniform(0, 2 * np.pi)
     return np.array([np.sin(tilt) * np.cos(towards), np.sin(tilt) * np.sin(towards), np.cos(tilt)])
 
@@ -79,7 +80,7 @@ def multicopter(
     radius_m: tuple[float, float] = (0.10, 0.20),
     rate_hz: tuple[float, float] = (65, 120),
 ) -> Scene:
-    """Rotors on a ring, each at its own rate; all blades' power is 5 to 20 dB under the body's."""
+    """Make rotors on a ring, each at its own rate; the power of all blades is 5 to 20 dB below the body's."""
     law = law or str(rng.choice(BLADE_LAWS))
     hover = rng.uniform() < 0.3
     track, _ = flight(rng, radar, (0, 0.5) if hover else (2, 18))
@@ -99,13 +100,13 @@ def multicopter(
 
 
 def quadcopter_over_ground(rng: np.random.Generator, radar: Radar) -> Scene:
-    """A quadcopter with ground in its cell, 0 to 25 dB over its body."""
+    """Make a quadcopter with ground in its cell, 0 to 25 dB over its body."""
     scene = multicopter(rng, radar)
     return Scene(scene.body + level(clutter.ground(rng, radar).micro, rng.uniform(0, 25)), scene.micro)
 
 
 def helicopter(rng: np.random.Generator, radar: Radar) -> Scene:
-    """A model helicopter: main rotor of 0.35 to 0.8 m and a tail rotor 4 to 5.5 times as fast."""
+    """Make a model helicopter: a main rotor of 0.35 to 0.8 m radius and a tail rotor 4 to 5.5 times as fast."""
     law = str(rng.choice(BLADE_LAWS))
     track, ahead = flight(rng, radar, (0, 20))
     rate, radius = rng.uniform(20, 40), rng.uniform(0.35, 0.8)
@@ -127,7 +128,7 @@ def helicopter(rng: np.random.Generator, radar: Radar) -> Scene:
 
 
 def fixed_wing(rng: np.random.Generator, radar: Radar) -> Scene:
-    """One two-bladed propeller whose axis is the line of flight, seen at 20 to 160 degrees off the nose."""
+    """Make one two-bladed propeller whose axis is the line of flight, seen at 20 to 160 degrees off the nose."""
     law = str(rng.choice(BLADE_LAWS))
     track, _ = flight(rng, radar, (0, 0))
     off = np.deg2rad(rng.uniform(20, 160)) * rng.choice([-1, 1])
@@ -156,7 +157,7 @@ BIRDS = (
 
 
 def spheroid(length_m: float, radius_m: float, axis: np.ndarray, sight: np.ndarray) -> np.ndarray:
-    """Amplitude of a spheroid's echo seen along `sight` (Chen, RCS of an ellipsoid)."""
+    """Give the amplitude of a spheroid's echo seen along `sight` (Chen, RCS of an ellipsoid)."""
     cosine2 = np.sum(axis * sight, axis=-1) ** 2
     half = length_m / 2
     return np.sqrt(np.pi) * radius_m**2 * half / (radius_m**2 * (1 - cosine2) + half**2 * cosine2)
@@ -172,9 +173,10 @@ def bird(
     ahead: np.ndarray | None = None,
     speed_mps: float | None = None,
 ) -> Scene:
-    """An ellipsoid with two wings of two segments (JEES 2021: inner 40 cos + 15 deg, outer 30 cos + 40 deg, swept).
+    """Make an ellipsoid with two wings of two segments (JEES 2021: inner 40 cos + 15 deg, outer 30 cos + 40 deg).
 
-    The body heaves against the wings. Every segment is a row of four spheroids.
+    Here the outer segment is bent from the inner one by 30 cos - 10 deg, 0.6 rad ahead in phase, and swept by 20 sin
+    deg. The body heaves against the wings. Every segment is a row of four spheroids.
     """
     beat_hz, span = kind or BIRDS[rng.integers(len(BIRDS))]
     beat_hz, span = beat_hz * rng.uniform(0.85, 1.15), span * rng.uniform(0.85, 1.15)
@@ -208,7 +210,7 @@ def bird(
 
 
 def flock(rng: np.random.Generator, radar: Radar) -> Scene:
-    """3 to 20 birds of a kind, a few metres apart, at much the same velocity."""
+    """Make 3 to 20 birds of one kind, a few metres apart, at nearly the same velocity."""
     track, ahead = flight(rng, radar, (0, 0))
     kind, speed = BIRDS[rng.integers(len(BIRDS))], rng.uniform(8, 18)
     birds = [
@@ -241,9 +243,9 @@ KINDS: dict[str, tuple[str, Callable[[np.random.Generator, Radar], Scene]]] = {
     "vehicle": ("clutter", clutter.vehicle),
     "wind_turbine": ("clutter", clutter.wind_turbine),
     "noise": ("clutter", clutter.noise),
-    # no flash, and the power at the edges of the band
+    # Only the tips reflect: there is no flash, and the power lies at the edges of the band.
     "quad_of_tips": ("uav", partial(multicopter, law="tip")),
-    # for a while its lines are as even as a rotor's
+    # A turbine whose lines are for a while as evenly spaced as a rotor's.
     "turbine_of_points": ("clutter", partial(clutter.wind_turbine, points=40, law="points")),
 }
-"""What a kind should be called, and what makes one of it."""
+"""Kind to the class that it should be called, and the function that makes a scene of it."""

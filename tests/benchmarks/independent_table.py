@@ -33,7 +33,7 @@ Counts = dict[tuple[str, str, str, str, float], Counter[str]]
 def received_scenes(
     kinds: list[str], scenes: int, seed: int, noises: tuple[str, ...] = ("total", "micro")
 ) -> Iterator[tuple[tuple[str, Radar, str, float], np.ndarray, np.ndarray]]:
-    """Records by (kind, radar, what the SNR is of, SNR), shape (scenes, pulses), and what of each a spectrum shows."""
+    """Make records by (kind, radar, what the SNR is of, SNR), shape (scenes, pulses), and tell which are `visible`."""
     for kind in kinds:
         make = KINDS[kind][1]
         for place, radar in enumerate(RADARS):
@@ -47,7 +47,10 @@ def received_scenes(
 
 
 def counted(models: list[str], kinds: list[str], scenes: int, seed: int) -> Counts:
-    """Answers by (model, kind, radar, what the SNR is of, SNR); "seen" and "seen right" count what a spectrum shows."""
+    """Count answers by (model, kind, radar, what the SNR is of, SNR).
+
+    "seen" counts the records whose micro-motion is `visible`, "seen right" those of them that are answered right.
+    """
     classifiers = {name: Classifier.load(name) for name in models}
     counts: Counts = {}
     for (kind, radar, of, snr_db), iq, seen in received_scenes(kinds, scenes, seed):
@@ -60,7 +63,7 @@ def counted(models: list[str], kinds: list[str], scenes: int, seed: int) -> Coun
 
 
 def line(counts: list[Counter[str]], truth: str) -> str:
-    """Shares of the answers [%], what is seen, and of that what is right."""
+    """Write the shares of the answers, the share that is seen, and the share of the seen that is right [%]."""
     whole: Counter[str] = sum(counts, Counter())
     total = sum(whole[answer] for answer in ANSWERS)
     shares = " ".join(f"{100 * whole[answer] / total:7.0f}{'*' if answer == truth else ' '}" for answer in ANSWERS)

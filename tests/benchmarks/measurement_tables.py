@@ -37,20 +37,20 @@ TYPES = {
 
 
 def share(hits: np.ndarray) -> str:
-    """A share with its 95 % interval."""
+    """Write a share with its 95 % interval."""
     n, p, z2 = len(hits), float(np.mean(hits)), 3.8416
     middle, half = (p + z2 / 2 / n) / (1 + z2 / n), np.sqrt(z2 * (p * (1 - p) / n + z2 / 4 / n**2)) / (1 + z2 / n)
     return f"{p:.3f} [{max(middle - half, 0):.3f} {min(middle + half, 1):.3f}]"
 
 
 def variance(normalised: np.ndarray) -> str:
-    """Mean square of normalised errors with its 95 % interval."""
+    """Write the mean square of normalised errors with its 95 % interval."""
     n, value = len(normalised), float(np.mean(np.square(normalised)))
     return f"{value:.2f} [{n * value / chi2.ppf(0.975, n):.2f} {n * value / chi2.ppf(0.025, n):.2f}]"
 
 
 def chopping(draws: int) -> None:
-    """Chopping frequency against the Cramer-Rao bound; octave errors; truth of the stated deviations."""
+    """Chopping frequency against the Cramer-Rao bound, octave errors, and whether the stated deviations are true."""
     print(f"chopping, {draws} draws a row, rates 40-110 Hz, 2 blades of 15 cm, |v| < 30 m/s")
     print(
         " SNR  body ground | within 2 %           octave error          | RMSE/bound  normalised variance   v m/s  ms"
@@ -98,7 +98,7 @@ def chopping(draws: int) -> None:
 
 
 def bandwidth(draws: int) -> None:
-    """Bandwidth of the paper's six types by the edge fit and by the paper's rule, velocity, blade length."""
+    """Bandwidth of the paper's six types by the edge fit and by the paper's rule; their velocity and blade length."""
     print(f"bandwidth, {draws} draws a row, rates jittered by 1 %; errors are medians of |found / eq. 26 - 1|")
     print("type  SNR | found  edge fit %  bias %  normalised variance  rule 20 dB %  length %  95 % of |v| errors m/s")
     for number, (length_m, rpm, count, velocity_mps, beta_rad) in TYPES.items():
@@ -133,12 +133,12 @@ def bandwidth(draws: int) -> None:
             )
 
 
-#: Rotors of an airframe, the highest rate (the lowest is 3395) and how far apart they are at least [rpm].
+#: For each airframe its number of rotors, their highest rate (the lowest is 3395) and their least separation [rpm].
 AIRFRAMES_RPM = ((4, 3500, 20), (6, 3720, 15), (8, 3840, 18))
 
 
 def single_rotors(draws: int) -> None:
-    """Rates of four to eight rotors, and the smearing index of one against them."""
+    """Rates of four to eight rotors, and how well the smearing index separates them from one rotor."""
     print(f"single rotors, {draws} draws a row; AUC: of the smearing index, against one rotor's")
     print(f"rotors     SNR | {_TOLD_APART}    AUC")
     for (count, highest_rpm, least_rpm), snr_db in product(AIRFRAMES_RPM, (0, 10, 20, 30)):
@@ -151,7 +151,7 @@ def single_rotors(draws: int) -> None:
 
 
 def drifting(draws: int) -> None:
-    """One rotor whose rate changes within the dwell: told as one, its change, rate and tips."""
+    """One rotor whose rate changes within the dwell: whether reported as one; its change, rate and tip speed."""
     print(f"one rotor, 40 to 110 Hz, {draws} draws a row: over the dwell its rate changes by so much")
     print("change     SNR | one, resolved       | normalised variance: change  rate              | tips off by")
     tip = 2 * 0.15 * 2 * np.pi / records.WAVELENGTH_M
@@ -182,7 +182,7 @@ def drifting(draws: int) -> None:
 
 
 def changing(draws: int) -> None:
-    """Four rotors at least 20 rpm apart whose rates change, each in its own way: told apart, rates and deviations."""
+    """Four rotors at least 20 rpm apart, each rate with its own change: whether resolved; rates and deviations."""
     print(f"four rotors in 3395 to 3500 rpm, at least 20 rpm apart, {draws} draws a row: each changes by up to so much")
     print(f"change     SNR | {_TOLD_APART}")
     for change, snr_db in product((0.0, 0.003, 0.01, 0.02), (0, 10, 20)):
@@ -194,7 +194,7 @@ def changing(draws: int) -> None:
 
 
 def gains(draws: int) -> None:
-    """Rotors whose echo swells and falls over the dwell: counted, rates and deviations."""
+    """Rotors whose echo rises and falls over the dwell: whether counted rightly; rates and deviations."""
     print(f"rotors in 3395 to 3500 rpm, at least 20 rpm apart, seen through a gain over the dwell, {draws} draws a row")
     print(f"rotors  gain             SNR | {_TOLD_APART}")
     for count, (name, gain), snr_db in product((1, 4), records.GAINS.items(), (0, 10, 20)):
@@ -209,7 +209,7 @@ def _measured(
     rates_hz: Iterable[np.ndarray],
     drawn: Callable[[np.random.Generator], dict[str, Any]] = lambda _: {},
 ) -> Iterator[tuple[np.ndarray, Measurements, float]]:
-    """The rates of each record's rotors [Hz], with options drawn for it, what is measured of it and that time [ms]."""
+    """Make and measure a record of each set of rates [Hz], with options from `drawn`; the time taken is in [ms]."""
     for rates in rates_hz:
         options = {"snr_db": snr_db, "body_db": 20, "velocity_mps": rng.uniform(-30, 30), **drawn(rng)}
         iq = records.record(rng, rates, **options)
@@ -219,7 +219,7 @@ def _measured(
 
 
 def _hovering(rng: np.random.Generator, draws: int, count: int, highest_rpm: float = 3500, least_rpm: float = 20):
-    """Rates of so many rotors, 3395 rpm and more, so far apart at least [Hz], as often as asked for."""
+    """Draw `draws` sets of `count` rates [Hz] between 3395 rpm and `highest_rpm`, at least `least_rpm` apart."""
     return (records.apart(rng, count, least_rpm, 3395, highest_rpm) / 60 for _ in range(draws))
 
 
@@ -227,7 +227,7 @@ _TOLD_APART = "all of them, resolved  wrong | within 0.2 %           normalised 
 
 
 def _told_apart(measured: Iterable[tuple[np.ndarray, Measurements, float]]) -> str:
-    """How often the rotors of records are told apart, and how well."""
+    """Write how often all rotors of a record are resolved, how often wrongly, and how accurate their rates are."""
     told, wrong, near, off, took_ms = [], 0, [], [], []
     for rates_hz, found, own_ms in measured:
         count = len(rates_hz)
@@ -247,7 +247,7 @@ def _told_apart(measured: Iterable[tuple[np.ndarray, Measurements, float]]) -> s
 
 
 def near_rotors(draws: int) -> None:
-    """Two rotors nearer than the dwell tells apart: reported as unresolved, or as one rate, never as too many."""
+    """Two rotors closer than the dwell resolves: to be reported as unresolved or as one rate, never as too many."""
     print(f"two rotors so far apart, {draws} draws a row: rates given, resolved, median of the spread")
     for snr_db in (0, 10):
         for apart_rpm in (2, 4, 7, 10, 13, 16, 20):
@@ -266,7 +266,7 @@ def near_rotors(draws: int) -> None:
 
 
 def random_rotors(draws: int) -> None:
-    """Rotors of random rates within 3 %, nearer than the dwell tells apart or not: number right, or told unresolved."""
+    """Rotors of random rates within 3 %, resolvable or not: whether the number is right or reported as unresolved."""
     print(f"rotors of random rates within 3 %, {draws} draws a row: number right, told resolved, right or unresolved")
     for snr_db in (0, 10):
         for count in (1, 2, 4, 6, 8):
@@ -285,7 +285,7 @@ def random_rotors(draws: int) -> None:
 
 
 def helicopter_record(rng: np.random.Generator, snr_db: float, tail_db: float) -> tuple[np.ndarray, float, float]:
-    """A helicopter's record with the chopping frequencies of its rotors; the tail so many dB from the main rotor."""
+    """Make a helicopter's record, its tail rotor at `tail_db` from the main one, and both chopping frequencies [Hz]."""
     length_m, tip_mps = rng.uniform(0.3, 0.5), rng.uniform(60, 110)
     rate_hz, gear = max(tip_mps / (2 * np.pi * length_m), 23.0), rng.uniform(3.8, 6.2)
     tail_m = min(length_m * rng.uniform(0.12, 0.25), 120 / (2 * np.pi * rate_hz * gear))
@@ -297,7 +297,7 @@ def helicopter_record(rng: np.random.Generator, snr_db: float, tail_db: float) -
 
 
 def helicopters(draws: int) -> None:
-    """Both combs and the gear ratio of helicopters, and gears reported for airframes that have none."""
+    """Both combs and the gear ratio of helicopters, and false gear ratios of airframes without a gear."""
     print(f"helicopters, {draws} draws a row, main 60-110 m/s, gear 3.8-6.2; all three within 1 %")
     print(" SNR  tail dB | found  within 1 %  wrong | normalised variance: main  tail  ratio")
     for tail_db in (-8, -14):
@@ -345,7 +345,7 @@ def helicopters(draws: int) -> None:
 
 
 def receivers(draws: int) -> None:
-    """Tips of fixed wings as training draws them, through receivers of one fault each."""
+    """Tip speeds of fixed wings as training draws them, through receivers with one fault each."""
     print(f"tips through receivers of one fault, {draws} draws a row, fixed wings at 0 to 30 dB, chopping within 2 %")
     print("fault         tips | error %: 5th, 25th, median, 75th, 95th | median and share over 4 of error / deviation")
     for fault in ("none", *FAULT_CHANCE):
@@ -365,7 +365,7 @@ def receivers(draws: int) -> None:
 
 
 def _through(fault: str, draws: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fixed wings behind receivers of one fault, or none: samples, tips along the line of sight, chopping [Hz]."""
+    """Make fixed wings behind receivers of one fault, or none: samples, tip speeds in sight [m/s], chopping [Hz]."""
     rng, faults = np.random.default_rng(11), np.random.default_rng(12)
     radar = Radar(records.CARRIER_HZ, records.PRF_HZ, records.PULSES)
     cursor = Draws(rng.random((draws, WIDTH)))
@@ -383,7 +383,7 @@ def _normals(rng: np.random.Generator, rows: int, count: int) -> np.ndarray:
 
 
 def false_alarms(draws: int) -> None:
-    """Rotors reported where there is none."""
+    """Rotors reported in records that hold none."""
     print(f"false alarms, {draws} draws a row")
     scenes: dict[str, Callable[[np.random.Generator], np.ndarray]] = {
         "noise": lambda rng: records.white(rng, records.PULSES),
@@ -406,7 +406,7 @@ def false_alarms(draws: int) -> None:
 
 
 def joint(draws: int) -> None:
-    """Chopping and bandwidth of the spectrum against those of the STFT on the same records."""
+    """Chopping frequency and bandwidth from the spectrum against those from the STFT, on the same records."""
     print(f"spectrum against STFT, {draws} draws a row, one rotor, rates 40-110 Hz, 2 blades of 15 cm, |v| < 30 m/s")
     print("errors: median; right: within 2 %; band 13: the rule at 13 dB in place of the paper's 20; ms a record")
     print(" SNR  method          | right  chopping %  band %  band 13 %     ms   KiB")
@@ -446,7 +446,7 @@ def joint(draws: int) -> None:
 
 
 def recordings(_draws: int) -> None:
-    """What stands in the measured recordings, in dwells of 80 ms."""
+    """What `measure` finds in the measured recordings, in dwells of 80 ms."""
     print("recordings, dwells of 80 ms; medians of the dwells with a rotor")
     for path in sorted(RECORDINGS.glob("*.sigmf-meta")):
         recording = load_recording(path)

@@ -1,19 +1,19 @@
-"""Costs as ratios within one run: candidates take turns, process CPU time, medians over the rounds."""
+"""Costs as ratios within one run: candidates take turns; a cost is the median process CPU time over the rounds."""
 
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from statistics import median
 
-#: Where the tables go.
+#: Folder that the tables are written to.
 FOLDER = Path("build") / "bench"
 
-#: Lines that the run prints at its end.
+#: Lines of all tables, printed at the end of the run.
 PRINTED: list[str] = []
 
 
 def cpu_seconds(candidates: Mapping[str, Callable[[], object]], *, rounds: int = 9) -> dict[str, float]:
-    """Median CPU time of one call of each candidate [s]; the first round warms up and does not count."""
+    """Measure the median CPU time of one call of each candidate [s]; the first round warms up and does not count."""
     spent: dict[str, list[float]] = {name: [] for name in candidates}
     for number in range(rounds + 1):
         for name, call in candidates.items():
@@ -25,7 +25,7 @@ def cpu_seconds(candidates: Mapping[str, Callable[[], object]], *, rounds: int =
 
 
 def repeated(call: Callable[[], object], times: int) -> Callable[[], None]:
-    """What calls so many times: a single call may be too short for the clock."""
+    """Make a function that calls `call` a number of times: one call alone may be too short for the clock."""
 
     def calls() -> None:
         for _ in range(times):

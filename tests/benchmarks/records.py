@@ -1,4 +1,4 @@
-"""Records that the tables of measurements are made of: 3000 pulses at 35 kHz and 9.85 GHz, rates off the bin."""
+"""Simulated records for the tables of measurements: 3000 pulses at 35 kHz and 9.85 GHz; rates are not bin-centred."""
 
 import numpy as np
 from bladewing.simulate import RotorMotion, rotor_echo
@@ -9,10 +9,10 @@ RADAR = {"carrier_hz": CARRIER_HZ, "prf_hz": PRF_HZ}
 WAVELENGTH_M = 299_792_458.0 / CARRIER_HZ
 TIMES_S = np.arange(PULSES) / PRF_HZ
 
-_AWAY = np.linspace(-1, 1, PULSES)  # from the middle of the dwell
+_AWAY = np.linspace(-1, 1, PULSES)  # time from the middle of the dwell, in half dwells
 
-#: Gains over the dwell of a target's echo, of power 1 on average: a beam that sweeps past, whose middle may lie
-#: elsewhere, a range cell that is entered and left, two paths that fade.
+#: Amplitude gains of a target's echo over the dwell, of mean power 1: a beam that sweeps past (in "beam, late" its
+#: maximum comes after the middle), a range cell that is entered and left, and fading between two paths.
 GAINS = {
     name: gain / np.sqrt(np.mean(gain**2))
     for name, gain in {
@@ -26,17 +26,17 @@ GAINS = {
 
 
 def white(rng: np.random.Generator, *shape: int) -> np.ndarray:
-    """Complex noise of unit power a sample."""
+    """Draw complex noise of unit power per sample."""
     return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) * np.sqrt(0.5)
 
 
 def moving_at(velocity_mps: float, times_s: np.ndarray = TIMES_S, wavelength_m: float = WAVELENGTH_M) -> np.ndarray:
-    """Echo of unit amplitude of what moves away at a velocity."""
+    """Give the unit-amplitude echo of a point that moves away at a velocity."""
     return np.exp(-4j * np.pi * velocity_mps * times_s / wavelength_m)
 
 
 def apart(rng: np.random.Generator, count: int, least: float, low: float, high: float) -> np.ndarray:
-    """Rates of chance within a range, rising, each at least so far from the next, any unit."""
+    """Draw rising rates within [low, high], neighbours at least `least` apart (any unit)."""
     while True:
         rates = np.sort(rng.uniform(low, high, count))
         if np.diff(rates).min(initial=np.inf) >= least:
@@ -52,10 +52,10 @@ def rotors(
     strengths: ArrayLike = 1.0,
     change: ArrayLike = 0.0,
 ) -> np.ndarray:
-    """Blades of rotors of random phases, unit power a sample together, equal ones or of some strengths.
+    """Make the blades' echo of rotors with random phases, of unit power per sample together.
 
-    Over the dwell their rates change evenly by a share of themselves, all alike or each by its own; those given are the
-    middle's.
+    `strengths` are the rotors' amplitudes. Over the dwell each rate changes linearly by the relative `change`, the same
+    for all or one for each rotor; `rates_hz` are the rates in the middle of the dwell.
     """
     echo = np.zeros(PULSES, complex)
     each = (np.broadcast_to(values, np.shape(rates_hz)) for values in (strengths, change))
@@ -69,7 +69,7 @@ def rotors(
 
 
 def ground(rng: np.random.Generator, per_mps: float = 5.5) -> np.ndarray:
-    """A static return and a skirt about it that falls as exp(-per_mps |v|), half the unit power each."""
+    """Make a static return and a skirt around it that falls as exp(-per_mps |v|), each with a power of one half."""
     speed = np.abs(np.fft.fftfreq(PULSES, 1 / PRF_HZ)) * WAVELENGTH_M / 2
     skirt = np.fft.ifft(np.fft.fft(white(rng, PULSES)) * np.exp(-per_mps * speed / 2))
     return (1 + skirt / np.sqrt(np.mean(np.abs(skirt) ** 2))) * np.sqrt(0.5)
@@ -87,9 +87,9 @@ def record(
     gain: ArrayLike = 1.0,
     **rotor: ArrayLike,
 ) -> np.ndarray:
-    """One record: blades at `snr_db` over the noise, body and ground so many dB over the blades; or a tail rotor.
+    """Make one record: blades at `snr_db` over the noise, body and ground at their levels [dB] over the blades.
 
-    The gain over the dwell is that of target and ground, not of the noise.
+    `tail` adds the blades of a tail rotor. The gain over the dwell applies to target and ground, not to the noise.
     """
     amplitude = 10 ** (snr_db / 20)
     blades = rotors(rng, rates_hz, **rotor)
@@ -104,7 +104,7 @@ def record(
 
 
 def bound_hz(echo: np.ndarray, chopping_hz: float, snr_db: float) -> float:
-    """Cramer-Rao bound of the chopping frequency, body frequency unknown [Hz]; `echo` has unit power."""
+    """Give the Cramer-Rao bound of the chopping frequency [Hz], body frequency unknown; `echo` has unit power."""
     order = np.arange(-int(PRF_HZ / 2 / chopping_hz), int(PRF_HZ / 2 / chopping_hz) + 1)
     lines = np.exp(-2j * np.pi * np.outer(order * chopping_hz, TIMES_S)) @ echo / PULSES
     power = np.abs(lines) ** 2 * 10 ** (snr_db / 10)

@@ -1,4 +1,4 @@
-"""What model inputs and whole answers cost, in units of what no spectrum can do without: one FFT of the dwell."""
+"""What model inputs and whole answers cost, in units of one FFT of the dwell, the least that a spectrum costs."""
 
 from collections.abc import Callable
 from functools import partial
@@ -25,12 +25,12 @@ INPUTS = {
     "joint features": ("joint_features",),
     "image": ("image",),
 }
-#: Most that an answer of the cheapest model may cost [FFTs].
+#: Batch size to the largest cost of an answer of the cheapest model [FFTs]; a goal in the table, not tested.
 GOALS = {1: 20, 64: 15}
 
 
 def costs(iq, candidates: dict[str, Callable[[], object]], title: str) -> None:
-    """Write a table of the candidates' cost a record beside one complex64 FFT of it."""
+    """Write a table of the candidates' cost per record over that of one complex64 FFT of the record."""
     records = len(iq)
     repeats = 200 // records + 1
     timed = {name: repeated(call, repeats) for name, call in candidates.items()}
@@ -46,7 +46,7 @@ def test_model_inputs_against_one_fft(records):
     iq = draw_records(RADAR, records, 0, purpose="bench").iq
     candidates = {title: partial(model_inputs, iq, **AXES, names=names) for title, names in INPUTS.items()}
     together = model_inputs(iq, **AXES, names={name for names in INPUTS.values() for name in names})
-    for made in candidates.values():  # what is cheaper alone is the same alone
+    for made in candidates.values():  # inputs made alone must equal those made together
         for name, rows in made().items():
             np.testing.assert_array_equal(rows, together[name])
     costs(iq, candidates, f"Features of {records}: batches of {records} x 2048 pulses")

@@ -1,4 +1,4 @@
-"""What the dwells of a long recording take on all processors, beside what they take in one process."""
+"""Time to measure the dwells of a long recording on all processors, compared with one process."""
 
 import time
 from dataclasses import fields

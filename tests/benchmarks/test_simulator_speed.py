@@ -1,8 +1,9 @@
-"""What a simulated record costs, in units of the drawing of its own noise.
+"""What a simulated record costs, in units of the cost of drawing its noise.
 
-A quadcopter record is what a user renders: four two-blade rotors of their own rates, phases and places, a body on its
-path, and complex noise; 256 records of 2048 pulses at X band. "Plain" are the paper's blades: equal, uniform, turning
-evenly. "Full" adds unequal blades, unlike edges, a root, drift and wander of the rates, acceleration and vibration.
+A quadcopter record is what a user renders: four two-blade rotors with rates, phases and places of their own, a body on
+its path, and complex noise; 256 records of 2048 pulses at X band. "Plain" means the paper's blades: equal, uniform, at
+constant rates. "Full" adds unequal blades, unlike edges, a root, drift and wander of the rates, acceleration and
+vibration.
 """
 
 import tracemalloc
@@ -39,7 +40,7 @@ def quadcopters(records: int, *, full: bool, rotors: int = 4) -> list[Rotor]:
 
 
 def draw_noise(generators: list[Generator], iq: np.ndarray) -> None:
-    """Complex noise of unit power, each record from its own stream."""
+    """Draw complex noise of unit power, each record from its own random stream."""
     parts = iq.view(np.float32)
     for generator, row in zip(generators, parts, strict=True):
         generator.standard_normal(dtype=np.float32, out=row)
@@ -92,7 +93,7 @@ def test_a_quadcopter_record_against_its_noise():
 
 
 def point_scatterers(rotors: list[Rotor], record: int, points: int) -> np.ndarray:
-    """The paper's sum, one record: each blade a row of points, phases in float64."""
+    """Compute the paper's sum for one record: each blade is a row of points, with phases in float64."""
     out = np.zeros(RADAR.pulses, complex)
     for rotor in rotors:
         values = [np.atleast_1d(x) for x in (rotor.motion.rotation_hz, rotor.motion.phase_rad, rotor.hub)]
@@ -158,5 +159,5 @@ def test_memory_beside_the_output_is_flat():
     spent = {records: beside_mib(records) for records in (64, 256, 1024)}
     rows = [(str(records), f"{mib:.0f}") for records, mib in spent.items()]
     table("Memory of draw_records: beside its output", ("records of 2048 pulses", "MiB"), rows)
-    # one chunk holds 256 of these records; beyond it only the truth's columns grow
+    # One chunk holds 256 of these records; with more records only the columns of the truth grow.
     assert spent[1024] < 1.2 * spent[256]

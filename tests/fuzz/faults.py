@@ -1,9 +1,10 @@
-"""Faults while results are written: killed, no room, read-only, two at once, a clock that goes back.
+"""Faults while results are written: killed, disk full, read-only, two processes at once, a clock that goes back.
 
     python -m tests.fuzz.faults [--kills 50] [--seed 0] [--only train] [--out faults.json]
 
-Every run works on a folder that holds an older result. Half of the kills fall at a random moment of the run, half
-within milliseconds of the first file that it writes. Afterwards the old or the new result must be whole.
+Half of the kills fall at a random moment of the run, half within milliseconds of the first file that it writes.
+Training and report run on a folder with an older result: afterwards the old or the new result must be complete. A data
+set is resumed until it is done.
 """
 
 import argparse
@@ -24,7 +25,7 @@ import numpy as np
 from bladewing.classify.files import settle
 from bladewing.classify.report.page import draw_page
 
-#: The commands at their smallest. A pool needs a script to start from, so each is one.
+#: The commands at their smallest size. Each is a script of its own, because a process pool needs one to start from.
 TRAIN = """
 import sys
 from pathlib import Path
@@ -67,7 +68,7 @@ if __name__ == "__main__":
 
 
 class Bench:
-    """A folder for scripts and results, and what came of them."""
+    """A folder with the scripts and their results, and the trials that run in it."""
 
     def __init__(self, place: Path, kills: int, rng: np.random.Generator) -> None:
         self.place, self.kills, self.rng = place, kills, rng
@@ -75,12 +76,12 @@ class Bench:
             (place / f"{name}.py").write_text(code)
 
     def start(self, name: str, out: Path, seed: int = 0, **options: object) -> subprocess.Popen:
-        """Start a command on a folder."""
+        """Start one of the scripts on a folder."""
         command = [sys.executable, str(self.place / f"{name}.py"), str(out), str(seed)]
         return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True, **options)  # type: ignore[call-overload]
 
     def whole(self, name: str, out: Path, seed: int = 0) -> float:
-        """Run to the end; the seconds it took."""
+        """Run a script to its end; give the seconds it took."""
         started = time.monotonic()
         process = self.start(name, out, seed)
         _, said = process.communicate()
@@ -89,7 +90,7 @@ class Bench:
         return time.monotonic() - started
 
     def kill(self, name: str, out: Path, takes_s: float, seed: int = 0, *, writing: bool) -> bool:
-        """Start, and kill at random or as it writes; False where it was done before."""
+        """Start a script and kill it at a random moment or as it writes; False if it had finished before."""
         before = {path.name for path in out.iterdir()}
         process = self.start(name, out, seed)
         if writing:
@@ -104,7 +105,7 @@ class Bench:
         return process.returncode == -signal.SIGKILL
 
     def train(self) -> dict[str, int]:
-        """Models and their account must be of one training."""
+        """Kill trainings: models and ``train.json`` must stem from the same training."""
         out = self.place / "trained"
         takes = self.whole("train", out, 0)
         models = {0: content(out, "*.onnx")}
@@ -119,7 +120,7 @@ class Bench:
         return self.killed("train", out, takes, lost)
 
     def report(self) -> dict[str, int]:
-        """The page must be the one that is drawn from the numbers beside it."""
+        """Kill reports: the page must be the one that is drawn from the ``report.json`` beside it."""
         out = self.place / "reported"
         shipped = Path(__file__).parents[2] / "models" / "pretrained" / "spectrum-cnn-fast.onnx"
         (self.place / "reported-models").mkdir()
@@ -133,7 +134,7 @@ class Bench:
         return self.killed("report", out, takes, lost)
 
     def killed(self, name: str, out: Path, takes_s: float, lost: Callable[[], bool]) -> dict[str, int]:
-        """Kill again and again; nothing may be lost, and what stays of it all is nothing but the results."""
+        """Kill again and again: no result may be lost, and no temporary file may stay in the end."""
         killed = losses = runs = 0
         while killed < self.kills:
             killed += self.kill(name, out, takes_s, runs % 2, writing=runs % 2 == 1)
@@ -144,7 +145,7 @@ class Bench:
         return {"kills": killed, "runs": runs, "lost": losses + lost(), "litter": litter}
 
     def dataset(self) -> dict[str, int]:
-        """Killed and resumed until it is done, a data set is to the byte one that nothing interrupted."""
+        """Kill and resume a data set until it is done: it must equal an uninterrupted one byte for byte."""
         takes = self.whole("dataset", self.place / "reference")
         reference = content(self.place / "reference", "*")
         killed = losses = sets = runs = 0
@@ -161,7 +162,7 @@ class Bench:
         return {"kills": killed, "runs": runs, "data_sets": sets, "lost": losses}
 
     def disk(self) -> dict[str, int]:
-        """No room, by a limit on the size of files and by a small disk, and a disk that may only be read."""
+        """Write without room (a limit on file sizes, a small disk) and to a read-only disk."""
         faults = losses = wrong = 0
         for name, pattern in (("train", "*.onnx"), ("dataset", "*")):
             out = _made(self.place / f"full-{name}")
@@ -198,7 +199,7 @@ class Bench:
         return {"faults": faults, "lost": losses, "wrong": wrong}
 
     def pairs(self) -> dict[str, int]:
-        """Two at once in one place: one after the other, or one of them refused; never a mixture."""
+        """Run two at once in one folder: they follow one another or one is refused; the results are never mixed."""
         models = {}
         for seed in (0, 1):
             self.whole("train", self.place / f"pair-{seed}", seed)
@@ -220,7 +221,7 @@ class Bench:
         return {"pairs": 7, "refused": refused, "lost": losses}
 
     def clock(self) -> dict[str, int]:
-        """A clock that goes back: older results from the future, and a clock that runs backwards meanwhile."""
+        """Turn the clock back: older results carry dates in the future, and the clock runs backwards during the run."""
         out = self.place / "clock"
         self.whole("dataset", self.place / "clock-reference")
         self.whole("train", self.place / "clock-train-reference", 1)
@@ -253,12 +254,12 @@ def _limit_files(size: int) -> None:
 
 
 def content(folder: Path, pattern: str) -> dict[str, bytes]:
-    """Names and contents of a folder's files."""
+    """Give names and contents of a folder's files."""
     return {path.name: path.read_bytes() for path in sorted(folder.glob(pattern)) if path.is_file()}
 
 
 def main() -> int:
-    """Run, print a line a fault, write the counts; 1 where anything was lost."""
+    """Run the trials, print a line for each, write the counts; 1 if anything was lost."""
     arguments = argparse.ArgumentParser()
     arguments.add_argument("--kills", type=int, default=50)
     arguments.add_argument("--seed", type=int, default=0)

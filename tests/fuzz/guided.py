@@ -1,9 +1,9 @@
-"""Files grown towards code they have not reached yet, for every reader: atheris, where it is installed.
+"""Coverage-guided fuzzing of every reader with atheris, where it is installed.
 
     python -m tests.fuzz.guided [--inputs 10000] [--seed 1] [--reader NAME]
 
-Our own code is instrumented; the real files of `readers` are what the inputs grow from. A reader runs in a process of
-its own, and what makes it crash, hang or refuse wrongly is kept as crash-... in this folder.
+Only bladewing's code is instrumented. The inputs grow from the real files of `readers`. Each reader runs in a process
+of its own. An input that makes it crash, hang or refuse wrongly is kept as crash-... in the current folder.
 """
 
 import argparse
@@ -17,7 +17,7 @@ _LONGEST = 1 << 16
 
 
 def grow(name: str, inputs: int, seed: int) -> None:
-    """Try so many inputs on one reader; ends the process, with 0 where nothing went wrong."""
+    """Try a number of inputs on one reader; ends the process, with exit code 0 if nothing went wrong."""
     import atheris
 
     with atheris.instrument_imports(include=["bladewing"]):
@@ -43,7 +43,7 @@ def grow(name: str, inputs: int, seed: int) -> None:
 
 
 def main() -> int:
-    """Print a line a reader; 1 where anything went wrong."""
+    """Print a line per reader; 1 if anything went wrong."""
     arguments = argparse.ArgumentParser()
     arguments.add_argument("--inputs", type=int, default=10_000)
     arguments.add_argument("--seed", type=int, default=1)

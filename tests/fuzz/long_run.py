@@ -1,9 +1,9 @@
-"""Mutated real files for every reader, by the ten thousand: counts of crashes, hangs and wrong refusals.
+"""Ten thousand mutated real files for every reader: counts of crashes, hangs and wrong refusals.
 
     python -m tests.fuzz.long_run [--inputs 10000] [--seed 0] [--reader NAME] [--out fuzz.json]
 
-Each thousand runs in a process of its own under a limit of memory, so that a crash of C code is seen, with the input
-that made it.
+Each thousand runs in a process of its own with limited memory. A crash in C code is thus noticed, and the input that
+caused it is kept.
 """
 
 import argparse
@@ -27,9 +27,9 @@ _BATCH = 1000
 
 
 def work(name: str, seed: int, first: int, count: int, place: str, answer: Any) -> None:
-    """Try inputs first..first + count; the answer goes through a pipe, the input under way lies in a file."""
+    """Try `count` inputs from number `first` on; counts go through a pipe, the current input is kept in a file."""
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
-    warnings.simplefilter("error")  # a warning from inside a library is wrong too
+    warnings.simplefilter("error")  # a warning from inside a library counts as a fault too
     folder = Path(place) / f"{name}-{first}"
     folder.mkdir(parents=True)
     reader = readers(folder / "seeds")[name]
@@ -51,7 +51,7 @@ def work(name: str, seed: int, first: int, count: int, place: str, answer: Any) 
 
 
 def main() -> int:
-    """Run, print a line a reader, write the counts; 1 where anything went wrong."""
+    """Run, print a line per reader, write the counts; 1 if anything went wrong."""
     arguments = argparse.ArgumentParser()
     arguments.add_argument("--inputs", type=int, default=10_000)
     arguments.add_argument("--seed", type=int, default=0)

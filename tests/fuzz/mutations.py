@@ -1,4 +1,4 @@
-"""Break guards one at a time in a copy of the tree; for each, a test must go red.
+"""Break guards one at a time in a copy of the source tree; for each, a test must fail.
 
 python -m tests.fuzz.mutations
 """
@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 
 
 class Mutation(NamedTuple):
-    """A guard: where it stands, what it becomes, and the tests that must notice."""
+    """A guard: its file, its code, the code that replaces it, and the tests that must fail then."""
 
     guard: str
     file: str
@@ -143,7 +143,7 @@ MUTATIONS = (
 
 
 def copy_tree(place: Path) -> None:
-    """Copy what git tracks, so that nothing of the checkout changes."""
+    """Copy the files that git tracks, so that the checkout itself stays unchanged."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout
     for name in listed.decode().split("\0"):
         if name and (ROOT / name).is_file():
@@ -154,14 +154,14 @@ def copy_tree(place: Path) -> None:
 
 
 def run_tests(place: Path, tests: str) -> int:
-    """Exit code of the tests in the copy, with the copy's own package."""
+    """Run tests in the copy, with the copy's own package, and give pytest's exit code."""
     environment = os.environ | {"PYTHONPATH": str(place / "build" / "ns"), "PYTHONDONTWRITEBYTECODE": "1", "CI": "1"}
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests.split()]
     return subprocess.run(command, cwd=place, env=environment, capture_output=True).returncode
 
 
 def main() -> int:
-    """Break each guard, print a line for each; 1 where a test stayed green, or was red before."""
+    """Break each guard and print a line for each; 1 if a test still passed, or had failed before."""
     failed = 0
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
@@ -177,7 +177,7 @@ def main() -> int:
             path.write_text(text.replace(mutation.old, mutation.new))
             after = run_tests(place, mutation.tests)
             path.write_text(text)
-            # 1: tests failed; below 0 or 3: the process died with them. 4 and 5: no test was found.
+            # pytest's exit codes: 1: tests failed; below 0 or 3: pytest itself died; 4 and 5: no test was found.
             good = before == 0 and after not in (0, 4, 5)
             failed += not good
             print(f"{'red' if good else 'NOT NOTICED'}  {mutation.guard}  ({before} -> {after})", flush=True)

@@ -12,25 +12,25 @@ from pathlib import Path
 import numpy as np
 from bladewing.classify import Classifier
 
-#: Growth of the process that may come of the allocator, once it has warmed up [MB].
+#: Allowed growth of the process's memory after the first tenth, which the allocator may cause [MB].
 FLAT_MB = 20
 
 
 def resident_mb() -> float:
-    """Memory that this process holds now [MB]."""
+    """Give the resident memory of this process now [MB]."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * 4096 / 1e6
 
 
 def main() -> int:
-    """Run and print what memory did; 1 where it grew."""
+    """Run and print the memory held; 1 if it grew by more than `FLAT_MB`."""
     arguments = argparse.ArgumentParser()
     arguments.add_argument("--predictions", type=int, default=1_000_000)
     arguments.add_argument("--batch", type=int, default=64)
     given = arguments.parse_args()
     rng = np.random.default_rng(0)
     classifier = Classifier.load()
-    # lengths and radars change, so that what is kept of each (windows, axes) is tried too
+    # Lengths and radars change, so that the caches for each (windows, axes) are tried too.
     shapes = [(pulses, prf_hz) for pulses in (256, 300, 509, 512) for prf_hz in (20e3, 25e3, 30e3)]
     pools = {n: rng.normal(size=(given.batch, n, 2)).astype(np.float32).view(np.complex64)[..., 0] for n, _ in shapes}
     done, started, first, seen = 0, time.perf_counter(), 0.0, []

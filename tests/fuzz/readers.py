@@ -1,4 +1,4 @@
-"""Real files of every kind that is read, mutations of them, and the readers that must take or refuse each."""
+"""Real files of every kind that is read, mutations of them, and the readers that must accept or refuse each."""
 
 import contextlib
 import io
@@ -26,7 +26,7 @@ from bladewing.simulate.scene import Scene, SceneError
 #: Longest that a reader may take over one small file [s]; machines are shared.
 HANG_S = 20
 
-#: Longest line that a refusal may be; a file's own words may stand in it.
+#: Longest line of a refusal [characters]; it may quote text from the file.
 LONGEST_LINE = 6000
 
 
@@ -37,9 +37,9 @@ class Reader:
     Parameters
     ----------
     seeds
-        Real contents.
+        Contents of real files.
     read
-        Puts a content into a folder and reads it; raises BadInput or SceneError where it is refused.
+        Writes a content into a folder and reads it; raises BadInput or SceneError if the content is refused.
     """
 
     seeds: tuple[bytes, ...] = field(repr=False)
@@ -52,7 +52,7 @@ class Hang(BaseException):
 
 @contextlib.contextmanager
 def time_limit(seconds: int = HANG_S) -> Iterator[None]:
-    """Raise `Hang` in the main thread after so many seconds."""
+    """Raise `Hang` in the main thread after the given number of seconds."""
 
     def ring(*_: object) -> None:
         raise Hang
@@ -67,14 +67,14 @@ def time_limit(seconds: int = HANG_S) -> Iterator[None]:
 
 
 def verdict(reader: Reader, content: bytes, folder: Path) -> str:
-    """Read one content: "read", "refused", "hang", or what went wrong."""
+    """Read one content and return "read", "refused", "hang", or what went wrong."""
     try:
         with time_limit():
             reader.read(content, folder)
     except (BadInput, SceneError) as refusal:
         problems = refusal.problems if isinstance(refusal, SceneError) else [str(refusal)]
         text = max(problems, key=len)
-        # the command line escapes what a scene's own words hold
+        # Line breaks in a SceneError are allowed: the command line escapes text quoted from a scene.
         if isinstance(refusal, BadInput) and "\n" in text:
             return f"several lines: {text[:200]!r}"
         return "refused" if len(text) <= LONGEST_LINE else f"a line of {len(text)} characters: {text[:200]!r}"
@@ -93,12 +93,12 @@ _WORDS = (
 
 
 def mutate(seeds: tuple[bytes, ...], rng: np.random.Generator) -> bytes:
-    """A seed after some changes, of the kinds that break readers: bits, numbers, words, cuts, repeats, splices."""
+    """Change a seed at random in ways that break readers: bits, numbers, words, cuts, repeats, splices."""
     content = bytearray(seeds[rng.integers(len(seeds))])
     for _ in range(int(rng.integers(1, 8))):
         if not content:
             break
-        # most of what decides stands at the two ends
+        # Headers and directories, which matter most, lie at the two ends of a file.
         edge = min(len(content), 400)
         at = int(rng.integers(edge) if rng.random() < 0.5 else rng.integers(len(content)))
         at = len(content) - 1 - at if rng.random() < 0.2 else at
@@ -125,7 +125,7 @@ def mutate(seeds: tuple[bytes, ...], rng: np.random.Generator) -> bytes:
 
 
 def readers(place: Path) -> dict[str, Reader]:
-    """Every reader with its seeds, made in a folder."""
+    """Give every reader with its seeds, which are made in a folder."""
     place.mkdir(parents=True, exist_ok=True)
     return {
         "npy": Reader(_npy_seeds(), _recording("x.npy")),
@@ -183,7 +183,7 @@ def _metadata(**changes: object) -> bytes:
     return json.dumps({"global": general, "captures": [capture], "annotations": [note]}).encode()
 
 
-#: Between the metadata and the samples of a pair, so that one mutation may touch both.
+#: Separates the metadata and the samples of a SigMF pair in one content, so that one mutation may change both.
 _SEAM = b"\x00--seam--\x00"
 
 
@@ -198,7 +198,7 @@ def _archive_seeds() -> tuple[bytes, ...]:
 
 
 def _packed(members: dict[str, bytes]) -> tuple[bytes, ...]:
-    """An archive of each kind, with a letter before it that says which."""
+    """Make an archive of each kind, preceded by a letter that tells the kind."""
     seeds = []
     for mode, kind in (("w:", b"T"), ("w:gz", b"G"), ("w:xz", b"X")):
         file = io.BytesIO()
@@ -227,7 +227,7 @@ def _model_seeds() -> tuple[bytes, ...]:
 
 
 def _dataset_seeds(place: Path) -> tuple[bytes, ...]:
-    """The manifest, and each file of a shard, with a letter before it that says which it is."""
+    """Make a data set; give its manifest and each file of a shard, preceded by a digit that tells which file it is."""
     plan = data_sets.DataSetPlan(1, dict.fromkeys(data_sets.PURPOSES, 6))
     data_sets.write_dataset(place, plan, Progress(visible=False), workers=1)
     names = (data_sets.MANIFEST, "train-00000.iq.npy", "train-00000.table.npy")
@@ -250,7 +250,7 @@ def _read_sigmf_pair(content: bytes, folder: Path) -> object:
 
 
 def _read_npz(content: bytes, folder: Path) -> object:
-    if not content.startswith(b"PK"):  # what stands in the archive, so that its checksum does not end the trial
+    if not content.startswith(b"PK"):  # an array: packed after its mutation, or the archive's checksum would refuse it
         file = io.BytesIO()
         with zipfile.ZipFile(file, "w") as archive:
             archive.writestr("iq.npy", content)
@@ -259,7 +259,7 @@ def _read_npz(content: bytes, folder: Path) -> object:
 
 
 def _read_sigmf_archive(content: bytes, folder: Path) -> object:
-    if _SEAM in content:  # what stands in the archive
+    if _SEAM in content:  # a pair: packed after its mutation
         meta, _, data = content.partition(_SEAM)
         content = _packed({"x/x.sigmf-meta": meta, "x/x.sigmf-data": data})[len(content) % 4]
     suffix = {b"G": ".gz", b"X": ".xz", b"Z": ".zip"}.get(content[:1], "")
@@ -282,7 +282,7 @@ def _read_toml(content: bytes, folder: Path) -> object:
 
 def _read_model(content: bytes, folder: Path) -> object:
     path = folder / "x.onnx"
-    # half of them are sealed again, as a forger would, so that what stands behind the seal is tried too
+    # Half of them are sealed again, as a forger would do, so that the checks behind the seal are tried too.
     if len(content) % 2:
         with contextlib.suppress(ValueError):
             content = resealed(content)
@@ -291,7 +291,7 @@ def _read_model(content: bytes, folder: Path) -> object:
 
 
 def resealed(content: bytes) -> bytes:
-    """A model with a seal that fits."""
+    """Give a model a seal that fits its content."""
     with contextlib.suppress(ValueError):
         return seal(content.replace(verify(content).encode(), PLACEHOLDER.encode()))
     at = content.find(b"bladewing_sha256")
@@ -310,7 +310,7 @@ def _read_dataset(content: bytes, folder: Path, place: Path) -> object:
     originals = [(place / "data set" / name).read_bytes() for name in names]
     which, body = min(max(content[0] - 48, 0), 2) if content else 0, content[1:]
     files = dict(zip(names, originals, strict=True)) | {names[which]: body}
-    if which and len(body) % 2:  # the digest fits, as a forger would see to
+    if which and len(body) % 2:  # make the digest fit, as a forger would do
         field = ("iq_sha256", "table_sha256")[which - 1]
         manifest = json.loads(originals[0])
         manifest["shards"]["train-00000"][field] = hashlib.sha256(body).hexdigest()
@@ -322,7 +322,7 @@ def _read_dataset(content: bytes, folder: Path, place: Path) -> object:
 
 
 def tar_with(name: bytes, size: int, kind: bytes = b"0") -> bytes:
-    """A tar of one member that says whatever one likes, without its content."""
+    """Make a tar of one member whose header claims any name, size and kind; the member has no content."""
     header = bytearray(512)
     header[: len(name)] = name
     header[100:108] = b"0000644\0"
@@ -335,6 +335,6 @@ def tar_with(name: bytes, size: int, kind: bytes = b"0") -> bytes:
 
 
 def npy_claiming(shape: str, descr: str = "'<c8'", body: bytes = b"") -> bytes:
-    """An .npy whose header says whatever one likes."""
+    """Make an .npy whose header claims any shape and type."""
     header = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}\n".encode("latin-1")
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + body

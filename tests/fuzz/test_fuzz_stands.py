@@ -1,4 +1,4 @@
-"""What `make fuzz` breaks, kills and starts still stands: it takes an hour, too seldom run to notice that it rots."""
+"""Quick checks that `make fuzz` still works: it takes an hour and runs too seldom for its own faults to be noticed."""
 
 from pathlib import Path
 
