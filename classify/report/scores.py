@@ -208,7 +208,8 @@ def _by_beta(
         return []
     slices = []
     beta_deg = np.rad2deg(beta_rad)
-    for low, high in pairwise(np.arange(0.0, np.nanmax(beta_deg) + BETA_STEP_DEG, BETA_STEP_DEG)):
+    count = int(np.nanmax(beta_deg) // BETA_STEP_DEG) + 1  # the largest may lie on an edge
+    for low, high in pairwise(BETA_STEP_DEG * np.arange(count + 1.0)):
         inside = (beta_deg >= low) & (beta_deg < high)
         rates = {"answered": metrics.rate(right[inside]), "found": metrics.rate(probability[inside] > threshold)}
         slices.append({"from": float(low), "to": float(high), **rates})

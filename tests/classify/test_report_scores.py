@@ -77,6 +77,14 @@ def test_a_dwell_on_an_edge_falls_into_one_slice(dwell_s: float) -> None:
     assert slices[0]["from"] == dwell_s
 
 
+@pytest.mark.parametrize("beta_deg", [0.0, 30.0, 80.0, 75.0])
+def test_an_angle_on_the_last_edge_falls_into_a_slice_too(beta_deg: float) -> None:
+    truth, answers = drawn(90)
+    beta_rad = np.where(truth.label == 0, np.deg2rad(beta_deg), np.nan)
+    slices = score(Truth(**{**vars(truth), "beta_rad": beta_rad}), answers)["by_beta"]
+    assert sum(one["answered"]["count"] for one in slices) == np.sum(answers.answered & (truth.label == 0))
+
+
 def test_every_kind_is_called_something_and_declined_answers_are_counted() -> None:
     truth, answers = drawn()
     found, seen = score(truth, answers), answers.answered

@@ -259,7 +259,7 @@ def content(folder: Path, pattern: str) -> dict[str, bytes]:
 
 
 def main() -> int:
-    """Run the trials, print a line for each, write the counts; 1 if anything was lost."""
+    """Run the trials, print a line for each, write the counts; 1 if anything was lost, wrong or left lying."""
     arguments = argparse.ArgumentParser()
     arguments.add_argument("--kills", type=int, default=50)
     arguments.add_argument("--seed", type=int, default=0)
@@ -274,7 +274,7 @@ def main() -> int:
         print(name, json.dumps(counts[name]), flush=True)
     if given.out:
         given.out.write_text(json.dumps(counts, indent=1) + "\n")
-    return int(any(one["lost"] for one in counts.values()))
+    return int(any(one.get(fault) for one in counts.values() for fault in ("lost", "wrong", "litter")))
 
 
 if __name__ == "__main__":

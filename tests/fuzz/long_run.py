@@ -79,8 +79,12 @@ def main() -> int:
                     process.join()
                     total["crash"] += 1
                     kept = Path(f"crash-{name.replace(' ', '-')}-{first}")
-                    kept.write_bytes((Path(place) / f"{name}-{first}" / "under way").read_bytes())
-                    found.append((first, f"died with {process.exitcode}, its input is in {kept}"))
+                    under_way = Path(place) / f"{name}-{first}" / "under way"
+                    held = under_way.is_file()  # else it died before its first input
+                    if held:
+                        kept.write_bytes(under_way.read_bytes())
+                    where = f", its input is in {kept}" if held else " before its first input"
+                    found.append((first, f"died with {process.exitcode}{where}"))
                 process.join()
             counts[name] = {**total, "slowest_s": round(slowest, 2), "peak_mb": peak // 1024, "found": found[:20]}
             print(name, json.dumps({k: v for k, v in counts[name].items() if k != "found"}), flush=True)
