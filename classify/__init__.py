@@ -1,6 +1,6 @@
 """Recordings, inference, training, report and the command line: composes simulate, features and models.
 
-Importing this package loads nothing heavy; what it offers is fetched when it is first asked for.
+Importing this package loads nothing heavy; each of its public names is imported on first use.
 """
 
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""The program `bladewing`, and `python -m bladewing.classify`: Ctrl-C is heard while what it needs is still loading."""
+"""The program `bladewing`, and `python -m bladewing.classify`: Ctrl-C is handled also while modules are loading."""
 
 import signal
 import sys
@@ -6,8 +6,8 @@ import threading
 
 
 def main() -> int:
-    """Run the command line; give its exit code."""
-    # who ends it otherwise (`timeout`, a service) gets the same tidy end, workers and all
+    """Run the command line; return its exit code."""
+    # SIGTERM (from `timeout`, a service) ends the program as tidily as Ctrl-C, workers included
     ours = threading.current_thread() is threading.main_thread()
     if ours and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
         signal.signal(signal.SIGTERM, signal.default_int_handler)

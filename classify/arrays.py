@@ -23,7 +23,7 @@ ARRAY_SUFFIXES = (".npy", ".npz", ".mat")
 _ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, NotImplementedError, RuntimeError, ValueError)
 
 
-# What numpy raises for a damaged .npy: an old header is Python text, so that the tokeniser's errors come too.
+# What numpy raises for a damaged .npy; an old header is Python text, so errors of the tokeniser are among them.
 _NPY_ERRORS = (
     ValueError,
     EOFError,
@@ -37,11 +37,11 @@ _NPY_ERRORS = (
     TokenError,
 )
 
-# Version of the format to what reads its header, and in how many bytes that header's length stands.
+# Version of the .npy format to the function that reads its header, and the bytes that hold the header's length.
 _HEADERS = {(1, 0): (np.lib.format.read_array_header_1_0, 2), (2, 0): (np.lib.format.read_array_header_2_0, 4)}
 _MOST_HEADER_BYTES = 10_000
 
-# What the two parts of complex samples are called.
+# Names of two arrays that hold I and Q.
 _PARTS = (("i", "q"), ("re", "im"), ("real", "imag"), ("inphase", "quadrature"))
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -87,7 +87,7 @@ def read_array(path: Path, variable: str | None = None) -> NDArray[np.generic]:
                 return _parse_npy(file, str(path), path.stat().st_size)
         arrays = _read_npz(path, variable) if suffix == ".npz" else _read_mat(path, variable)
     except OSError as error:
-        if error.errno is None:  # not the system's: the readers' word for a file that ends too early
+        if error.errno is None:  # not from the system: readers raise it for a file that ends too early
             raise BadInput(_damaged(path, error)) from None
         raise unreadable(path, error) from None
     return _choose(arrays, variable, path)
@@ -108,13 +108,13 @@ def _parse_npy(file: IO[bytes], name: str, size: int) -> NDArray[np.generic]:
 
 
 def _require_whole(file: IO[bytes], name: str, size: int) -> None:
-    """Refuse a header that speaks of more than the file holds, before any room is made for it."""
+    """Refuse a header that claims more data than the file holds, before memory is allocated for it."""
     magic = file.read(len(np.lib.format.MAGIC_PREFIX))
     if magic != np.lib.format.MAGIC_PREFIX:
         raise BadInput(f"{name}: not an .npy file, whatever its name says: save the samples with numpy.save")
     file.seek(0)
     version = np.lib.format.read_magic(file)
-    if version == (3, 0):  # for names of fields, which samples have none of
+    if version == (3, 0):  # only for names of fields, which samples do not have
         raise BadInput(f"{name}: version 3.0 of the .npy format: save the samples with numpy.save, which writes 1.0")
     if version not in _HEADERS:
         raise ValueError(f"version {version} of the format")
@@ -163,12 +163,12 @@ def _read_mat(path: Path, variable: str | None) -> dict[str, NDArray[np.generic]
     try:
         with open(path, "rb") as file:
             head = file.read(len(_HDF5))
-        if head == _HDF5:  # without the head that MATLAB writes before it
+        if head == _HDF5:  # HDF5 without the header that MATLAB writes before it
             raise _hdf5(path)
         if _mat_version(path, head) == 1:
             require_sound(path)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about variables that are of no concern here
+            warnings.simplefilter("ignore")  # about variables that are not read here
             kinds = {name: kind for name, _, kind in scipy.io.whosmat(path, appendmat=False)}
             numeric = [name for name, kind in kinds.items() if kind.startswith(("double", "single", "int", "uint"))]
             if variable in kinds and variable not in numeric:
@@ -209,7 +209,7 @@ def _choose(arrays: Mapping[str, NDArray[np.generic]], variable: str | None, pat
         if variable not in arrays:
             raise BadInput(f"{path}: no variable {variable!r}: it holds {_listed(arrays)}")
         return arrays[variable]
-    if len(arrays) == 1:  # what ails it, if it is not complex, is told as that of a .npy file is
+    if len(arrays) == 1:  # if it is not complex, later checks say so, as for a .npy file
         return next(iter(arrays.values()))
     candidates = [name for name, array in arrays.items() if array.dtype.kind == "c"]
     if len(candidates) == 1:

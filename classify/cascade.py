@@ -1,4 +1,4 @@
-"""Two trained models at work, the better one asked where the fast one is not sure."""
+"""A cascade of two trained models: the better one is asked where the fast one is not sure."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -13,21 +13,21 @@ from .ladder import CASCADE, STAGES_KEY, shipped_account
 from .model_file import read_model
 
 SURE = (0.95, 0.85, 0.85)
-"""Probability of each class (uav, bird, clutter) from which on the fast model's answer stands. On records of the whole
-envelope the cascade is then as accurate as the better model, finds as many UAVs and names as few others so, and asks it
-about three of five; with 0.9 for all it names a tenth more birds and clutter UAV, since a false drone of either counts
-(the table "cascade" of tests/benchmarks/classification_tables.py)."""
+"""Least probability of each class (uav, bird, clutter) at which the fast model's answer stands. On records of the whole
+envelope the cascade is then as accurate as the better model, finds as many UAVs, names as few others UAV, and asks the
+better model about three of five records. With 0.9 for all classes it names a tenth more birds and clutter UAV, since a
+false drone of either model counts (the table "cascade" of tests/benchmarks/classification_tables.py)."""
 
 
 class Cascade(Classifier):
     """A fast model and a better one behind it, asked where the first is not sure; it answers like any classifier.
 
-    What both read is computed once. A record that the fast model is sure of costs what the fast model costs, so clear
-    returns, most of what a radar near its targets sees, are answered at a third of the better model's price.
+    Inputs that both models read are computed once. A record of which the fast model is sure costs what the fast model
+    costs, so clear returns, most of what a radar near its targets sees, cost a third of the better model's time.
 
-    Where the first gives a class a probability of `SURE` or more, its probabilities are the answer's; elsewhere
-    those of the second, by whose thresholds labels are given. `metadata`, `accept` and the detection of the operating
-    point are the second's; `inputs` are those of both.
+    Where the first model gives a class a probability that reaches `SURE` and the acceptance thresholds of both models,
+    its probabilities are the answer; elsewhere the second model's are. Labels go by the second model's thresholds.
+    `metadata`, `accept` and the detection of the operating point are the second's; `inputs` are those of both.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Cascade(Classifier):
         CPU threads that one call may use.
     max_false_alarm
         Largest share of birds and clutter that may be named UAV. Each model gets half of it, so that both together keep
-        to it whatever they have in common.
+        to it, however their errors are correlated.
 
     Raises
     ------
@@ -86,7 +86,7 @@ class Cascade(Classifier):
     def sure(
         self, probabilities: NDArray[np.float32], pulses: int | NDArray[np.integer] | None = None
     ) -> NDArray[np.bool_]:
-        """Where the first model's answer stands: from `SURE` on, and where either would name it.
+        """Where the first model's answer stands: a class reaches `SURE` and the acceptance thresholds of both models.
 
         Parameters
         ----------
@@ -103,10 +103,10 @@ class Cascade(Classifier):
         limits = np.array(SURE)
         for model in (self.first, self):
             limits = np.maximum(limits, model.accept if pulses is None else model.rules.accept(pulses))
-        return np.asarray((probabilities >= limits).any(axis=1))  # above a half it is the likeliest class
+        return np.asarray((probabilities >= limits).any(axis=1))  # above 0.5 it is the likeliest class
 
     def _judged(self, records: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> list[NDArray[np.float32]]:
-        """What is told of a bounded number of records, in one or more pieces."""
+        """Answer rows of a bounded number of records, in one or more pieces."""
         out = []
         for dwells in dwells_of(records, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs):
             told = self.first._answer(dwells.inputs(self.first.inputs))

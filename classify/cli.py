@@ -30,20 +30,20 @@ Seed = Annotated[int | None, typer.Option(metavar="S", min=0, help="Root of all 
 
 
 def _path(given: str | Path) -> Path:
-    """A path as it was given; an empty one, as of a shell's empty variable, would be the current folder."""
+    """A path as it was given; an empty one (a shell's empty variable) is refused, as it would be the current folder."""
     if given == "":
         raise typer.BadParameter("it is empty: give a name")
     return Path(given)
 
 
 def _path_option(metavar: str, what: str, **more: Any) -> Any:
-    """An option that is a path; whether it can be read says who reads it, better than typer does."""
+    """An option that is a path. Its reader checks that it can be read, not typer: the reader's errors are clearer."""
     return typer.Option(metavar=metavar, parser=_path, help=what, **more)
 
 
 Config = Annotated[Path | None, _path_option("FILE.toml", "Settings; the options given here come first.")]
 
-# What every command over recordings takes.
+# Arguments and options of every command over recordings.
 Recordings = Annotated[
     list[Path],
     typer.Argument(
@@ -140,7 +140,7 @@ def predict(
         if value is not None:
             positive(value, option)
     classifier = Classifier.load(model, budget_us=budget_us, max_false_alarm=max_false_alarm, coverage=coverage)
-    if budget_us is not None:  # it follows from a timing of this moment
+    if budget_us is not None:  # the choice depends on a timing made just now
         complain(
             f"the budget of {budget_us:g} us buys the model {classifier.name} now: name it for the same answers again",
             kind="note",
@@ -359,13 +359,13 @@ def simulate(
     said = [plan.explain() if plan else "full fidelity: nothing is left out"] if explain else []
     try:
         if out is not None:
-            parts = len(found.uavs) + len(found.birds) + len(found.clutters) + 1  # and the receiver
+            parts = len(found.uavs) + len(found.birds) + len(found.clutters) + 1  # the receiver is one more
             with Progress(visible=True, passing=True) as bars, bars.phase("render", parts) as on_part:
                 rendering = render(found, seed, plan=plan, on_part=on_part)
-            for warning in rendering.warnings[len(told) :]:  # what shows as it is drawn
+            for warning in rendering.warnings[len(told) :]:  # those found only while rendering
                 complain(f"{scene}: {warning}", kind="warning")
             said += [str(path) for path in write_rendering(out, rendering, found, seed)]
-    finally:  # whoever reads the first line alone has the recording as well
+    finally:  # printed last: who reads only the first line and closes the pipe has the recording too
         if said:
             print("\n".join(said), flush=True)
 
@@ -414,7 +414,7 @@ def _print_each(results: Iterable[Any], show: Callable[[Any], None], *, as_json:
 
 @contextmanager
 def _goes_on(kept: Path) -> Iterator[None]:
-    """Around a long run whose finished parts lie in a folder: stopped by Ctrl-C, it says how to go on."""
+    """Context of a long run whose finished parts lie in a folder: if Ctrl-C stops it, the error says how to go on."""
     try:
         yield
     except KeyboardInterrupt:

@@ -38,7 +38,7 @@ PURPOSES = ("train", "validate", "calibrate", "test")
 
 _FORMAT = 1
 _MANIFEST_BYTES = 64 << 20
-_MOST = 10_000_000  # records of a set, and a bound on what a manifest can ask for
+_MOST = 10_000_000  # most records of a set; it bounds what a manifest can ask for
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class DataSetPlan:
 
 
 class DataSet:
-    """A data set on the disk, complete, ready to be read. What it says of itself is checked when it is opened.
+    """A data set on the disk, complete, ready to be read. Its manifest is checked when it is opened.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class DataSet:
     plan : DataSetPlan
         What it holds.
     simulator_sha256 : str
-        `simulator_digest` of who wrote it.
+        `simulator_digest` of the simulator that wrote it.
 
     Raises
     ------
@@ -137,7 +137,7 @@ def run_dataset(
     out : Path
         Folder of the data set; made if it is missing, else empty or begun by the same command.
     records, seed, config
-        See `training_config`; fields that do not concern the records are left to the training.
+        See `training_config`; fields that do not concern the records have no effect.
     progress : bool
         Show progress on stderr.
 
@@ -160,7 +160,7 @@ def run_dataset(
 
 
 def write_dataset(folder: Path, plan: DataSetPlan, bars: Progress, *, workers: int | None = None) -> int:
-    """Write what is missing of a data set; give the number of shards that were.
+    """Write the missing shards of a data set; return their number.
 
     Parameters
     ----------
@@ -197,15 +197,15 @@ def _draw(folder: Path, seed: int, shard: Shard) -> Contents:
 
 @contextmanager
 def _writable(folder: Path) -> Iterator[None]:
-    """Have a folder to oneself; faults of the disk become errors of one line."""
+    """Context in which no other process writes to a folder; errors of the disk become errors of one line."""
     with no_empty_folder(folder) as made:
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            settle(folder)  # another command's files, decided and not yet renamed, are no litter
+            settle(folder)  # does another command's pending renames: its files are no litter
             with only_writer(folder, wait=False):
                 yield
         except BlockingIOError:
-            made.clear()  # one that began at this very moment has nothing in it yet
+            made.clear()  # keep it: a process that has just begun may have written nothing yet
             cure = "let it finish, or give another folder"
             raise BadInput(f"{folder}: another process is writing there: {cure}") from None
         except OSError as error:
@@ -217,7 +217,7 @@ def _writable(folder: Path) -> Iterator[None]:
 def _begun(folder: Path, plan: DataSetPlan, bars: Progress) -> dict[str, Contents]:
     """The shards that an earlier run left whole."""
     manifest = _read_manifest(folder)
-    mixture: BadInput | None = None  # shards of two simulators are no data set; what is whole may be of another
+    mixture: BadInput | None = None  # shards of two simulators must not mix; a complete set may be another's
     if manifest is None:
         if any(not path.name.startswith(".bladewing-") for path in folder.iterdir()):
             raise BadInput(f"{folder}: not empty, and it holds no {MANIFEST}: give a new folder")
@@ -263,7 +263,7 @@ def _require_room(folder: Path, plan: DataSetPlan, missing: list[Shard]) -> None
 
 @lru_cache(maxsize=1)
 def simulator_digest() -> str:
-    """Digest of a few records of every kind: another simulator, or arithmetic of other rounding, gives another."""
+    """Digest of a few records of every kind; it changes with the simulator and with the rounding of the machine."""
     digest = hashlib.sha256()
     for kind in KIND_CLASS:
         digest.update(draw_records(Radar(10e9, 20e3, 64), 4, 0, purpose="bench", kind=kind).iq.astype("<c8").tobytes())

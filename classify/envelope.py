@@ -12,39 +12,39 @@ from .errors import BadInput
 from .samples import positive
 
 _ROUNDING = 1e-9  # relative: 0.005 s x 25 kHz must be 125 pulses, whatever the last bit says
-_ADC_HZ = 1e6  # no radar repeats its pulses faster: what samples so fast is a converter, within each of them
+_ADC_HZ = 1e6  # no radar repeats its pulses faster: such a rate is a converter's, which samples within each pulse
 
 
 def exchanged(carrier_hz: float, prf_hz: float) -> str:
-    """What is said of a carrier that is below the PRF."""
+    """Error text for a carrier and a PRF that seem to be exchanged."""
     return f"carrier {carrier_hz:g} Hz and PRF {prf_hz:g} Hz stand in each other's place: exchange them"
 
 
 def in_kilohertz(prf_hz: float) -> str:
-    """The cure of a PRF that seems to be given in kilohertz; empty where it does not."""
+    """The cure for a PRF that seems to be given in kilohertz; empty for any other."""
     low, high = Envelope.prf_min_hz, Envelope.prf_max_hz
     return f"give {prf_hz:g} kHz as {prf_hz:g}e3" if low <= prf_hz * 1e3 <= high and prf_hz < low else ""
 
 
 def require_hertz(name: str, carrier_hz: float, prf_hz: float) -> None:
-    """Refuse a recording whose carrier or PRF is no radar's; one that has them exchanged is never made.
+    """Refuse a recording whose carrier or PRF is no radar's (`Recording` itself refuses exchanged ones).
 
     Raises
     ------
     BadInput
-        One is.
+        One of them is out of the range of radars.
     """
     if beyond := beyond_radars(carrier_hz, prf_hz):
         raise BadInput(f"{name}: {beyond}: give 9.85 GHz as 9.85e9 and 20 kHz as 20e3")
 
 
 def refuse_exchanged(name: str, carrier_hz: float, prf_hz: float) -> None:
-    """Refuse a recording whose carrier and PRF are a radar's if exchanged, and only then.
+    """Refuse a recording whose carrier and PRF are a radar's only if exchanged.
 
     Raises
     ------
     BadInput
-        They are.
+        They are exchanged.
     """
     if beyond_radars(carrier_hz, prf_hz) and not beyond_radars(prf_hz, carrier_hz):
         raise BadInput(f"{name}: {exchanged(carrier_hz, prf_hz)}")
@@ -52,7 +52,7 @@ def refuse_exchanged(name: str, carrier_hz: float, prf_hz: float) -> None:
 
 @dataclass(frozen=True)
 class Envelope:
-    """The limits within which a model was trained; all of them count as inside.
+    """The limits within which a model was trained; each limit itself counts as inside.
 
     Attributes
     ----------
@@ -184,7 +184,7 @@ class Envelope:
         return f"take {needed} pulses, {_up(needed / prf_hz)} s, or more (dwell = pulses / PRF)"
 
     def _shorten(self, prf_hz: float) -> str:
-        # of whole pulses: a dwell in seconds is rounded to them, and must not be rounded up beyond
+        # in whole pulses: a dwell in seconds is rounded to them and must not be rounded up past the limit
         longest = min(self.pulses_max, math.floor(self.dwell_max_s * prf_hz * (1 + _ROUNDING)))
         return f"take dwells of {_down(longest / prf_hz)} s or less (dwell = pulses / PRF)"
 
@@ -198,12 +198,12 @@ def _under(value: float, limit: float) -> str:
 
 
 def _up(value: float) -> str:
-    """Round up to 4 digits, so that who follows the cure is not just short of it."""
+    """Round up to 4 digits, so that the value named as the cure is not itself just too small."""
     return _four_digits(value, math.ceil, 1 - _ROUNDING)
 
 
 def _down(value: float) -> str:
-    """Round down to 4 digits, so that who follows the cure is not just over it."""
+    """Round down to 4 digits, so that the value named as the cure is not itself just too large."""
     return _four_digits(value, math.floor, 1 + _ROUNDING)
 
 
@@ -213,21 +213,22 @@ def _four_digits(value: float, whole: Callable[[float], int], slack: float) -> s
 
 
 def dwell_length(value: object, name: str = "dwell_s") -> float:
-    """Check the length of a dwell [s]: above 0, and none of seconds where thousandths were meant.
+    """Check the length of a dwell [s]: above 0 and at most `Envelope.dwell_max_s`.
 
-    None is longer than models know of, and rotors keep their rates for tenths of a second.
+    A longer one was probably given in milliseconds: models are trained on none, and rotors keep their rates for tenths
+    of a second only.
 
     Parameters
     ----------
     value
         What was given.
     name
-        What it is called there: the argument, or the option.
+        Name of the argument or the option, for the error.
 
     Raises
     ------
     BadInput
-        It is not.
+        It is out of range.
     """
     dwell_s = positive(value, name)
     if dwell_s > Envelope.dwell_max_s * (1 + _ROUNDING):

@@ -1,4 +1,4 @@
-"""The exceptions that are told in one line: what a user can put right, and a long run that was stopped."""
+"""The exceptions that are reported in one line: bad input, which a user can correct, and the stop of a long run."""
 
 import os
 from pathlib import Path
@@ -18,12 +18,12 @@ class BadInput(ValueError):  # noqa: N818 - it is the user's input that is bad
 
 
 def unreadable(path: object, error: OSError, cure: str = "name a file that can be read") -> BadInput:
-    """What the system says of a file that it did not read; it knows which of several it was."""
+    """Error for a file that the system could not read; if the system names another file than `path`, that is named."""
     return BadInput(f"{error.filename or path}: cannot be read: {error.strerror or error}: {cure}")
 
 
 def unwritable(path: str | os.PathLike[str], error: OSError, cure: str) -> BadInput:
-    """What the system says of a file or a folder that it did not write; what is wrong with its folder comes first."""
+    """Error for a file or a folder that the system could not write; a fault of its folder is named first."""
     reason, folder = error.strerror or error, Path(path).parent
     if isinstance(error, FileNotFoundError):
         cure = "make its folder first"

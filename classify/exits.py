@@ -15,7 +15,7 @@ from .errors import BadInput, Interrupted, one_line
 # The parent of all usage errors has no public name that old and new versions of typer share.
 _UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])
 
-# As modules, or as the packages that hold them: an account of a training asks for their versions.
+# Libraries of the extra "train", by module and by package: the account of a training asks for versions of packages.
 _TRAIN_EXTRA = {"torch", "sklearn", "scikit-learn", "onnx", "onnxscript", "skl2onnx", "matplotlib", "jinja2", "mpmath"}
 # A disk that is full, read-only or out of bounds is the user's to mend, and so is an output that is closed.
 _DISK_ERRORS = {
@@ -23,25 +23,25 @@ _DISK_ERRORS = {
     errno.EEXIST, errno.ENAMETOOLONG, errno.ENOENT, errno.EBADF,
 }  # fmt: skip
 _TRACEBACK = "BLADEWING_TRACEBACK"
-# What others' errors say may hold whole models.
+# Most characters shown of an unexpected error: the text of some libraries' errors holds whole models.
 _MOST_SAID = 300
 _NUMBERS = {"int_parsing": "be a whole number", "float_parsing": "be a number"}
 
 
 class _Closed(io.TextIOBase):
-    """An output that is closed: answers that nobody gets are an error, as where the disk is full."""
+    """Stands for a closed standard output: printing to it is an error, as on a full disk, as answers would be lost."""
 
     def __init__(self, place: IO[str]) -> None:
-        self.place = place  # where it would be, kept open
+        self.place = place  # keeps its file descriptor taken
 
     def write(self, text: str) -> NoReturn:
         raise OSError(errno.EBADF, "it is closed")
 
 
 def mend_streams() -> None:
-    """Make sure that what is printed goes somewhere or is missed, whatever characters it holds."""
+    """Replace standard streams that are closed, and escape characters that a stream's encoding cannot hold."""
     for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by whoever calls: no file that is opened may take its place
+        if getattr(sys, name) is None:  # closed by the caller: no file opened later may get its descriptor
             place = open(os.devnull, "w")  # noqa: SIM115
             setattr(sys, name, _Closed(place) if name == "stdout" else place)
         elif isinstance(getattr(sys, name), io.TextIOWrapper):  # a name its encoding cannot hold is shown escaped
@@ -49,16 +49,16 @@ def mend_streams() -> None:
 
 
 def exit_code(command: Callable[[], object]) -> int:
-    """Run a command; what goes wrong becomes one line on stderr and the exit code that stands for it.
+    """Run a command; an error becomes one line on stderr and the exit code that stands for it.
 
     Parameters
     ----------
     command
-        Answers the code it ends with, 0 where that is no number.
+        Returns its exit code; anything but a whole number counts as 0.
     """
     try:
         code = command()
-        if code == 130:  # how typer tells of an interrupt
+        if code == 130:  # typer's code for an interrupt
             raise KeyboardInterrupt
         return code if isinstance(code, int) else 0
     except (KeyboardInterrupt, typer.Abort):
@@ -109,23 +109,23 @@ def _output_is_full() -> bool:
 
 def _usage(error: Exception) -> int:
     message = getattr(error, "format_message", lambda: str(error))()
-    # typer takes numbers by pydantic, whose error knows the value
+    # typer parses numbers with pydantic, whose error holds the value
     wrong: list[dict] = getattr(error.__cause__ or error.__context__, "errors", list)()
     if wrong:
         name = getattr(error, "param").opts[0]  # noqa: B009 - the class of the error has no public name
         rule = _NUMBERS.get(wrong[0]["type"], wrong[0]["msg"].removeprefix("Input should "))
         message = f"{name} is {wrong[0]['input']!r}: it must {rule}"
     message = " ".join(message.split())
-    if re.match("No such option: -[^-]", message):  # no command has any of one letter but -h
+    if re.match("No such option: -[^-]", message):  # the only one-letter option is -h: a file name is meant
         message += ": a name that begins with - is given after --, as in -- -name.npy"
-    context = getattr(error, "ctx", None)  # the parser does not tell whose option lacks its value
+    context = getattr(error, "ctx", None)  # unknown where an option lacks its value
     command = f"{context.command_path} " if context is not None else ""
     complain(f"{message} (see {command}--help)")
     return 2
 
 
 def _was_interrupted(error: BaseException | None) -> bool:
-    """Whether an interrupt is what an exception was raised for: libraries that load make others of it."""
+    """Whether an interrupt caused an exception: libraries that are loading turn it into other exceptions."""
     seen: set[int] = set()
     while error is not None and id(error) not in seen:
         if isinstance(error, KeyboardInterrupt):

@@ -1,8 +1,8 @@
 """The work behind `bladewing export`: one ONNX graph from raw IQ to probabilities, for one radar and one dwell.
 
-It holds what `Classifier.predict` does of a record inside the envelope: the inputs (`bladewing.features.graph`), the
-model with its calibration, and the answer; only what lost pulses or has one channel alone is not mended. Only operators
-of the ONNX standard, so any runtime can serve it.
+The graph does what `Classifier.predict` does with a record inside the envelope: the inputs
+(`bladewing.features.graph`), the model with its calibration, and the answer. It does not mend records with lost pulses
+or with one channel alone. It holds only operators of the ONNX standard, so any runtime can serve it.
 """
 
 import hashlib
@@ -33,7 +33,7 @@ from .samples import positive
 
 TOLERANCE = 2e-3
 """Largest difference of a probability from `Classifier.predict` that an exported graph may show on records with noise;
-without it all beside a line is rounding, which differs."""
+without noise all beside a line is rounding, which differs between the two."""
 
 _CHECKED = 16
 
@@ -56,14 +56,15 @@ def export_raw_iq(
         1 or more, I and Q at any gain, and gives "probabilities", float32 (batch, 3) in the order uav, bird, clutter,
         and "label", int64 (batch,): the place in (uav, bird, clutter, unknown). A record without signal, or with a
         sample that is not finite, three and more lost pulses (exactly 0, which `Classifier.predict` fills in) or one
-        channel alone (which that makes analytic), is unknown with probabilities of 1/3. Pulses that interference hit,
-        and ends of the span that a filter took out, which that fills in too, are taken as they are.
+        channel alone (which `Classifier.predict` makes analytic), is unknown with probabilities of 1/3. Pulses that
+        interference hit, and ends of the span that a filter took out, are taken as they are; `Classifier.predict` fills
+        in both.
     carrier_hz, prf_hz
-        Carrier and pulse repetition frequency [Hz] that it is made for.
+        Carrier and pulse repetition frequency [Hz] that the graph is made for.
     pulses
         Pulses of a record.
     model
-        As for `Classifier.load`; one that reads `IN_GRAPH` only.
+        As for `Classifier.load`; a model whose inputs are all in `IN_GRAPH`.
     max_false_alarm
         As for `Classifier`: largest share of birds and clutter whose label may be UAV.
 
@@ -72,7 +73,7 @@ def export_raw_iq(
     worst : float
         Largest difference of a probability from `Classifier.predict` over a few records, at most `TOLERANCE`.
     point : OperatingPoint or None
-        What the false-alarm rate costs; None where none is asked for.
+        Threshold and detection probability at the false-alarm rate; None where none is asked for.
 
     Raises
     ------
@@ -118,7 +119,7 @@ def export_raw_iq(
 
 
 def _replaceable(out: Path) -> bool:
-    """Whether nothing of another kind stands there."""
+    """Whether there is no file yet, or an exported graph, which may be replaced."""
     try:
         return not out.exists() or EXPORTED.encode() in read_bounded(out, MOST_MODEL_BYTES)
     except (OSError, ValueError):
@@ -134,7 +135,7 @@ def _whole_graph(
     inputs, live = input_graph(before, carrier_hz=carrier_hz, prf_hz=prf_hz, pulses=pulses, names=classifier.inputs)
     for name, value in inputs.items():
         before.name(value, name)
-    for node in model.graph.node:  # the names of the answer are free for what follows
+    for node in model.graph.node:  # frees the names of the answer for the nodes behind the model
         for names in (node.input, node.output):
             names[:] = [f"{IQ}_model_{name}" if name in ("probabilities", "label") else name for name in names]
 
@@ -174,7 +175,7 @@ def _whole_graph(
 def _sealed(
     whole: onnx.ModelProto, content: bytes, classifier: Classifier, carrier_hz: float, prf_hz: float, pulses: int
 ) -> bytes:
-    """The graph with what the model says of itself, what it was made for and where it came from."""
+    """The sealed graph, with the model's metadata, the radar and dwell it was made for, and the digest of the model."""
     metadata = {key: value for key, value in classifier.metadata.items() if key not in (SEAL_KEY, "inputs")}
     metadata |= {
         "product": EXPORTED,
@@ -191,7 +192,7 @@ def _sealed(
 def _difference(written: bytes, classifier: Classifier, carrier_hz: float, prf_hz: float, pulses: int) -> float:
     """Largest difference of a probability from the classifier's, over noise with lines of every strength.
 
-    Half of them are one-sided, as analytic recordings are: noise is put in place of what they lack.
+    Half of them have a one-sided spectrum, as analytic recordings have: their empty side is filled with noise.
     """
     rng = np.random.default_rng(0)
     noise = rng.normal(size=(_CHECKED, pulses, 2)).astype(np.float32)

@@ -20,7 +20,7 @@ except ImportError:  # Windows: writers are not kept apart there
 def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:
     """Replace a file in one step: a reader sees the old file or the new one, never a part.
 
-    The content is written beside the file under another name, brought to the disk and then renamed over it. A link
+    The content is written beside the file under another name, flushed to the disk and then renamed over it. A link
     is followed, so that it goes on pointing at the file.
 
     Parameters
@@ -33,8 +33,8 @@ def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:
     Raises
     ------
     OSError
-        The folder is missing or not writable, or the disk is full; what stands there is no regular file. The old file,
-        if any, is untouched.
+        The folder is missing or not writable, the disk is full, or `path` is there and is no regular file. The old
+        file, if any, is untouched.
     """
     target = Path(os.path.realpath(path))
     if target.is_dir():
@@ -53,7 +53,7 @@ def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:
 
 
 def _write_new(path: Path, content: bytes | str) -> None:
-    """Write a file that is not there yet and bring it to the disk."""
+    """Write a file that is not there yet and flush it to the disk."""
     # Not tempfile: its files are private (0600), a result should follow the user's umask.
     with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666), "wb") as file:
         file.write(content.encode() if isinstance(content, str) else content)
@@ -63,7 +63,7 @@ def _write_new(path: Path, content: bytes | str) -> None:
 
 @contextlib.contextmanager
 def only_writer(folder: str | os.PathLike[str], *, wait: bool = True) -> Iterator[None]:
-    """Keep other writers out of a folder; the lock ends with the process, however that ends.
+    """Context that keeps other writers out of a folder; the lock ends with the process, however that ends.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def only_writer(folder: str | os.PathLike[str], *, wait: bool = True) -> Iterato
                 raise
             except OSError:  # a file system without locks: writers are not kept apart there
                 pass
-            if os.path.samestat(os.fstat(descriptor), os.stat(folder)):  # else its holder has removed it meanwhile
+            if os.path.samestat(os.fstat(descriptor), os.stat(folder)):  # else its holder removed it: try again
                 yield
                 return
         finally:
@@ -99,7 +99,7 @@ def only_writer(folder: str | os.PathLike[str], *, wait: bool = True) -> Iterato
 
 
 def clear_litter(folder: str | os.PathLike[str], pattern: str = ".bladewing-*.*") -> None:
-    """Remove what killed writers left half written; only while no other process writes there (`only_writer`)."""
+    """Remove what killed writers left half written; call it only while no other process writes (`only_writer`)."""
     for path in Path(folder).glob(pattern):
         if path.suffix in (".tmp", ".new"):
             with contextlib.suppress(OSError):
@@ -129,7 +129,7 @@ def read_bounded(path: str | os.PathLike[str], most_bytes: int) -> bytes:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Bring the rename itself to the disk, where the system can (Windows cannot open a folder)."""
+    """Flush the rename itself to the disk, where the system can (Windows cannot open a folder)."""
     with contextlib.suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -141,7 +141,7 @@ def _sync_folder(folder: Path) -> None:
 def result_folder(path: str | os.PathLike[str]) -> Path:
     """Make the folder that results will go to, and see that it can be written to before any work is done.
 
-    What an earlier writer decided and did not finish is finished: what is read there next is whole.
+    A change of several files that an earlier writer left half done is finished (see `settle`).
 
     Raises
     ------
@@ -167,16 +167,16 @@ def result_folder(path: str | os.PathLike[str]) -> Path:
 
 @contextlib.contextmanager
 def no_empty_folder(path: str | os.PathLike[str]) -> Iterator[list[Path]]:
-    """Around a run that writes to a folder: what it makes of that and those above goes again where it stays empty.
+    """Context of a run that writes to a folder: at its end folders that were made for it and stayed empty are removed.
 
-    A run that is stopped early, or that lacks a library, leaves nothing then. Who finds that the folders are another's
-    clears the list of them that the ``with`` gives.
+    A run that is stopped early, or that lacks a library, then leaves nothing. The folders are the one given and those
+    above it that were missing, and the ``with`` gives their list; clear it if another process uses them.
     """
     made = [folder for folder in (Path(path), *Path(path).parents) if not os.path.exists(folder)]
     try:
         yield made
     finally:
-        with contextlib.suppress(OSError):  # of the first that holds something, all above do
+        with contextlib.suppress(OSError):  # ends at the first that is not empty, as all above hold it
             for folder in made:
                 folder.rmdir()
 
@@ -189,8 +189,8 @@ _JOURNAL_BYTES = 1 << 20
 def write_together(folder: str | os.PathLike[str], files: Mapping[str, bytes | str]) -> None:
     """Replace several files of a folder as one: after any interruption they are all old or, once settled, all new.
 
-    All contents are brought to the disk beside the old files first; then a journal names the renames, which decides
-    the change; then they are done. Who finds the journal later (see `settle`) finishes them.
+    First all contents are flushed to the disk beside the old files. Then a journal of the renames is written, which
+    decides the change. Then the renames are done. A process that finds the journal later finishes them (see `settle`).
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def write_together(folder: str | os.PathLike[str], files: Mapping[str, bytes | s
     place = Path(folder)
     with only_writer(place):
         _settle(place)
-        clear_litter(place, ".bladewing-*.new")  # of writers that were killed before they decided
+        clear_litter(place, ".bladewing-*.new")  # of writers that were killed before their journal was written
         waiting: dict[str, str] = {}
         try:
             for name, content in files.items():
@@ -220,7 +220,7 @@ def write_together(folder: str | os.PathLike[str], files: Mapping[str, bytes | s
             _sync_folder(place)
             write_whole(place / _JOURNAL, json.dumps(waiting))
         except BaseException:
-            _remove(place, [_JOURNAL, *waiting])  # the decision first, else half of what it names would be gone
+            _remove(place, [_JOURNAL, *waiting])  # the journal first, else files that it names would be gone
             raise
         _settle(place, fresh=True)
 
@@ -239,7 +239,7 @@ def settle(folder: str | os.PathLike[str]) -> None:
 
 
 def _settle(place: Path, *, fresh: bool = False) -> None:
-    """Do the renames that a journal names; one decided just now is taken back where none can be done."""
+    """Do the renames that a journal names; a `fresh` change is undone if a rename fails before any was done."""
     journal = place / _JOURNAL
     try:
         waiting = json.loads(read_bounded(journal, _JOURNAL_BYTES))
@@ -247,31 +247,31 @@ def _settle(place: Path, *, fresh: bool = False) -> None:
     except FileNotFoundError:
         return
     except (ValueError, AttributeError, RecursionError):
-        # written whole by whoever writes it: this one is not ours, and it must not stand in the way for ever
+        # a journal of ours is written whole: this one is not ours, and must not block the folder for ever
         journal.unlink()
         return
     done = False
     for beside, name in renames:
-        # a name is taken for what it says only within the folder: a journal must not move files elsewhere
+        # only names within the folder are followed: a journal must not move files elsewhere
         if Path(beside).match(".bladewing-*.new") and all(Path(one).name == one for one in (beside, name)):
             try:
                 os.replace(place / beside, place / name)
                 done = True
             except FileNotFoundError:
-                done = True  # by whoever was interrupted
+                done = True  # by the writer that was interrupted
             except OSError:
                 if fresh and not done:
                     _remove(place, [_JOURNAL, *waiting])
                 if fresh:
                     raise
-                # of an earlier writer: what cannot be finished must not stand in the way for ever
+                # of an earlier writer: a rename that cannot be done must not block the folder for ever
                 _remove(place, [beside])
     _sync_folder(place)
     _remove(place, [_JOURNAL])
 
 
 def _remove(place: Path, names: Iterable[str]) -> None:
-    """Remove files of a folder where that can be done, in this order."""
+    """Remove files of a folder, in this order; those that cannot be removed stay."""
     for name in names:
         with contextlib.suppress(OSError):
             (place / name).unlink()

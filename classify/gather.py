@@ -19,10 +19,10 @@ from .workers import in_order
 #: Records of one task: whole radar groups, so that no record is drawn twice.
 TASK_RECORDS = 10 * RADAR_GROUP
 
-#: Tasks whose inputs are kept together as a part of a long run: some 90 MB.
+#: Number of tasks whose inputs are kept together as a part of a long run: some 90 MB.
 KEPT_TASKS = 50
 
-#: Inputs kept as float16 until a batch needs them: dB values of at most 120 keep 0.06 dB.
+#: Inputs kept as float16 until a batch needs them: dB values of at most 120 keep a resolution of 0.06 dB.
 _COMPACT = ("levels", "spectrum", "cadence", "combs", "image")
 
 _INPUT, _TRUTH = "input/", "truth/"
@@ -30,7 +30,7 @@ _INPUT, _TRUTH = "input/", "truth/"
 
 @lru_cache(maxsize=1)
 def inputs_digest() -> str:
-    """Digest of every input of a few records: other measurements, or arithmetic of other rounding, give another."""
+    """Digest of every input of a few records; it changes with the measurements and with the rounding of the machine."""
     records = draw_records(Radar(10e9, 20e3, 512), 12, 0, purpose="bench")
     inputs = model_inputs(records.iq, carrier_hz=10e9, prf_hz=20e3, names=tuple(INPUT_SHAPES))
     return hashlib.sha256(b"".join(inputs[name].astype("<f4").tobytes() for name in INPUT_SHAPES)).hexdigest()
@@ -64,12 +64,12 @@ class Gathered:
 
     @classmethod
     def of(cls, arrays: Mapping[str, NDArray], names: Sequence[str]) -> Gathered:
-        """What `arrays` gave, with the inputs in the order of `names`.
+        """Rebuild from what `arrays` gave, with the inputs in the order of `names`.
 
         Raises
         ------
         KeyError, ValueError
-            They are not what it gives for these inputs.
+            The arrays are not what `arrays` gives for these inputs.
         """
         inputs = {name: arrays[_INPUT + name] for name in names}
         truth = {name.removeprefix(_TRUTH): array for name, array in arrays.items() if name.startswith(_TRUTH)}
@@ -80,7 +80,7 @@ class Gathered:
 
     @classmethod
     def joined(cls, runs: Iterable[Gathered], count: int) -> Gathered:
-        """Consecutive runs of `count` records together as one: room for all at once, which a list would need twice.
+        """Join consecutive runs, `count` records together, in one allocation: a list of them would need it twice.
 
         Raises
         ------
@@ -99,7 +99,7 @@ class Gathered:
         return whole
 
     def like(self, count: int) -> Gathered:
-        """Room for so many records of this form; what it holds is not set."""
+        """Allocate room for `count` records of this form; its values are not set."""
         empty = {name: np.empty((count, *array.shape[1:]), array.dtype) for name, array in self.arrays().items()}
         return Gathered.of(empty, tuple(self.inputs))
 
@@ -149,7 +149,7 @@ def gather(
     on_records : callable, optional
         Called with the number of records of each finished task.
     parts : Parts, optional
-        Where to keep what is done, and to find what an interrupted run did; they must depend on all that the inputs do.
+        Where finished inputs are kept, and found after an interruption; made for all that the inputs depend on.
 
     Returns
     -------
@@ -183,7 +183,7 @@ def gather_from(
     sources : sequence of callable
         Each gives a run of consecutive records when it is called, in any process; at least one.
     purpose, count
-        Of the records: what they are called where they are kept, and their number.
+        Name under which the records are kept, and their number.
     names, workers, on_records, parts
         As in `gather`.
 
@@ -215,7 +215,7 @@ def _done(
     workers: int | None,
     parts: Parts | None,
 ) -> Iterator[Gathered]:
-    """What was kept of the sources, and what is made of the rest, kept by `KEPT_TASKS` at a time; all in order."""
+    """Inputs of the sources in order: those kept before, then the others, which are kept `KEPT_TASKS` at a time."""
     made = partial(in_order, partial(_inputs_of, tuple(names)), workers=workers)
     if parts is None:
         yield from made(sources)

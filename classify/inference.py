@@ -47,7 +47,7 @@ _STEP_INPUTS = 4096
 
 _COVERAGE_DIGITS = 6
 
-_TOLD = len(CLASSES) + 1  # columns of what is told of a record: the classes' probabilities and that of mere noise
+_TOLD = len(CLASSES) + 1  # columns of the answer row of a record: the classes' probabilities and that of noise alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +63,9 @@ class Prediction:
     reasons
         Shape (...): why a label is "unknown" (rule and cure), "" for the others.
     noise
-        Shape (...), float32: probability that there is nothing but noise, no background either, a part of that of
-        "clutter"; NaN where a record could not be judged, and from models without kinds. Against noise alone the share
-        of "uav" in "uav" and this, `probabilities[..., 0] / (probabilities[..., 0] + noise)`, finds more UAVs than the
+        Shape (...), float32: probability that a record holds noise alone, not even a background. It is a part of the
+        probability of "clutter"; NaN where a record could not be judged, and from models without kinds. To detect UAVs
+        against noise alone, `probabilities[..., 0] / (probabilities[..., 0] + noise)` finds more UAVs than the
         probability of "uav", which every other thing that might be there lowers.
     """
 
@@ -94,27 +94,27 @@ class Classifier:
     coverage
         Name a record only where its prediction set holds one class alone. For each class, at least this share of its
         records have a set that holds it (on records like those of the calibration). One of the coverages that the model
-        stores, 0.9 say. Of false alarms it promises nothing: with `max_false_alarm` besides, "uav" is named only where
-        that rate allows it too.
+        stores, 0.9 say. It promises nothing about false alarms: with `max_false_alarm` as well, "uav" is named only
+        where that rate allows it too.
 
     Attributes
     ----------
     classes
         ("uav", "bird", "clutter"), the order of the probabilities.
     metadata
-        What the file says of itself: text, JSON where structured (see `bladewing.models.export`).
+        Metadata of the file: text, JSON where structured (see `bladewing.models.export`).
     envelope
         The radars it answers for.
     accept
-        Least probability at which each class is named whatever the number of pulses, as of a track; under a `coverage`
-        without effect, but for that of "uav" where `max_false_alarm` set it.
+        Least probability at which each class is named where there is no number of pulses, as of a track. Without effect
+        under a `coverage`, except that of "uav" where `max_false_alarm` set it.
     rules
-        The same of a record, by how many pulses it has.
+        The same thresholds for a record, by its number of pulses.
     inputs
         Names of the inputs it reads, keys of `bladewing.features.schema.INPUT_SHAPES`.
     operating_point
-        The threshold that `max_false_alarm` chose and the detection probability that remains, of its calibration
-        records (under a `coverage` at most that); None without one.
+        The threshold that `max_false_alarm` chose and the detection probability that remains on the calibration records
+        (under a `coverage` at most that); None without `max_false_alarm`.
     coverage
         As it was asked for, or None.
 
@@ -149,7 +149,7 @@ class Classifier:
         threads = int(threads)
         max_false_alarm, coverage = _rule(max_false_alarm, coverage)
         try:
-            verify(onnx_bytes)  # before anything of the file is opened, and so is what it says of itself
+            verify(onnx_bytes)  # the file is verified, and its metadata are read, before any runtime opens it
             self.metadata = MappingProxyType(read_metadata(onnx_bytes))
         except ValueError as error:
             raise BadInput(f"{source}: {error}") from None
@@ -210,7 +210,7 @@ class Classifier:
             except BadInput:
                 if budget_us is None:
                     raise
-            # a budget alone never leads to a refusal that another model within it would not give
+            # a budget alone never leads to a refusal as long as another model within the budget can answer
             name = chosen_name(budget_us=budget_us, single=True)
         content, source = read_model(name)
         return cls(content, source=source, threads=threads, max_false_alarm=max_false_alarm, coverage=coverage)
@@ -223,11 +223,11 @@ class Classifier:
 
     @property
     def name(self) -> str:
-        """Of the model, as it stands on the ladder; empty where its file does not say."""
+        """Name of the model on the ladder; empty where its file does not say."""
         return self.metadata.get("name", "")
 
     def _keep_to(self, max_false_alarm: float, source: str, models: int = 1) -> OperatingPoint:
-        """Choose the threshold on "uav" for a false-alarm rate that so many models share."""
+        """Choose the threshold on "uav" for a false-alarm rate that `models` models share."""
         self.operating_point = point = point_of_curve(self.metadata, max_false_alarm, source, models)
         self._of_all = self._of_all.naming_uav_from(point.threshold)
         self.accept = self._of_all.accept
@@ -244,7 +244,7 @@ class Classifier:
         probabilities
             Shape (records, 3), as `predict` gives them.
         pulses
-            Of all records or of each, shape (records,); None where they have no such number, as a track.
+            Number of pulses of all records, or of each, shape (records,); None where there is none, as of a track.
         """
         limits: Limits | NDArray[np.float64]
         if pulses is None or isinstance(pulses, int | np.integer):
@@ -265,10 +265,10 @@ class Classifier:
         iq
             Shape (..., pulses), complex: one range cell, one sample a pulse. Leading axes are a batch, and every record
             is answered as if it were alone. The gain does not matter. Pulses that were lost, which are exactly 0, are
-            filled in by what those beside them tell of them, and so are single ones that interference hit, far over all
-            others; of a record that more lost ones in a row break than that is done for, the longest stretch is judged.
-            Those that a receiver marks by another value, or holds, a `Recording` alone finds. One channel, I without Q,
-            is made analytic.
+            filled in from those beside them, and so are single pulses that interference raised far above all others.
+            Where too many pulses in a row are lost for that, the longest unbroken stretch is judged. Lost pulses that a
+            receiver marks by another value, or by repeating the pulse before, are found by a `Recording` alone. One
+            channel, I without Q, is made analytic.
         carrier_hz
             Carrier [Hz].
         prf_hz
@@ -299,7 +299,7 @@ class Classifier:
             raise BadInput(f"iq has shape {samples.shape}: it must be (..., pulses) with one pulse or more")
         *leading, pulses = samples.shape
         records = samples.reshape(-1, pulses)
-        if outside := self.envelope.reason(carrier_hz, prf_hz, pulses):  # before anything is read of so many
+        if outside := self.envelope.reason(carrier_hz, prf_hz, pulses):  # before any work on the records
             told, labels = _untold(len(records))
             reasons = np.full(len(records), outside)
         else:
@@ -318,7 +318,7 @@ class Classifier:
     def _answers(
         self, records: NDArray[np.complex64], carrier_hz: float, prf_hz: float
     ) -> tuple[NDArray[np.float32], NDArray[np.str_], NDArray[np.str_]]:
-        """What is told (see `_TOLD`), labels and reasons of (records, pulses) inside the envelope."""
+        """Answer rows (see `_TOLD`), labels and reasons of (records, pulses) inside the envelope."""
         largest = largest_part(records)
         records = clicks_filled(records, largest)
         live = largest >= LEAST_PART
@@ -341,13 +341,13 @@ class Classifier:
         carrier_hz: float,
         prf_hz: float,
     ) -> tuple[NDArray[np.float32], NDArray[np.str_], NDArray[np.str_]]:
-        """As `_answers`, of records some of which silences break: of each its longest stretch that is whole."""
+        """As `_answers`, for records of which silences break some: of each its longest unbroken stretch is judged."""
         told, labels = _untold(len(records))
         reasons = np.empty(len(records), dtype=object)
         ends = np.full((len(records), 2), (0, records.shape[-1]))
         for (row,), stretch in stretches.items():
             ends[row] = stretch.start, stretch.stop
-        for begin, end in np.unique(ends, axis=0):  # padded records are alike
+        for begin, end in np.unique(ends, axis=0):  # records with the same padding go together
             rows, pulses = np.flatnonzero((ends == (begin, end)).all(axis=1)), end - begin
             if not pulses:
                 reasons[rows] = BEYOND_FILLING_IN
@@ -371,12 +371,12 @@ class Classifier:
         return out[-1] if len(out) <= 2 else np.concatenate(out)
 
     def _judged(self, records: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> list[NDArray[np.float32]]:
-        """What is told of a bounded number of records, in one or more pieces."""
+        """Answer rows of a bounded number of records, in one or more pieces."""
         each = dwells_of(records, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs)
         return [self._answer(dwells.inputs(self.inputs)) for dwells in each]
 
     def from_inputs(self, inputs: Mapping[str, NDArray[np.floating]]) -> NDArray[np.float32]:
-        """Probabilities of records whose inputs are made; others than the model's are passed over.
+        """Probabilities of records whose inputs are computed already; inputs that the model does not read are ignored.
 
         Parameters
         ----------
@@ -399,7 +399,7 @@ class Classifier:
         return np.concatenate([softmax(scores).astype(np.float32) for _, scores in self._run(inputs)])
 
     def _answer(self, inputs: Mapping[str, NDArray[np.floating]]) -> NDArray[np.float32]:
-        """What is told of records whose inputs are made."""
+        """Answer rows (see `_TOLD`) of records whose inputs are computed already."""
         parts = []
         for probabilities, *others in self._run(inputs):
             told = np.full((len(probabilities), _TOLD), np.nan, np.float32)
@@ -420,14 +420,14 @@ class Classifier:
 
 
 def _untold(records: int) -> tuple[NDArray[np.float32], NDArray[np.str_]]:
-    """What is told of records of which nothing is (see `_TOLD`), and their labels."""
+    """Answer rows (see `_TOLD`) and labels of records that cannot be judged: 1/3 each, NaN for noise, "unknown"."""
     told = np.full((records, _TOLD), 1 / len(CLASSES), dtype=np.float32)
     told[:, -1] = np.nan
     return told, np.full(records, UNKNOWN, dtype="<U7")
 
 
 def _rule(max_false_alarm: object, coverage: object) -> tuple[float | None, float | None]:
-    """Check the two numbers by which "unknown" may be ruled."""
+    """Check the two numbers that may set when "unknown" is said."""
     rate = None if max_false_alarm is None else positive(max_false_alarm, "max_false_alarm")
-    # as models store them: 0.9 of float32 is meant to be 0.9
+    # rounded as models store it: a 0.9 given as float32 means 0.9
     return rate, None if coverage is None else round(positive(coverage, "coverage"), _COVERAGE_DIGITS)

@@ -1,4 +1,4 @@
-"""The answers, and how probabilities become one."""
+"""The labels, and how probabilities become one of them."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ def decide(
     probabilities
         Shape (records, 3), order `CLASSES`.
     accept
-        Least probability at which each class is named, order `CLASSES`: of all records, or an array of (records, 3).
+        Least probability at which each class is named, order `CLASSES`: for all records, or an array of (records, 3).
 
     Returns
     -------
@@ -56,7 +56,7 @@ def decide_by_sets(
     coverage
         What the sets promise; the reasons quote it.
     least_uav
-        Where given, a UAV is named only where it is the most probable class too, and at least so probable.
+        Where given, a UAV is named only if "uav" is also the most probable class and has at least this probability.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def decide_by_sets(
 
 
 def _of_each(limits: Sequence[float] | NDArray[np.floating], records: int) -> Sequence[Sequence[float]]:
-    """Limits of each record, of those of all or of each."""
+    """Limits of each record, from limits of all records or of each."""
     if isinstance(limits, np.ndarray):
         return np.broadcast_to(limits, (records, len(CLASSES))).tolist()
     return [limits] * records
@@ -86,7 +86,7 @@ def _of_each(limits: Sequence[float] | NDArray[np.floating], records: int) -> Se
 
 def _below(name: str, value: float, limit: float) -> str:
     """`name value < limit` with two decimals, or as many as it takes to tell them apart; or that no value is enough."""
-    if limit > 1:  # as `NEVER` of the calibration, and what an operating point may ask
+    if limit > 1:  # `NEVER` of the calibration, or the threshold of an operating point
         why = "but no threshold of this model is precise enough to name it: train with more records"
         return f"{name} {value:.2f}, {why}"
     for decimals in range(2, 7):

@@ -19,14 +19,14 @@ from scipy import fft
 
 from .errors import BadInput
 
-#: Names for places on the front: the cheapest, the cheapest that gains at least half of the accuracy between the ends,
-#: the most accurate.
+#: Names for places on the front: the cheapest, the cheapest with at least half of the gain in accuracy from the
+#: cheapest to the most accurate, and the most accurate.
 PLACES = ("fast", "balanced", "best")
 
-#: A time measured again is longer by a twentieth at most.
+#: Factor on a measured time: measured again it is longer by a twentieth at most.
 _SCATTER = 1.05
 
-#: Name of the two models that are asked one after the other (see `Cascade`), in train.json and where one is loaded.
+#: Name of the cascade of two models (see `Cascade`), in train.json and where a model is loaded by name.
 CASCADE = "cascade"
 
 #: The folder of the shipped models, and the name of the account beside models.
@@ -36,7 +36,7 @@ ACCOUNT = "train.json"
 #: Key of the cascade's account in train.json: the names of its two models.
 STAGES_KEY = "stages"
 
-#: What the costs are measured on: so many records at a time, each of so many pulses.
+#: Costs are measured on RECORDS records at a time, each of PULSES pulses.
 RECORDS, PULSES = 64, 2048
 
 #: Key of a model's account in train.json: time of a record from samples to answer over that of its bare FFT [1].
@@ -46,7 +46,7 @@ _ROUNDS = 40
 
 
 def shipped_account() -> dict[str, Any]:
-    """The shipped models and their cascade, name to account in `train.json`, which also tells of others."""
+    """The shipped models and their cascade, name to account in `train.json`; what it holds of others is left out."""
     told = json.loads(SHIPPED.joinpath(ACCOUNT).read_text(encoding="utf-8"))
     accounts = told["models"] | ({CASCADE: told[CASCADE]} if told.get(CASCADE) else {})
     return {
@@ -57,7 +57,7 @@ def shipped_account() -> dict[str, Any]:
 
 
 def non_dominated(costs: Sequence[float], values: Sequence[float]) -> list[bool]:
-    """Which points no other point beats: none is as cheap and as good and better in one of the two.
+    """Which points no other point beats, being as cheap and as good, and better in at least one of the two.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def non_dominated(costs: Sequence[float], values: Sequence[float]) -> list[bool]
 
 
 def front(account: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, float]]:
-    """Names and costs of the models that none is both cheaper and more accurate than, cheapest first.
+    """Names and costs of the models that no other beats (see `non_dominated`), cheapest first.
 
     The teacher, which is not shipped, is none of them.
 
@@ -94,7 +94,7 @@ def front(account: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, float]]:
 
 
 def by_place(place: str, account: Mapping[str, Mapping[str, Any]]) -> str:
-    """Name of the model at one of `PLACES`: of one file, as prediction sets and exported graphs are; no cascade."""
+    """Name of the model at one of `PLACES`; never the cascade, as prediction sets and exports are of one model."""
     models = front({name: model for name, model in account.items() if name != CASCADE})
     names = [name for name, _ in models]
     accuracy = [float(account[name]["test"]["balanced_accuracy"]) for name in names]
@@ -131,7 +131,7 @@ def by_budget(budget_us: float, account: Mapping[str, Mapping[str, Any]], fft_us
 
 
 def measured_fft_us() -> float:
-    """Time of a record's bare FFT in a batch on this machine [us]: the shortest of some rounds."""
+    """Time of a record's bare FFT in a batch on this machine [us]: the shortest of `_ROUNDS` rounds."""
     iq = np.random.default_rng(0).standard_normal((RECORDS, 2 * PULSES), np.float32).view(np.complex64)
     taken = []
     for _ in range(_ROUNDS):

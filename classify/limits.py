@@ -1,4 +1,4 @@
-"""What is asked for where nothing is said, and limits: of files, what packed ones unpack to, records and seeds."""
+"""The default dwell, and limits on file sizes, on what packed files unpack to, on records and on seeds."""
 
 import bz2
 import io
@@ -24,13 +24,15 @@ MOST_MODEL_BYTES = 1 << 28
 #: Length of a dwell where none is asked for [s]; the paper's.
 DWELL_S = 0.08
 
-#: Fewest records that can be trained on: of every kind the other three sets must hold some.
+#: Fewest records that can be trained on. Each of the other three sets holds at least this many too, so that it has some
+#: of every kind.
 LEAST_RECORDS = 600
 
 #: Seeds of a training or a report are below this: scikit-learn takes no larger.
 SEEDS = 1 << 32
 
-# Samples hardly compress; text does, but is small. What unpacks to more than this is no recording.
+# A packed file may unpack to _FREE_BYTES, or to _RATIO times its size if that is more: samples hardly compress, and
+# text, which does, is small.
 _FREE_BYTES, _RATIO = 64 << 20, 100
 
 _CHUNK = 1 << 20
@@ -38,19 +40,19 @@ _LZMA_BYTES = 256 << 20  # for its dictionary
 
 
 def most_unpacked(packed_bytes: int) -> int:
-    """What a packed file of this size may unpack to [bytes]."""
+    """The most that a packed file of this size may unpack to [bytes]."""
     return min(MOST_BYTES, max(_FREE_BYTES, _RATIO * packed_bytes))
 
 
 def require_size(path: Path) -> int:
-    """Size of a file of samples [bytes].
+    """Size of a file of samples [bytes]; too large a file is refused.
 
     Raises
     ------
     BadInput
-        It is larger than what is read, or a pipe or a device.
+        The file is larger than `MOST_BYTES`, or a pipe or a device.
     OSError
-        It cannot be looked at.
+        Its status cannot be read.
     """
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
@@ -62,12 +64,12 @@ def require_size(path: Path) -> int:
 
 
 def require_unpacked(path: Path, unpacked: int) -> None:
-    """Refuse a packed file that says it unpacks to more than it may.
+    """Refuse a packed file that unpacks to more bytes than it may (see `most_unpacked`).
 
     Raises
     ------
     BadInput
-        It does.
+        It unpacks to too much.
     """
     most = most_unpacked(path.stat().st_size)
     if unpacked > most:
@@ -78,7 +80,7 @@ def require_unpacked(path: Path, unpacked: int) -> None:
 
 @contextmanager
 def open_zip(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open a zip archive whose members together are not too large; none can give more than it says.
+    """Open a zip archive whose members together are not too large; no member can give more than it declares.
 
     Raises
     ------
@@ -137,12 +139,12 @@ def _stream(decompressor: object, packed: bytes) -> Iterator[bytes]:
 
 
 def inflate(path: Path, packed: bytes, total: list[int]) -> bytes:
-    """Unpack one zlib stream of a file; `total` counts what all of its streams came to.
+    """Unpack one zlib stream of a file; `total[0]` counts the bytes of all streams of the file.
 
     Raises
     ------
     BadInput
-        They unpack to too much.
+        The streams together unpack to too much.
     """
     out = io.BytesIO()
     for part in _stream(zlib.decompressobj(), packed):

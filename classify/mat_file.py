@@ -1,4 +1,4 @@
-"""Checks on a MATLAB file before scipy reads it: its compiled reader follows a wrong type or size out of its memory."""
+"""Checks on a MATLAB file before scipy reads it: a wrong type or size leads its compiled reader out of its memory."""
 
 import math
 import struct
@@ -30,7 +30,7 @@ def require_sound(path: Path) -> None:
     Raises
     ------
     ValueError
-        A type is none, a size does not fit, or the file ends too early.
+        A type is unknown, a size does not fit, or the file ends too early.
     BadInput
         It is too large, or unpacks to too much.
     """

@@ -23,10 +23,10 @@ from .progress import Progress
 from .recording import Recording
 from .terminal import counted
 
-#: Pulses of a dwell at most, as of one that is named: to measure so many takes a quarter of a minute.
+#: Most pulses of a dwell, as for classification: to measure a dwell of this many takes a quarter of a minute.
 MOST_PULSES = Envelope.pulses_max
 
-#: A recording whose spectrum has one side alone in more than this share of its dwells is of one channel.
+#: A recording is taken for one channel if half of the spectrum is empty in more than this share of its dwells.
 ONE_SIDED = 0.5
 
 
@@ -55,7 +55,8 @@ class Settings:
         Raises
         ------
         BadInput
-            The dwell is not within 0 to 5 s, there is no such number of blades, or beta not in 0 to below 90 degrees.
+            The dwell is not above 0 and at most 5 s, the number of blades is out of range, or beta is not at least 0
+            and below 90 degrees.
         """
         if blades is not None and not 1 <= blades <= MOST_BLADES_GIVEN:
             raise BadInput(f"--blades is {blades}: it must be a whole number of 1 to {MOST_BLADES_GIVEN}")
@@ -124,7 +125,7 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
             f"{recording.prf_hz:g} Hz, fewer than {MIN_PULSES}: {meant + ', or ' if meant else ''}give --dwell "
             f"{math.ceil(1e4 * MIN_PULSES / recording.prf_hz) / 1e4:g} or more"
         )
-    whole = made_analytic(recording.iq)  # as a whole: dwells made so would each have ends of their own
+    whole = made_analytic(recording.iq)  # as a whole: each dwell made analytic alone would have edge effects
     iq = whole[: iq.size].reshape(len(iq), iq.shape[1])
     count, pulses = iq.shape
     radar = {"carrier_hz": recording.carrier_hz, "prf_hz": recording.prf_hz}
@@ -139,7 +140,7 @@ def measure_recording(recording: Recording, settings: Settings, progress: Progre
     remarks = recording.remarks(settings.dwell_s, iq, measured=True)
     if meant := in_kilohertz(recording.prf_hz):
         remarks += (f"PRF {recording.prf_hz:g} Hz: {meant}, if that is what it is",)
-    direction_known = whole is recording.iq  # else it is told that there is one channel
+    direction_known = whole is recording.iq  # else a remark says that there is one channel
     if direction_known:
         empty = sum(bool(half_empty(centred_power(scaled(dwell, unit_scale(dwell)), window=KAISER))) for dwell in iq)
         direction_known = empty <= ONE_SIDED * count

@@ -1,4 +1,4 @@
-"""The dwells of one recording measured: in this process, and by all processors where that would take long."""
+"""Measures the dwells of one recording: in this process, and on all processors where that would take long."""
 
 import time
 from collections.abc import Callable
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from .workers import in_order
 
-#: So long dwells are measured in this process; if what is left would take it as long again, which is what workers need
-#: to begin, they share it, in tasks of about so long [s].
+#: ALONE_S: for this long dwells are measured in this process [s]. If the rest would take it longer than that again,
+#: which is what workers need to begin, workers share the rest. TASK_S: about the length of a worker's task [s].
 ALONE_S, TASK_S = 1.0, 0.5
 
 
@@ -29,12 +29,12 @@ def measure_dwells(iq: NDArray[np.complex64], *, on_record: Callable[[float], No
     on_record : callable
         Called with the number of dwells that are done, as they are.
     **given
-        Of `measure`: the radar, the blades and beta.
+        Arguments of `measure`: the radar, the blades and beta.
 
     Returns
     -------
     Measurements
-        Of all of them, in their order.
+        Of all dwells, in their order.
 
     Raises
     ------

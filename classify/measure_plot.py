@@ -18,18 +18,18 @@ _LEGEND = (("#dbe9f6", "band"), ("#f3d9b1", "notch"), ("#c0392b", "comb"), ("#1e
 
 _WIDTH, _HEIGHT, _LEFT, _RIGHT, _BOTTOM, _TOP = 960, 470, 56, 12, 44, 80
 
-#: Middle of what is drawn on.
+#: Centre of the plot area.
 _MIDDLE_X, _MIDDLE_Y = (_LEFT + _WIDTH - _RIGHT) / 2, (_TOP + _HEIGHT - _BOTTOM) / 2
 
 _MINUS = "\u2212"
 
-#: Letters of a name that fit above the picture.
+#: Most characters of a name that fit above the plot.
 _LONGEST_NAME = 100
 
-#: What lies below this is drawn there [dB].
+#: Lowest level of the plot: lower levels are drawn at this one [dB].
 _BOTTOM_DB = -10.0
 
-#: Width of what is shown over that of the band; all where no band is measured.
+#: Width of the span that is shown over that of the band; where no band is measured, the whole span is shown.
 _MARGIN = 1.6
 
 
@@ -41,7 +41,7 @@ def _round_step(least: float) -> float:
 
 @dataclass(frozen=True)
 class _Frame:
-    """The plane that is drawn on, from `low` to `high` [Hz] and `bottom_db` to `top_db`."""
+    """The plot area, from `low` to `high` [Hz] and `bottom_db` to `top_db`."""
 
     low: float
     high: float
@@ -56,11 +56,11 @@ class _Frame:
 
     @property
     def base(self) -> float:
-        """Where it ends below."""
+        """Its lower edge, in the coordinates of the SVG."""
         return self.y(self.bottom_db)
 
     def band(self, first_hz: float, last_hz: float, colour: str, title: str) -> Iterator[str]:
-        """Colour what lies between two frequencies, as far as it is shown."""
+        """Colour the span between two frequencies, as far as it is shown."""
         a, b = self.x(max(first_hz, self.low)), self.x(min(last_hz, self.high))
         if b > a:
             yield (
@@ -69,7 +69,7 @@ class _Frame:
             )
 
     def comb(self, body_hz: float, spacing_hz: float, half_hz: float, colour: str, length: int) -> Iterator[str]:
-        """Mark the places of a comb's lines so far from the body."""
+        """Mark the places of a comb's lines up to `half_hz` from the body."""
         reach = int(half_hz / spacing_hz + 1e-6)
         for order in range(-reach, reach + 1):
             hz = body_hz + order * spacing_hz
@@ -81,7 +81,7 @@ class _Frame:
                 )
 
     def axes(self, per_mps: float) -> Iterator[str]:
-        """Doppler below, and above the velocity, which falls where it rises."""
+        """Axes of the Doppler frequency, below, and of the velocity, above, which falls where the frequency rises."""
         for per_unit, edge, tick, label_y in ((1.0, self.base, 4, self.base + 20), (-per_mps, _TOP, -4, _TOP - 8)):
             first, last = sorted((self.low / per_unit, self.high / per_unit))
             step = _round_step((last - first) / 10)
@@ -92,7 +92,7 @@ class _Frame:
                 yield f'<text x="{at:.1f}" y="{label_y:.1f}" text-anchor="middle">{said}</text>'
 
     def levels(self) -> Iterator[str]:
-        """A line every 20 dB from the noise up, or every 10 where so few would be drawn that none tells the scale."""
+        """A line every 20 dB from the noise floor up, or every 10 where the plot ends less than 40 dB above it."""
         for db in np.arange(0, self.top_db + 1, 20 if self.top_db >= 40 else 10):
             yield f'<path d="M{_LEFT} {self.y(db):.1f}H{_WIDTH - _RIGHT}" stroke="#ccc" stroke-width="0.5"/>'
             yield f'<text x="{_LEFT - 6}" y="{self.y(db) + 4:.1f}" text-anchor="end">{db:.0f}</text>'
@@ -124,13 +124,13 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
     if len(rates_hz) < 2 or not values.rotors_resolved[index]:
         rates_hz = [chopping_hz]
     low, high = float(frequency[0]), float(frequency[-1])
-    if np.isfinite(width_hz):  # and what is at rest
+    if np.isfinite(width_hz):  # the notch at rest is shown as well
         reach_hz = _MARGIN * width_hz / 2
         low = max(low, min(body_hz - reach_hz, -2 * NOTCH_MPS * per_mps))
         high = min(high, max(body_hz + reach_hz, 2 * NOTCH_MPS * per_mps))
     shown = (frequency >= low) & (frequency <= high)
     frequency, level = frequency[shown], level[shown]
-    # of silence too
+    # 20 dB high at least, also for silence
     frame = _Frame(low, high, _BOTTOM_DB, max(10 * np.ceil(float(level.max()) / 10 + 0.2), _BOTTOM_DB + 20))
     parts: list[str] = []
     if np.isfinite(width_hz):
@@ -157,7 +157,7 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
     if len(rates_hz) > 1:
         combs = f"combs of {len(rates_hz)} rotors, every {rates_hz[0]:.2f} to {rates_hz[-1]:.2f} Hz"
     said = str(values.reason[index]) or f"{combs}, {wide}"
-    if level.max() <= _BOTTOM_DB:  # nothing is drawn
+    if level.max() <= _BOTTOM_DB:  # the whole spectrum is below the plot
         why = escape(one_line(said))
         parts.append(f'<text x="{_MIDDLE_X}" y="{_MIDDLE_Y - 20}" font-size="16" text-anchor="middle">{why}</text>')
     if np.isfinite(both_hz).all():
@@ -166,7 +166,7 @@ def spectrum_svg(iq: np.ndarray, recording: Recording, values: Measurements, ind
 
 
 def _legend(drawn: Sequence[bool]) -> Iterator[str]:
-    """What the colours are, of those that are drawn."""
+    """The legend of the colours that are drawn."""
     entries = [entry for entry, shown in zip(_LEGEND, drawn, strict=True) if shown]
     for number, (colour, words) in enumerate(entries):
         left = _WIDTH - _RIGHT - 76 * (len(entries) - number)
@@ -175,7 +175,7 @@ def _legend(drawn: Sequence[bool]) -> Iterator[str]:
 
 
 def _picture(recording: str, start_s: float, said: str, parts: Sequence[str]) -> str:
-    """The whole of it: parts under a title, and what is said of them."""
+    """The whole SVG: the parts under a title and a line of words."""
     # the folder would push the words off the picture, and so would the middle of a long name
     name = one_line(Path(recording).name)
     if len(name) > _LONGEST_NAME:

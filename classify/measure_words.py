@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from .measured import Measured
 
-#: Bodies whose velocity differs by more from dwell to dwell have no single one [m/s].
+#: If the velocities of the dwells range over more than this, the range is given in place of one velocity [m/s].
 UNSTEADY_MPS = 1.0
 
 
@@ -98,7 +98,7 @@ def _sentence(found: "Measured") -> str:
 
 
 def _none(found: "Measured") -> str:
-    """Where no rotor is, which would have been seen, and where none could have been."""
+    """Words for no rotor: the slowest that would have been seen, and in how many dwells any could have been seen."""
     dwells = len(found.iq)
     if not found.looked_at:
         return "whether there is a rotor cannot be told"
@@ -110,7 +110,7 @@ def _none(found: "Measured") -> str:
 
 
 def _body(found: "Measured", all_together: Mapping[str, Any]) -> str:
-    """How fast the body is: its median, or from where to where where that is not the same in all dwells; or ""."""
+    """How fast the body is: its median velocity or, where the dwells differ (`UNSTEADY_MPS`), their range; or ""."""
     velocity_mps, std_mps = (all_together[name] for name in BODY)
     slowest, fastest = all_together["body_velocity_range_mps"] or (0.0, 0.0)
     sign = "+" if found.direction_known else ""
@@ -130,10 +130,10 @@ def _blades(found: "Measured") -> str:
 
 
 def _unlike(found: "Measured") -> str:
-    """Words of caution where most dwells count other rotors than the one whose rates are named; or ""."""
+    """Words of caution where most dwells count another number of rotors than the clearest, whose rates are named."""
     v, named = found.values, found.clearest()
     held = np.isfinite(v.chopping_hz)
-    # that of rotors that are not told apart is a bound: it bears out no other dwell's
+    # the number of unresolved rotors is a lower bound: it confirms no other dwell's number
     counts, dwells = np.unique(np.where(v.rotors_resolved, v.rotor_count, np.inf)[held], return_counts=True)
     alike = dwells[counts == v.rotor_count[named]].sum()
     if not v.rotors_resolved[named] or 2 * alike >= dwells.sum():
@@ -146,7 +146,7 @@ def _unlike(found: "Measured") -> str:
 
 
 def _wheel(found: "Measured") -> str:
-    """Words of caution where the lines of most combs reach no further from the body than that moves; or ""."""
+    """Words of caution where most combs reach no further from the body than `OVER_BODY` times its speed; or ""."""
     v = found.values
     held = np.isfinite(v.chopping_hz)
     edge_mps = v.bandwidth_hz[held] * SPEED_OF_LIGHT_MPS / found.recording.carrier_hz / 4
@@ -202,7 +202,7 @@ def with_error(value: float, std: float) -> str:
 
 
 def _rate_with_error(value: float, std: float) -> str:
-    """`with_error` of a rate, which may be some times what is seen where its deviation is larger than itself.
+    """`with_error` of a rate; if its standard deviation is larger than the rate, that is only a lower bound.
 
     Examples
     --------
@@ -215,7 +215,7 @@ def _rate_with_error(value: float, std: float) -> str:
 def signed(velocity_mps: float, std_mps: float, sign: str = "+") -> str:
     """A velocity with its sign and its standard deviation, to the hundredth where it is known to 1 m/s.
 
-    `sign` is "" where one that is not below 0 has none.
+    With `sign` "" a velocity that is not below 0 has no sign.
 
     Examples
     --------

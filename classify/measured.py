@@ -1,4 +1,4 @@
-"""What was measured in one recording, and what its dwells come to together."""
+"""What was measured in one recording, and the summary of its dwells."""
 
 import math
 import os
@@ -47,23 +47,24 @@ VALUES = (
     "gear_ratio_std",
 )
 
-#: Of these, and of the alternatives, those that count something.
+#: Those of VALUES, and of the fields of alternatives, that are whole numbers.
 WHOLE = ("comb_order", "rotor_count", "blades")
 
 #: What a recording's JSON object holds of combs: medians over the dwells.
 OF_COMBS = ("chopping_hz", "bandwidth_hz", "tip_speed_mps", "rotation_hz", "blade_length_m")
 
-#: Where the middle half of so many combs and more reaches over this ratio, they are not the same in all dwells, and no
-#: rotor is named: a wind turbine's blades, hundreds of echoes each, show another comb in every second dwell.
+#: If the middle half of LEAST_COMBS or more chopping frequencies spans a ratio of UNSTEADY or more, the combs are not
+#: the same in all dwells, and no rotor is named: a wind turbine's blades, hundreds of echoes each, show another comb in
+#: every second dwell.
 LEAST_COMBS, UNSTEADY = 4, 1.25
 
-#: And of the wingbeat and of the body's course.
+#: What a recording's JSON object holds of the wingbeat and of the body's motion.
 WINGBEAT = ("wingbeat_hz", "wingbeat_hz_std", "acceleration_mps2", "acceleration_mps2_std")
 
-#: How fast a body is from dwell to dwell: by those that know it well, but for so large a share at either end.
+#: The range of a body's velocity leaves out this share, at either end, of the dwells that know it well.
 ENDS = 0.05
 
-#: Combs in no larger a share of the dwells may be chance: of noise alone one dwell in some 300 shows one.
+#: Combs in at most this share of the dwells may be chance: of noise alone one dwell in some 300 shows one.
 CHANCE = 0.1
 
 
@@ -87,10 +88,10 @@ class Measured:
     beat
         Wingbeat and body over the whole recording; None where that is too short.
     remarks
-        What is to be known of the recording beside this, a sentence each.
+        Remarks on the recording, a sentence each.
     direction_known
-        False for one channel: whether a body comes or goes is not told then, and what is told in place of its velocity
-        and acceleration is its speed and how that changes; `values` are as measured.
+        False for one channel: whether a body comes or goes is then unknown, and its speed and the rate of change of its
+        speed are given in place of its velocity and acceleration; `values` are as measured.
     """
 
     recording: Recording
@@ -115,7 +116,7 @@ class Measured:
         return self._turn(self.values.body_velocity_mps) * self.values.body_velocity_mps
 
     def _turn(self, velocity_mps: np.ndarray) -> np.ndarray:
-        """-1 where a velocity is turned to be a speed, and what goes with it as well; else 1."""
+        """Factor from a velocity, and from its rate of change, to a speed's: -1 if negative without a direction."""
         return np.where((velocity_mps < 0) & (not self.direction_known), -1.0, 1.0)
 
     @property
@@ -125,7 +126,7 @@ class Measured:
 
     @property
     def has_rotor(self) -> bool:
-        """Whether more dwells hold a comb than chance alone would make hold one; they need not be one rotor's."""
+        """Whether more dwells hold a comb than may by chance (`CHANCE`); the combs need not be one rotor's."""
         return self.combs > CHANCE * len(self.iq)
 
     def json_objects(self) -> Iterator[dict[str, Any]]:
@@ -156,10 +157,10 @@ class Measured:
         yield {"file": self.recording.name, "recording": self.together()}
 
     def together(self) -> dict[str, Any]:
-        """Medians over the dwells that hold a comb, or both of a helicopter's, and how many those are.
+        """Medians over the dwells that hold a comb, or both combs of a helicopter, and the number of these dwells.
 
-        Where no comb is, or they are not one rotor's, the reason in place of their medians. The body's velocity is then
-        that of the other dwells, as it is where combs may be chance; see `body`.
+        Where there is no comb, or the combs are not one rotor's, the medians are None and a reason is given. The body's
+        velocity is then that of the dwells without a comb, as it is where combs may be chance; see `body`.
         """
         held = np.isfinite(self.values.chopping_hz)
         reason = disagreement(self.values)
@@ -182,7 +183,7 @@ class Measured:
         return {**counts, "reason": reason or None, **beside, **medians, **gear, **self.over_all()}
 
     def body(self, dwells: np.ndarray) -> dict[str, float | None]:
-        """The body's velocity over some of the dwells and its deviation; nothing where none of them tells it.
+        """The body's velocity over some of the dwells and its standard deviation; None where no dwell tells it.
 
         See `over_dwells`.
         """
@@ -194,9 +195,9 @@ class Measured:
         return dict(zip(BODY, (middle - self._span_mps * round(middle / self._span_mps), middle_std), strict=True))
 
     def body_range(self, dwells: np.ndarray) -> list[float] | None:
-        """Between what nine tenths of the body's velocities in single dwells lie; None where none knows it well.
+        """Range of nine tenths of the body's velocities in single dwells; None where no dwell knows it well.
 
-        Of a body that passes the end of the unambiguous velocities one of both lies beyond.
+        If the velocity passes an end of the unambiguous span, one of the two limits lies beyond that end.
         """
         values, stds = self._course(dwells)
         known = values[np.isfinite(values) & (stds < KNOWN_MPS)]
@@ -204,11 +205,11 @@ class Measured:
 
     @property
     def _span_mps(self) -> float:
-        """All unambiguous velocities [m/s]."""
+        """Width of the unambiguous span of velocities [m/s]."""
         return SPEED_OF_LIGHT_MPS / self.recording.carrier_hz * self.recording.prf_hz / 2
 
     def _course(self, dwells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The body's velocity in some of the dwells and its deviation, all in the span about the best known."""
+        """The body's velocity in some of the dwells, unfolded to the span about the best known, and its deviation."""
         value, std = self.body_mps[dwells], self.values.body_velocity_mps_std[dwells]
         known = np.isfinite(value) & np.isfinite(std)
         if known.any():
@@ -217,9 +218,9 @@ class Measured:
         return value, std
 
     def over_all(self) -> dict[str, Any]:
-        """Wingbeat and acceleration over the whole recording; nothing where that is too short.
+        """Wingbeat and acceleration over the whole recording; empty where the recording is too short.
 
-        A rotor has no wingbeat, and the strong line that is followed may be a blade's.
+        Where there is a rotor no wingbeat is given: the strong line that is followed may be a blade's.
         """
         if self.beat is None:
             return {}
@@ -231,9 +232,9 @@ class Measured:
         return beat | {"wingbeat_reason": str(self.beat.reason) or None}
 
     def clearest(self) -> int:
-        """The dwell whose comb stands highest over the noise, of those as near to the median band as half of them are.
+        """The dwell whose comb stands highest over the noise, among the half whose bands are nearest to the median.
 
-        The first dwell where there is no comb. The highest of all may be an outlier.
+        Where there is no comb, the first dwell. The highest comb of all may be an outlier.
         """
         snr, band = self.values.comb_snr_db, self.values.bandwidth_hz
         known = np.isfinite(band)
@@ -275,8 +276,8 @@ def is_helicopter(values: Measurements) -> bool:
 
 
 def disagreement(values: Measurements) -> str:
-    """Why the combs of the dwells are not one rotor's, where most differ by more than that changes; else ""."""
-    known = np.sort(values.chopping_hz[values.chopping_hz_std < values.chopping_hz])  # lower bounds bear out any
+    """Why the combs of the dwells are not one rotor's, where their rates differ too much (`UNSTEADY`); else ""."""
+    known = np.sort(values.chopping_hz[values.chopping_hz_std < values.chopping_hz])  # lower bounds fit any rate
     if len(known) < LEAST_COMBS or is_helicopter(values):
         return ""
     low, high = known[len(known) // 4], known[-1 - len(known) // 4]

@@ -1,4 +1,4 @@
-"""A model's file: which one is meant, and what it says of itself, checked before anything is asked of it."""
+"""A model's file: which one is meant, and checks of its metadata and graph before the model is used."""
 
 import json
 import os
@@ -25,10 +25,11 @@ CURVE_KEY = "operating_curve"
 """Metadata of the thresholds for every false-alarm rate; models of earlier versions hold none."""
 
 SETS_KEY = "prediction_sets"
-"""Metadata of the thresholds of prediction sets, rows of coverage and one a class; earlier models hold none."""
+"""Metadata of prediction sets: rows of a coverage and the threshold of each class; earlier models hold none."""
 
 RULES_KEY = "rules_by_pulses"
-"""Metadata of both by how many pulses a record has (see `rules`); earlier models hold none."""
+"""Metadata of acceptance thresholds and prediction sets by the pulses of a record (see `rules`); earlier models hold
+none."""
 
 COVERAGES = (0.8, 0.9, 0.95, 0.98, 0.99)
 """Coverages that a training stores."""
@@ -36,14 +37,14 @@ COVERAGES = (0.8, 0.9, 0.95, 0.98, 0.99)
 FORMAT = "1"
 """Version of the metadata that this code reads."""
 
-#: What the metadata of an exported graph call it.
+#: The product that the metadata of an exported graph name.
 EXPORTED = "bladewing raw-IQ graph"
 
 KINDS_KEY = "kinds"
 """Metadata of the kinds that a network tells apart inside, name to class in their order; some models know none."""
 
 NOISE = "noise"
-"""The kind of a record that holds nothing else."""
+"""The kind of a record that holds noise alone."""
 
 
 def model_names() -> tuple[str, ...]:
@@ -55,7 +56,7 @@ def model_names() -> tuple[str, ...]:
 def chosen_name(
     name_or_path: str | os.PathLike[str] | None = None, budget_us: float | None = None, *, single: bool = False
 ) -> str:
-    """Name or path of the model that is meant: the default's, or what a place on the ladder or a budget leads to.
+    """Name or path of the model that is meant: as given, the default's, or that of a place on the ladder or a budget.
 
     Parameters
     ----------
@@ -127,7 +128,7 @@ def open_session(onnx_bytes: bytes, source: str, threads: int) -> onnxruntime.In
 
 
 def checked_metadata(metadata: Mapping[str, str], source: str) -> tuple[Envelope, Limits]:
-    """Check what a model says of itself against what this version can serve.
+    """Check a model's metadata against what this version can serve; return its envelope and acceptance thresholds.
 
     Raises
     ------
@@ -162,7 +163,7 @@ def checked_metadata(metadata: Mapping[str, str], source: str) -> tuple[Envelope
 
 
 def point_of_curve(metadata: Mapping[str, str], max_false_alarm: float, source: str, models: int) -> OperatingPoint:
-    """The point of the model's curve that keeps to its part of a false-alarm rate.
+    """The point of the model's curve that keeps to its share of a false-alarm rate, which `models` models share evenly.
 
     Raises
     ------
@@ -178,7 +179,7 @@ def point_of_curve(metadata: Mapping[str, str], max_false_alarm: float, source: 
 
 
 def rules_by_pulses(metadata: Mapping[str, str], of_all: Rule, source: str) -> Rules:
-    """The model's rules by how many pulses a record has; that of all records where it holds none.
+    """The model's rules by a record's number of pulses; where it holds none, the rule of all records.
 
     Raises
     ------
@@ -261,7 +262,7 @@ def checked_kinds(metadata: Mapping[str, str], session: onnxruntime.InferenceSes
 
 
 def place_of_noise(kinds: Mapping[str, str]) -> tuple[int, slice, int] | None:
-    """The class that noise is of, the columns of that class's kinds, which stand together, and its place among them."""
+    """Index of the class of `NOISE`, columns of that class's kinds, which are adjacent, and place of noise in them."""
     if NOISE not in kinds:
         return None
     names, classes = list(kinds), list(kinds.values())

@@ -33,7 +33,7 @@ class Parts:
     folder : Path
         Where they lie while the run is not done, beside its results.
     of : mapping
-        All that the results depend on; parts of anything else are not taken.
+        All that the results depend on; parts of a run with other values are not taken.
     """
 
     def __init__(self, folder: Path, of: Mapping[str, Any]) -> None:
@@ -47,7 +47,7 @@ class Parts:
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Keep other runs out that would leave their results in the same place, while this one lasts.
+        """Context that keeps out other runs with results in the same place.
 
         Raises
         ------
@@ -61,7 +61,7 @@ class Parts:
             except (BlockingIOError, FileNotFoundError):  # or one that ends at this very moment
                 busy = f"{self._all.parent}: another run is at work there"
                 raise BadInput(f"{busy}: let it finish, or give another folder") from None
-            held.callback(self._clear)  # while it is held, and by its holder alone: the folder is the lock
+            held.callback(self._clear)  # by the holder of the lock alone, which is the folder itself
             yield
 
     def have(self, name: str) -> bool:
@@ -115,11 +115,14 @@ class Parts:
             raise self.refusal(name, str(error)) from None
 
     def refusal(self, name: str, why: str, *, suffix: str = "npz") -> BadInput:
-        """The one line for a part that cannot be used."""
+        """The error for a part that cannot be used."""
         return BadInput(f"{self._folder / name}.{suffix}: not what this run kept: {why}: remove it and start again")
 
     def forget(self) -> None:
-        """Remove all parts of this run, whose result stands; those of others stay, the folder until `alone` ends."""
+        """Remove all parts of this run, whose result is written.
+
+        Parts of other runs stay, and so does the folder of all runs until `alone` ends.
+        """
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def others(self) -> str:
@@ -144,7 +147,7 @@ class Parts:
         write_whole(file, content)
 
 
-# What reading a damaged archive may raise; an array alone (.npy) has no list of files.
+# What reading a damaged archive may raise; AttributeError: a single array (.npy) has no list of files.
 _DAMAGE = (
     OSError,
     EOFError,

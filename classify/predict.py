@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from .inference import Classifier, Prediction
 
 LONG_S = 5.0
-"""How much of a recording, from its start, what only a long look shows is sought in [s]."""
+"""Length of the start of a recording that `long_look` is given [s]."""
 
-# A track of fewer pulses is named as surely as a record of as many must be: by the thresholds of all lengths together
-# 82 to 89 in 100 named birds were right of tracks of 2 to 12 dwells of 64 to 255 pulses, so 85 to 93. Of more these
-# are the better ones.
+# A track of fewer pulses is named by the thresholds of records of as many pulses. On tracks of 2 to 12 dwells of 64 to
+# 255 pulses, 85 to 93 in 100 named birds are right with these, 82 to 89 with the thresholds of all records. On tracks
+# of more pulses the thresholds of all records are the better ones.
 FEW_PULSES = 1024
 
 _SHOWN = {
@@ -47,7 +47,7 @@ _COLOURS = {"uav": "bold red", "bird": "green", "clutter": "cyan", UNKNOWN: "yel
 
 
 def terms(point: "OperatingPoint", *, by_sets: bool = False) -> str:
-    """Say what a chosen false-alarm rate costs; by prediction sets besides, more."""
+    """Say what a chosen false-alarm rate costs; with `by_sets`, prediction sets may cost further UAVs."""
     return (
         f"uav from {point.threshold:.4f} on: at most {point.false_alarm:.4g} of birds and clutter are named uav, and "
         f"{'at most ' if by_sets else ''}{point.detection:.3f} of UAVs (synthetic calibration records of the whole "
@@ -62,21 +62,21 @@ class Answer:
     Attributes
     ----------
     name
-        The recording, as it was asked for.
+        Name of the recording, as it was asked for.
     start_s, stop_s
         Shape (dwells,): where each dwell begins and ends [s].
     dwells
         The answers, shape (dwells,).
     track
-        The dwells together, and what the whole recording shows.
+        The answer for the dwells together and what the whole recording shows.
     shown
-        What that is [Hz], by the keys of `ODDS`: about what the chopping frequency of a comb is that stays (of several
-        rotors, one's), the rate of wings, of a body that heaves or of a walker's steps. The last three are sought in
-        1.5 s and more.
+        What the whole recording shows [Hz], by the keys of `ODDS`: the approximate chopping frequency of a comb that
+        stays (of several rotors, one's), the rate of wings, of a body that heaves or of a walker's steps. The last
+        three are sought in recordings of 1.5 s and more.
     left_out_s
         The end of the recording that is shorter than a dwell [s].
     remarks
-        What is to be known of the recording beside this, a sentence each.
+        Remarks on the recording, a sentence each.
     """
 
     name: str
@@ -128,14 +128,14 @@ class Answer:
         yield {"file": self.name, "track": track}
 
     def _runs(self) -> Iterator[tuple[int, int]]:
-        """Where each line of the table begins, and of how many dwells in a row it is, all refused alike if several."""
+        """First dwell and number of dwells of each line of the table: dwells in a row refused alike share a line."""
         reasons, p = self.dwells.reasons, np.round(self.dwells.probabilities, 6)
         goes_on = (reasons[1:] != "") & (reasons[1:] == reasons[:-1]) & (p[1:] == p[:-1]).all(axis=1)
         ends = np.append(np.flatnonzero(~goes_on) + 1, len(reasons))
         yield from zip(np.append(0, ends[:-1]).tolist(), np.diff(ends, prepend=0).tolist(), strict=True)
 
     def _heard(self) -> str:
-        """How many dwells were named, whatever they were named, how many were not sure, and how many not judged."""
+        """Words for how many dwells were named (as any class), how many were not sure, and how many not judged."""
         named = int(np.count_nonzero(self.dwells.labels != UNKNOWN))
         counts = {"named": named, "unsure": self.track.used - named}
         counts["not judged"] = len(self.dwells.labels) - self.track.used
@@ -212,7 +212,7 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
             f"classifier is {classifier!r}: it must be a Classifier: Classifier.load({classifier!r}) gives one"
         )
     require_hertz(recording.name, recording.carrier_hz, recording.prf_hz)
-    if meant := in_kilohertz(recording.prf_hz):  # all dwells would be refused alike, thousands of a few pulses each
+    if meant := in_kilohertz(recording.prf_hz):  # else thousands of dwells of a few pulses would all be refused
         least_hz = classifier.envelope.prf_min_hz
         raise BadInput(f"{recording.name}: PRF {recording.prf_hz:g} Hz is below {least_hz:g} Hz: {meant}")
     dwell_s = dwell_length(dwell_s)
@@ -230,7 +230,7 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
     shown: dict[str, float] = {}
     if seen:
         shown = long_look(recording.iq[: round(LONG_S * recording.prf_hz)], recording.carrier_hz, recording.prf_hz)
-        if recording.clipped:  # it makes combs of its own
+        if recording.clipped:  # clipping makes combs of its own
             shown.pop("comb", None)
     track = fuse(
         dwells.probabilities,
@@ -238,7 +238,7 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
         longer=longer,
         shown=shown,
         rule=partial(classifier.decide, pulses=seen * wanted) if few else classifier.decide,
-        dwell_s=min(wanted / recording.prf_hz, Envelope.dwell_max_s),  # of whole pulses it may be a trifle longer
+        dwell_s=min(wanted / recording.prf_hz, Envelope.dwell_max_s),  # in whole pulses it may be a trifle longer
     )
     stop_s = start_s + wanted / recording.prf_hz
     left_out_s, remarks = recording.left_out_s(iq), recording.remarks(dwell_s, iq)
@@ -248,7 +248,7 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
 def long_look(iq: np.ndarray, carrier_hz: float, prf_hz: float) -> dict[str, float]:
     """What a long look shows of one target and a single dwell does not [Hz], by the keys of `ODDS`."""
     radar = {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
-    whole = made_analytic(iq)  # of one channel both sides rise and fall alike; a comb shows in it better as it is
+    whole = made_analytic(iq)  # else both sides of one channel move as mirror images; a comb shows better without
     body = heave(whole, **radar)
     rates_hz = {
         "comb": steady_comb(iq, **radar).chopping_hz,

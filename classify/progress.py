@@ -24,7 +24,7 @@ class Progress:
     visible : bool
         False: nothing is written.
     passing : bool
-        The bars go when they are done, and nothing says so: what they were waited for is printed in their place.
+        The bars are removed when done, without a closing line: the result is printed in their place.
     """
 
     def __init__(self, *, visible: bool, passing: bool = False) -> None:
@@ -51,7 +51,7 @@ class Progress:
 
     @contextmanager
     def phase(self, title: str, total: float) -> Iterator[Callable[[float], None]]:
-        """Show a bar, and give the function to call with how much of the total is done."""
+        """Show a bar; yield the function to call with how much of the total is done."""
         task = self._bars.add_task(title, total=total)
         started = said = time.monotonic()
 

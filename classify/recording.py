@@ -22,7 +22,7 @@ from .limits import require_size
 from .samples import complex_samples, positive
 from .sigmf_file import ARCHIVES, find_sigmf, read_sigmf
 
-#: What packed files end in: who reads their bytes as samples gets some.
+#: Suffixes of packed files: their bytes could be read as samples without any error.
 PACKED_SUFFIXES = (".gz", ".tgz", ".xz", ".bz2", ".zst", ".zip", ".tar", ".7z")
 
 Result = TypeVar("Result")
@@ -45,13 +45,13 @@ class Recording:
     start_s
         Time of the first sample [s]; above 0 where a SigMF file says that it goes on from an earlier one.
     filled_in
-        How many these are.
+        Number of pulses that were filled in.
 
     Raises
     ------
     BadInput
-        The samples are no complex numbers, not finite, none or of several cells, a frequency is not above 0,
-        carrier and PRF stand in each other's place, or the start is no time.
+        The samples are not complex, not finite, none, or of several cells, a frequency is not above 0, carrier and PRF
+        are exchanged, or the start is not a finite time.
     """
 
     name: str
@@ -119,7 +119,7 @@ class Recording:
         return round((len(self.iq) - dwells.size) / self.prf_hz, 9)
 
     def cut_sentence(self, dwell_s: float, dwells: NDArray[np.complex64]) -> str:
-        """How `dwells` of so many seconds fit the recording, in words; empty where they fill it.
+        """How `dwells` of `dwell_s` seconds fit the recording, in words; empty where they fill it.
 
         Examples
         --------
@@ -135,9 +135,9 @@ class Recording:
         return f"the last {left_out_s:.2g} s, shorter than a dwell, are left out" if left_out_s else ""
 
     def remarks(self, dwell_s: float, dwells: NDArray[np.complex64], *, measured: bool = False) -> tuple[str, ...]:
-        """What is to be known of the recording beside its answer: `cut_sentence`, and what ails its samples.
+        """Remarks on the recording, a sentence each: `cut_sentence`, and the faults of its samples.
 
-        What that means is another thing for what was `measured` than for labels.
+        What a fault means is said for measurements if `measured`, else for labels.
         """
         said = [self.cut_sentence(dwell_s, dwells)]
         clipped_so, one_channel_so = _OF_MEASUREMENTS if measured else _OF_LABELS
@@ -209,7 +209,7 @@ def load_recording(
         The file is missing, damaged or cut short, holds no finite complex samples of one range cell, or lacks the
         carrier or the PRF, or contradicts the ones given. Nothing is ever unpickled.
     """
-    name = os.fspath(path).encode("utf-8", "backslashreplace").decode()  # or JSON that holds it would be no UTF-8
+    name = os.fspath(path).encode("utf-8", "backslashreplace").decode()  # else JSON that holds it would not be UTF-8
     found = find_recording(path)
     if found.suffix.lower() in ARRAY_SUFFIXES:
         samples, file_carrier_hz, file_prf_hz, first = read_array(found, variable), None, None, 0
@@ -234,7 +234,7 @@ def load_recording(
 
 
 def find_recording(path: str | os.PathLike[str]) -> Path:
-    """Give the file that stands for a recording: one for all the names that a SigMF recording goes by.
+    """Return the file that stands for a recording: the same one for all names of a SigMF recording.
 
     Parameters
     ----------
@@ -275,7 +275,7 @@ def find_recording(path: str | os.PathLike[str]) -> Path:
 
 
 def _folder(given: Path) -> BadInput:
-    """What is said of a folder, by what it holds."""
+    """Error for a folder that is named as a recording, by what the folder holds."""
     kinds = ("*.sigmf-meta", "*.sigmf", *(f"*{suffix}" for suffix in ARRAY_SUFFIXES))
     held = next((kind for kind in kinds if any(given.glob(kind))), None)
     if held is None:
@@ -319,7 +319,7 @@ def _distinct(paths: Iterable[Path]) -> Iterator[Path]:
     for path in paths:
         try:
             found = find_recording(path)
-            # a link is a name of its own: metadata of several recordings may be one file, its samples lie beside it
+            # a link is not resolved: several may point at one metadata file, each with its own samples beside it
             key = found.parent.resolve() / found.name
         except BadInput:
             key = path
@@ -329,11 +329,11 @@ def _distinct(paths: Iterable[Path]) -> Iterator[Path]:
 
 
 def _one_range_cell(samples: NDArray[np.generic], name: str) -> NDArray[np.complex64]:
-    """Check the samples, and let go of axes of length 1 (MATLAB has no other vectors)."""
+    """Check the samples, and drop axes of length 1 (every vector of MATLAB has one)."""
     if samples.size == 0:
         raise BadInput(f"{name}: no samples (shape {samples.shape}): a recording needs at least one pulse")
     if samples.dtype.kind in "fiu":
-        complex_samples(samples, name)  # how I and Q are joined comes before what their shape is then
+        complex_samples(samples, name)  # raises: how to join I and Q matters before the shape
     if samples.ndim == 0 or samples.size != max(samples.shape):
         raise BadInput(
             f"{name}: samples of shape {samples.shape}: a recording is one range cell, shape (pulses,): "

@@ -1,9 +1,10 @@
-"""From which probabilities on a class is named, by how many pulses a record has.
+"""The least probabilities at which classes are named, by the number of pulses of a record.
 
-One rule for all keeps its promise of all radars together and of no single one: of short records, of which a model is
-seldom sure, one named bird in five was wrong where one in ten is promised, of long ones one in twenty
-(docs/ablation.md). So each range of pulses has thresholds of its own. What is told of a track of several dwells goes by
-those of all records, or of as many pulses as its dwells have together where these are few (`predict.answer`).
+One rule for all records keeps its promises for all radars together but for no single one: of short records, of which a
+model is seldom sure, one named bird in five was wrong where one in ten is promised, of long ones one in twenty
+(docs/ablation.md). So each range of pulses has thresholds of its own. A track of several dwells goes by the thresholds
+of all records or, if its dwells together have few pulses or one alone carries evidence, by those of that number of
+pulses (`predict.answer`).
 """
 
 import json
@@ -20,14 +21,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from .labels import CLASSES
 
-#: Records of so many pulses and more go together, up to the next; of fewer than so many records they go by all.
+#: PULSES_FROM: fewest pulses of each range, which ends below the next; the first also holds all shorter records.
+#: LEAST_RECORDS: a range of fewer calibration records goes by the rule of all records.
 PULSES_FROM, LEAST_RECORDS = (64, 256, 1024, 4096), 1000
 
-#: Nor is a class named that is not likelier than all others together: what long records show is not all that there is.
+#: Least threshold of a class: it must be likelier than all others together. Long calibration records would allow lower
+#: thresholds, but they do not show all that there is.
 LIKELIER = 0.5
 
 Limits = tuple[float, float, float]
-"""A probability a class, order `CLASSES`."""
+"""One probability for each class, order `CLASSES`."""
 
 
 @dataclass(frozen=True)
@@ -58,14 +61,15 @@ class Rule:
         false_alarm: float,
         coverages: Sequence[float],
     ) -> Self:
-        """The thresholds that keep their promises of these records, whatever their pulses.
+        """Fit the thresholds that keep their promises on these records, whatever their pulses.
 
         Parameters
         ----------
         probabilities, labels, precision
             As `acceptance_thresholds` takes them.
         false_alarm
-            Largest share of birds and clutter named UAV: "uav" keeps to both, however many UAVs it costs.
+            Largest share of birds and clutter named UAV: the threshold on "uav" keeps to this and to `precision`,
+            however many UAVs that costs.
         coverages
             Of the prediction sets.
         """
@@ -78,7 +82,7 @@ class Rule:
         return cls(1, (uav, bird, clutter), {coverage: (a, b, c) for coverage, (a, b, c) in held.items()})
 
     def naming_uav_from(self, threshold: float) -> Self:
-        """The same with another threshold on "uav"."""
+        """The same rule with another threshold on "uav"."""
         return replace(self, accept=(threshold, *self.accept[1:]))
 
 
@@ -105,9 +109,9 @@ class Rules:
         precision: float,
         false_alarm: float,
     ) -> Self:
-        """One rule a range of `PULSES_FROM`, that of all records where it holds fewer than `LEAST_RECORDS`.
+        """Fit a rule for each range of `PULSES_FROM`; a range of fewer than `LEAST_RECORDS` takes that of all records.
 
-        Nowhere is "uav" named from less on than of all records: a false drone is the worst of answers.
+        No range has a lower threshold on "uav" than the rule of all records: a false drone is the worst of answers.
 
         Parameters
         ----------
@@ -116,7 +120,7 @@ class Rules:
         pulses
             Of each record, shape (n,).
         of_all
-            The rule of all records; the coverages are its.
+            The rule of all records; the coverages are taken from it.
         """
         ranges = np.searchsorted(PULSES_FROM[1:], pulses, side="right")
         each = []
@@ -130,14 +134,14 @@ class Rules:
         return cls(tuple(each))
 
     def of(self, pulses: int) -> Rule:
-        """The rule of a record of so many pulses."""
+        """The rule of a record of this number of pulses."""
         return self.each[bisect_right(self.each, pulses, lo=1, key=lambda rule: rule.pulses) - 1]
 
     def _places(self, pulses: ArrayLike) -> NDArray[np.intp]:
         return np.searchsorted([rule.pulses for rule in self.each[1:]], pulses, side="right")
 
     def accept(self, pulses: ArrayLike) -> NDArray[np.float64]:
-        """Least probability at which each class is named, of records of so many pulses, shape (..., 3)."""
+        """Least probability at which each class is named, for records of these numbers of pulses, shape (..., 3)."""
         return np.array([rule.accept for rule in self.each])[self._places(pulses)]
 
     def sets(self, pulses: ArrayLike, coverage: float) -> NDArray[np.float64]:
@@ -149,7 +153,7 @@ class Rules:
         return [[rule.pulses, *rule.accept] for rule in self.each]
 
     def naming_uav_from(self, threshold: float) -> Self:
-        """Each with another threshold on "uav"."""
+        """The same rules with another threshold on "uav"."""
         return type(self)(tuple(rule.naming_uav_from(threshold) for rule in self.each))
 
     def to_json(self) -> str:
@@ -182,7 +186,7 @@ class Rules:
 
 
 def _limits(values: Sequence[float]) -> Limits:
-    """Three numbers, each a probability or just above."""
+    """Check three thresholds, each a probability or up to `NEVER`."""
     uav, bird, clutter = map(float, values)
     if not all(0 <= limit <= NEVER for limit in (uav, bird, clutter)):
         raise ValueError(f"{list(values)} must be {len(CLASSES)} numbers of 0 to 1")

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import BadInput
 
 _COMPLEX64 = np.dtype(np.complex64)
-# Samples of a recording lie within so many decades of one another, all but a twentieth at either end.
+# _LOOKED_AT: samples that are examined for a wrong order of bytes. _MOST_DECADES: the samples of a recording, all but a
+# twentieth at either end, lie within this many decades.
 _LOOKED_AT, _MOST_DECADES = 1 << 16, 6.0
 
 
@@ -27,9 +28,10 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
     Raises
     ------
     BadInput
-        The samples are a Recording, or not complex numbers, one is not finite as complex64, or all vanish in it.
+        The samples are a Recording, or not complex numbers, one is not finite as complex64, or all of a record become 0
+        in complex64.
     """
-    if type(values).__name__ == "Recording":  # not by its type: its module imports this one
+    if type(values).__name__ == "Recording":  # by its name: the module of the type imports this one
         raise BadInput(f"{name} is a Recording: give recording.dwells(0.08), or call answer(recording, classifier)")
     if np.ma.is_masked(values):
         hidden = np.ma.count_masked(values)
@@ -67,7 +69,7 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
         if vanished.any():
             largest = float(np.abs(vanished).max())
             raise BadInput(f"{name}: samples of at most {largest:.2g}, which complex64 holds as 0: raise the gain")
-    if not np.isfinite(np.ascontiguousarray(iq).view(np.float32)).all():  # real numbers: a quarter of the time
+    if not np.isfinite(np.ascontiguousarray(iq).view(np.float32)).all():  # as real numbers: a quarter of the time
         finite = np.isfinite(iq)
         first = np.unravel_index(int(np.argmin(finite)), iq.shape)
         where = int(first[0]) if iq.ndim == 1 else tuple(int(i) for i in first)
@@ -86,7 +88,7 @@ def complex_samples(values: ArrayLike, name: str) -> NDArray[np.complex64]:
 
 
 def _in_other_order(samples: NDArray[np.complexfloating]) -> bool:
-    """Whether samples are read with their bytes in the wrong order: turned round, all are finite, and of alike size."""
+    """Whether samples were read with their bytes in the wrong order: swapped, all are finite and of similar size."""
     some = samples.ravel()[:_LOOKED_AT]
     turned = some.byteswap()
     decades = []

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from bladewing.simulate.render import Rendering
     from bladewing.simulate.scene import Scene
 
-#: Under this name the writer of a recording stands in its metadata.
+#: The `core:recorder` of a rendering's metadata.
 RECORDER = "bladewing simulate"
 
 #: Version of the fields under "bladewing:".
@@ -33,10 +33,10 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
     Parameters
     ----------
     stem
-        Path without the suffix; a .sigmf, .sigmf-meta or .sigmf-data at its end is taken off, and what an archive's
-        name ends in.
+        Path without the suffix; a .sigmf, .sigmf-meta or .sigmf-data at its end, or the suffix of an archive, is taken
+        off.
     rendering, scene, seed
-        What was rendered, from what.
+        The rendering, its scene and its seed.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
         raise BadInput(f"{stem} is a folder: name the recording in it: give --out {stem / 'NAME'}")
     if not np.isfinite(rendering.iq).all():
         raise BadInput(f"{stem}: the scene's samples exceed what complex64 holds: lower its levels")
-    with suppress(OSError):  # a folder that is missing or cannot be written to is told below
+    with suppress(OSError):  # a folder that is missing or cannot be written to is refused below
         settle(stem.parent)
     if foreign := _foreign(stem.parent / f"{name}.sigmf-meta", stem.parent / f"{name}.sigmf-data"):
         raise BadInput(f"{foreign} is there and was not simulated: it is not written over: give another --out NAME")

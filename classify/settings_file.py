@@ -37,7 +37,7 @@ def build_settings(
     stored : mapping, optional
         Field to value of a data set, which the file and the options may only repeat.
     options
-        Field to value, over the file; None says nothing.
+        Field to value, which overrides the file; None overrides nothing.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def named(field: str, file: Path | None, options: Mapping[str, Any]) -> str:
 
 def _read(file: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(read_bounded(file, MOST_TEXT_BYTES).decode("utf-8-sig"))  # some editors begin with a mark
+        return tomllib.loads(read_bounded(file, MOST_TEXT_BYTES).decode("utf-8-sig"))  # editors may begin with a BOM
     except OSError as error:
         raise unreadable(file, error, "give the path of a TOML file") from None
     except (ValueError, RecursionError) as error:  # too large, not UTF-8, not TOML, or nested beyond reason

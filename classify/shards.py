@@ -1,8 +1,8 @@
-"""Shards of a data set: a run of records as two plain .npy files, one of samples and one of what is true of them.
+"""Shards of a data set: a run of records as two plain .npy files, one of samples and one of their truth.
 
 `NAME.iq.npy` holds the records' samples one behind the other, complex64; `NAME.table.npy` one row a record, `ROW`. Both
-load with `numpy.load` and map into memory. Here a file is used only where its bytes have the digest that the data
-set's manifest gives and its header is, to the byte, the one that is written here: no header is ever interpreted.
+load with `numpy.load` and map into memory. This module uses a file only if its bytes have the digest that the data
+set's manifest gives and its header is, to the byte, the one that this module writes: no header is ever interpreted.
 """
 
 import hashlib
@@ -23,7 +23,7 @@ from .files import read_bounded, write_whole
 #: Samples, one behind the other.
 SAMPLE = np.dtype("<c8")
 
-#: What is true of a record; units as in `bladewing.simulate.dataset.TRUTH_UNITS`, NaN where without meaning.
+#: The truth of a record; units as in `bladewing.simulate.dataset.TRUTH_UNITS`, NaN where a value has no meaning.
 ROW = np.dtype(
     [("carrier_hz", "<f8"), ("prf_hz", "<f8"), ("pulses", "<i8"), ("label", "S7"), ("kind", "S16")]
     + [(name, "<f8") for name in TRUTH_UNITS]
@@ -156,7 +156,7 @@ def read_shard(folder: Path, name: str, contents: Contents) -> Iterator[Records]
 
 
 def _read(folder: Path, name: str, contents: Contents) -> tuple[NDArray[np.complex64], NDArray[np.void]]:
-    """The two arrays of a shard, once its files are what the manifest says."""
+    """The two arrays of a shard, after its files were checked against the manifest."""
     arrays: list[NDArray] = []
     wanted = (SAMPLE, contents.samples, contents.iq_sha256), (ROW, contents.records, contents.table_sha256)
     for path, (dtype, count, sha256) in zip(_paths(folder, name), wanted, strict=True):
@@ -183,7 +183,7 @@ def _paths(folder: Path, name: str) -> tuple[Path, Path]:
 
 
 def _header(dtype: np.dtype, count: int) -> bytes:
-    """The head of an .npy file that holds so many values in one axis."""
+    """The header of an .npy file that holds `count` values in one axis."""
     file = io.BytesIO()
     described = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": (count,)}
     np.lib.format.write_array_header_1_0(file, described)

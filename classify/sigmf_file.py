@@ -25,15 +25,16 @@ if TYPE_CHECKING:
 
 _META, _DATA = ".sigmf-meta", ".sigmf-data"
 
-#: Where a capture begins in what the receiver gave, whole.
+#: Field of a capture: index of its first sample in all that the receiver gave.
 _INDEX = "core:global_index"
 
-#: When it began. Of two captures the times differ by what lies between them but for what a computer's clock is off by,
-#: where they have fractions of a second, and else for their rounding [s]; and by this share of it.
+#: _TIME: field of a capture, the time when it began. The difference of two captures' times may depart from the duration
+#: of the samples between them by the share _DRIFT of that duration, plus _CLOCK_S, by which a computer's clock may be
+#: off, if both times have fractions of a second, else plus _ROUNDED_S for their rounding [s].
 _TIME = "core:datetime"
 _CLOCK_S, _ROUNDED_S, _DRIFT = 0.1, 1.5, 1e-3
 
-_MOST_COUNT = 1 << 63  # JSON's whole numbers have no end, and what is reckoned with them would leave every type
+_MOST_COUNT = 1 << 63  # JSON's whole numbers are unbounded: larger ones would overflow every integer type
 ARCHIVES = (".sigmf", ".sigmf.gz", ".sigmf.xz", ".sigmf.zip")
 _DATATYPE = re.compile(r"([cr])(?!f8|f16)([fiu])(8|16|32|64)(_le|_be)?")
 
@@ -48,7 +49,8 @@ class SigmfSamples(NamedTuple):
     carrier_hz, prf_hz
         `core:frequency` and `core:sample_rate` [Hz]; None where the file does not say.
     first_sample
-        Index of the first sample in the whole recording (`core:offset` and the first capture's start).
+        Index of the first sample in the whole recording: the first capture's `core:global_index`, else its
+        `core:sample_start`; without captures `core:offset`.
     """
 
     iq: NDArray[np.generic]
@@ -58,7 +60,7 @@ class SigmfSamples(NamedTuple):
 
 
 def find_sigmf(path: Path) -> Path | None:
-    """Give the metadata file or the archive that a name stands for, or None where it is not SigMF.
+    """Return the metadata file or the archive that a name stands for, or None where it is not SigMF.
 
     Parameters
     ----------
@@ -75,7 +77,7 @@ def find_sigmf(path: Path) -> Path | None:
     if path.name.endswith(ARCHIVES):
         return path if path.is_file() else None
     with suppress(OSError):
-        settle(path.parent)  # both files of a pair, or what stood there before
+        settle(path.parent)  # finishes a pair of files that was left half written
     if path.name.endswith((_META, _DATA)):
         stem, missing = path.with_suffix(""), f"{path}: no such file"
     elif path.is_file() or not path.name:
@@ -118,7 +120,7 @@ def read_sigmf(path: Path) -> SigmfSamples:
 
 
 def _each_once(path: Path, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """An object of metadata that says nothing twice: of two that differ, nobody can tell which holds."""
+    """An object of metadata; a field given twice with different values is refused: nobody can tell which holds."""
     said = dict(pairs)
     for name, value in pairs:
         if said[name] is not value and said[name] != value:
@@ -182,7 +184,7 @@ def _read_archive(path: Path) -> SigmfSamples:
 
 
 def _bounded_archive(path: Path) -> dict[str, Any]:
-    """What to hand to the library, once it cannot unpack to more than a recording: it reads members whole."""
+    """Arguments for the library's reader, once the archive is bounded: the library reads members whole."""
     require_size(path)
     with open(path, "rb") as file:
         if file.read(2) == b"PK":
@@ -218,7 +220,7 @@ def _library_message(path: Path, error: Exception) -> str:
 
 
 def _check_structure(metadata: Any, path: Path) -> None:
-    """Check every field that is used here, so that none is trusted for its type."""
+    """Check the type and the value of every field that is used here."""
     if not isinstance(metadata, dict) or not isinstance(metadata.get("global"), dict):
         raise BadInput(f"{path}: no 'global' object: SigMF metadata are an object of global, captures, annotations")
     for section in ("captures", "annotations"):
@@ -230,7 +232,7 @@ def _check_structure(metadata: Any, path: Path) -> None:
             if "core:sample_count" in entry:
                 _count(entry, "core:sample_count", f"{path}: {section}[{index}]")
     general = metadata["global"]
-    if isinstance(digest := general.get("core:sha512"), str):  # of either case in SigMF, of lower case in its library
+    if isinstance(digest := general.get("core:sha512"), str):  # SigMF allows either case, its library lower case only
         general["core:sha512"] = digest.lower()
     _check_captures(metadata["captures"], path)
     _check_times(metadata["captures"], general.get("core:sample_rate"), path)
@@ -259,7 +261,7 @@ def _check_structure(metadata: Any, path: Path) -> None:
 
 
 def _check_captures(captures: list[dict[str, Any]], path: Path) -> None:
-    """Captures must follow one another, and nothing may be missing between them: a dwell would lie over the hole."""
+    """Refuse captures that are out of order, or with samples missing between them: a dwell would lie over the gap."""
     for index, (one, two) in enumerate(pairwise(captures)):
         start, following = one["core:sample_start"], two["core:sample_start"]
         if following < start:
@@ -267,7 +269,7 @@ def _check_captures(captures: list[dict[str, Any]], path: Path) -> None:
                 f"{path}: captures[{index + 1}] starts at sample {following}, captures[{index}] at {start}: "
                 "they must follow one another: put them in order"
             )
-    # the index is optional: a capture without it is one with those about it
+    # the index is optional: a capture without one is taken to continue those beside it
     places = [
         (number, entry["core:sample_start"], _count(entry, _INDEX, f"{path}: captures"))
         for number, entry in enumerate(captures)
@@ -284,9 +286,9 @@ def _check_captures(captures: list[dict[str, Any]], path: Path) -> None:
 
 
 def _check_times(captures: list[dict[str, Any]], prf_hz: object, path: Path) -> None:
-    """Nor may time have gone by, or back, between captures that follow one another without a hole in their samples."""
+    """Refuse captures whose times differ by another duration than that of the samples between them."""
     if isinstance(prf_hz, bool) or not isinstance(prf_hz, int | float) or not 0 < prf_hz < np.inf:
-        return  # it is missing or wrong: that is told elsewhere
+        return  # it is missing or wrong, which is reported elsewhere
     dated = [
         (number, entry["core:sample_start"], *time)
         for number, entry in enumerate(captures)
@@ -296,7 +298,7 @@ def _check_times(captures: list[dict[str, Any]], prf_hz: object, path: Path) -> 
         lasted_s = (following - start) / prf_hz
         apart_s = (later - begun).total_seconds()
         slack_s = lasted_s * _DRIFT + (_CLOCK_S if fine and fine_too else _ROUNDED_S)
-        # one date for all is when the recording began
+        # equal times are that of the whole recording's beginning
         if later != begun and abs(apart_s - lasted_s) > slack_s:
             raise BadInput(
                 f"{path}: captures[{after}] is dated {apart_s:.6g} s after captures[{before}] ({_TIME}), but the "

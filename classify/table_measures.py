@@ -14,10 +14,12 @@ from bladewing.simulate.render import Rendering
 from bladewing.simulate.scene import Scene
 from scipy.fft import next_fast_len
 
-#: The paper's threshold over the mean amplitude of this band [Hz], on simulated data [dB].
+#: QUIET_BAND_HZ: the paper's threshold is relative to the mean amplitude of this band [Hz]. SIMULATED_DB: the threshold
+#: on simulated data [dB].
 QUIET_BAND_HZ, SIMULATED_DB = (8e3, 10e3), 30.0
 
-#: Where the first lines are sought: this far from the body [bins], over the noise floor [dB], with so fine a transform.
+#: The first lines are sought from LOBE_BINS above the body [bins], where they rise LINE_DB over the noise floor [dB],
+#: in a transform ZERO_PADDING times as long as the dwell.
 LOBE_BINS, LINE_DB, ZERO_PADDING = 4.0, 15.0, 8
 
 
@@ -70,7 +72,7 @@ def first_lines_hz(rendering: Rendering) -> float:
 
 
 def theory(scene: Scene) -> tuple[float, float, float]:
-    """Bandwidth (26), chopping frequency (25) of the mean rate, and shift of the first UAV of a scene [Hz]."""
+    """Bandwidth (eq. 26), chopping frequency (eq. 25) of the mean rate, and shift of a scene's first UAV [Hz]."""
     (part, *_), wavelength = scene.uavs, scene.sight.wavelength_m
     first = part.rotors[0]
     alike = [r for r in part.rotors if r.blade_length_m == first.blade_length_m]  # not a helicopter's tail

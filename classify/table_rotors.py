@@ -79,7 +79,7 @@ def rotor_rows(scene: Scene, rendering: Rendering, *, band_hz: float, chopping_h
 
 
 def gear_rows(scene: Scene, found: Measurements, *, tail_hz: float | None, gear_ratio: float | None) -> Row:
-    """Tail comb and gear ratio: truth, paper and ours; what there is no second comb for is None."""
+    """Tail comb and gear ratio: truth, paper and ours; the truth is None where the paper gives no tail comb."""
     rates = sorted({abs(r.rotation_hz) * r.blades for r in scene.uavs[0].rotors})
     geared = tail_hz is not None
     return {

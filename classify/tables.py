@@ -1,4 +1,4 @@
-"""The paper's tables made again: theory, what the paper measured, and what this product measures on its own scenes.
+"""The paper's tables reproduced: theory, what the paper measured, and what this product measures on its own scenes.
 
 The paper is "Analysis of Micro-Doppler Signatures of Small UAVs Based on Doppler Spectrum". Its on-bin rates test no
 estimator (116.667 Hz is exactly ten bins of 35 kHz / 3000), so off-bin rates stand beside them.
@@ -62,14 +62,14 @@ Row = dict[str, Any]
 
 
 def changed(scene: Scene, *, rates: float = 1.0, **fields: Any) -> Scene:
-    """Give a scene whose UAV has other fields, and its rotors `rates` times their rates."""
+    """Return a scene whose UAV has other `fields`, and whose rotors turn at `rates` times their rates."""
     part = scene.uav[0]
     rotors = [{**dict(rotor), "rotation_hz": rotor.rotation_hz * rates} for rotor in part.rotors]
     return Scene.build({**dict(scene), "uav": [{**dict(part), "airframe": None, "rotors": rotors, **fields}]})
 
 
 def table_iii(seed: int) -> Iterator[Row]:
-    """The six types: theory, the paper, on its bins, and off them."""
+    """The six simulated types: theory, the paper, and this product at the paper's on-bin rates and at off-bin rates."""
     for name, (band, band_seen, chop, chop_seen, shift_seen) in TABLE_III.items():
         scene = Scene.load(name)
         expected, found = theory(scene), by_the_papers_rules(scene.render(seed), SIMULATED_DB)
@@ -207,7 +207,7 @@ TABLES = {
     "The paper's bird": bird,
 }
 
-#: What is said above a table.
+#: Title of a table to the text above it.
 NOTES = {
     "Tables VI and VIII: four measured UAVs, their rotors and blades": EXPLAINED
     + " The tail's blade is not in the paper; the gear ratio, ours, is tail over main chopping frequency.",

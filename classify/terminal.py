@@ -1,4 +1,4 @@
-"""Where answers are printed, and tables there: none of their numbers is ever cut, no line of theirs ends in spaces."""
+"""Printing of answers and tables: no number in them is ever cut, no line ends in spaces."""
 
 import os
 import sys
@@ -12,16 +12,17 @@ if TYPE_CHECKING:
 
 _LONGEST_LINE = 10_000
 
-#: Where fewer columns would be left for a reason, it stands behind its row unwrapped, as the terminal breaks it.
+#: Least width of a column of words, such as a reason [characters]: where less is left for it, lines are printed
+#: unwrapped and the terminal breaks them.
 _LEAST_WORDS = 20
 
 
 def console() -> "Console":
-    """Where answers are printed: as wide as the terminal, and in a pipe or a file as wide as a line is."""
+    """The console on which answers are printed: as wide as the terminal, in a pipe or a file unbounded."""
     from rich.console import Console
 
     columns = os.environ.get("COLUMNS", "")
-    unbounded = columns.strip("0") == "" if columns else not sys.stdout.isatty()  # no terminal has no columns
+    unbounded = columns.strip("0") == "" if columns else not sys.stdout.isatty()  # COLUMNS=0 is no width
     return Console(highlight=False, width=_LONGEST_LINE if unbounded else None)
 
 
@@ -38,9 +39,9 @@ def print_words(console: "Console", words: "Text") -> None:
 
 
 def print_table(console: "Console", table: "Table") -> None:
-    """Print a table; a terminal too narrow for what must not be wrapped gets narrow gaps, then wraps the lines.
+    """Print a table; for a terminal too narrow the gaps are made narrow, then the lines unwrapped (it breaks them).
 
-    So it does where little more than a word a line would be left for the words of the other columns.
+    Too narrow is one that cannot hold the columns that must not be wrapped and `_LEAST_WORDS` of each other column.
     """
     from rich.cells import cell_len
     from rich.text import Text

@@ -103,14 +103,14 @@ def _thread_clock() -> Callable[[], int]:
 
 
 def typical(laps: Sequence[float] | NDArray[np.floating], turns: int) -> float:
-    """Median of laps; of pieces that took turns, the mean of each one's median: some may cost twice what others do.
+    """Median of laps; if `turns` pieces took turns, the mean of their medians: some may cost twice what others do.
 
     Parameters
     ----------
     laps : sequence of float
         In the order of the rounds.
     turns : int
-        Pieces that took turns.
+        Number of pieces that took turns.
     """
     return float(np.mean([np.median(laps[piece::turns]) for piece in range(min(turns, len(laps)))]))
 
@@ -161,5 +161,5 @@ def ratio(laps: Laps, base: Laps, *, turns: int = 1) -> dict[str, float]:
     worked, bare = np.asarray(laps.worked_s), np.asarray(base.worked_s)
     low, high = np.quantile(worked / bare, (0.1, 0.9))
     middle = typical(worked, turns) / typical(bare, turns)
-    # one round is no spread, and the ratio of typical times may leave a narrow one
+    # of one round, or a narrow spread, the ratio of typical times may lie outside the quantiles
     return {"ratio_to_fft": middle, "ratio_low": min(float(low), middle), "ratio_high": max(float(high), middle)}

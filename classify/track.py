@@ -1,4 +1,4 @@
-"""One answer for a track: the dwells of one target put together, and when it was safe to say."""
+"""One answer for a track: the dwells of one target fused, and after which dwell a class was safe to name."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,14 +14,15 @@ from .labels import CLASSES, UNKNOWN
 FITTED_DWELL_S = 0.08
 """Dwell that `LOOKS` was fitted to [s]."""
 
-# Who may speak after every dwell errs more often than who speaks once. Of 3029 tracks of 2.5 s at 0 dB and above of
-# models before these, with odds divided by 1.5, 2, 2.5, 3 and 4, 1.1, 0.7, 0.5, 0.4 and 0.4 % of the birds and
-# clutter were declared UAV (0.3 % were named so at the end), 4.3, 3.2, 2.5, 2.1 and 1.6 % of all something else than
-# they were, and 88, 86, 85, 83 and 81 % of the UAVs were declared after their first dwell.
+# A declaration, which may come after any dwell, must be surer than a label at the end: the odds are divided by this.
+# Of 3029 tracks of 2.5 s at 0 dB and above, answered by models before these with odds divided by 1.5, 2, 2.5, 3 and 4,
+# 1.1, 0.7, 0.5, 0.4 and 0.4 % of the birds and clutter were declared UAV (0.3 % were named so at the end), 4.3, 3.2,
+# 2.5, 2.1 and 1.6 % of all tracks were declared a wrong class, and 88, 86, 85, 83 and 81 % of the UAVs were declared
+# after their first dwell.
 DOUBT = 2.5
 
-_OFF = 1e-3  # rounded ones sum to 1 this nearly
-_FLOOR = 1e-6  # no single dwell rules a class out for ever
+_OFF = 1e-3  # the sum of probabilities, which may be rounded, is this near to 1
+_FLOOR = 1e-6  # least probability that counts: no single dwell rules a class out for ever
 
 Decide = Callable[[NDArray[np.floating]], tuple[NDArray[np.str_], list[str]]]
 Looks = tuple[ArrayLike, Sequence[str] | NDArray[np.str_]]
@@ -42,10 +43,10 @@ class Track:
     used
         Number of dwells that carried evidence.
     declared
-        The class that was safe to name first, as dwell after dwell came in; "" where none ever was. It stands: later
-        dwells may carry the label elsewhere, and then the two differ.
+        The first class that was safe to name as dwell after dwell came in; "" where none ever was. It is never
+        withdrawn: later dwells may change the label, and then the two differ.
     declared_after
-        Dwells that it took, silent ones among them; 0 where none was declared.
+        Number of dwells until then, those without evidence included; 0 where none was declared.
     """
 
     label: str
@@ -71,13 +72,13 @@ def fuse(
     Dwells of one target share its aspect, its background and the model's own error, so their evidence is correlated:
     the log-probabilities are averaged and weighted by the number of dwells that the correlated ones are worth,
     n / (1 + (n - 1) `correlation`). One dwell is left as it is, dwells that agree sharpen each other, and the order
-    does not matter to the label. A slow target shows its motion only to a long look: looks at several dwells in a row
-    as one are averaged among those of their length, and the mean of all averages counts, weighted by `weights`. A look
+    does not matter to the label. A slow target shows its motion only in longer looks, at several dwells in a row as one
+    record: looks of the same length are averaged, and the mean of the averages, weighted by `weights`, counts. A look
     without evidence ("unknown" with 1/3 each: outside the envelope, or without signal) is left out, and so is a longer
-    one at such a dwell; one that was merely not sure counts with what it said.
+    look that holds such a dwell; a look that was merely not sure counts with its probabilities.
 
-    A class is declared after the first dwell at which it would be named even with its odds divided by `DOUBT`: one who
-    may speak after every dwell must be surer than one who speaks once. So a label may stand that never was declared.
+    A class is declared after the first dwell at which it would be named even with its odds divided by `DOUBT`: a
+    decision that may come after any dwell must be surer than one at the end. So a label may never have been declared.
 
     Parameters
     ----------
@@ -88,21 +89,20 @@ def fuse(
     rule
         Labels and reasons of probabilities (n, 3), as `Classifier.decide`.
     longer
-        By their lengths in dwells, keys of `LOOKS`: probabilities and labels of the looks at so many dwells in a row;
-        number k of length n is known after dwell k n.
+        Length in dwells, a key of `LOOKS` above 1, to probabilities and labels of the looks at that many dwells in a
+        row; look number k of length n is known after dwell k n.
     shown
         What the whole track shows, of the keys of `ODDS`: a comb that stays, a wingbeat, a body that heaves as wings
-        lift it or sways as a walker's does. It speaks at the end, not while dwells come in; that nothing is found
-        says nothing.
+        lift it or sways as a walker's does. It counts after the last dwell only; that nothing is found is no evidence.
     correlation
         Between the evidence of two dwells, 0 (independent) to 1 (many are worth one).
     dwell_s
-        Length of a dwell [s], above 0 and at most 5: what a look counts depends on how long it is.
+        Length of a dwell [s], above 0 and at most 5: the weight of a look depends on its duration.
 
     Raises
     ------
     ValueError
-        The shapes do not match, a row of probabilities is none, looks are of a length without a weight, `shown` holds
+        The shapes do not match, a row holds no probabilities, looks are of a length without a weight, `shown` holds
         something else, `dwell_s` is not above 0 or above 5, or `correlation` is outside 0 to 1.
     """
     if not 0 <= correlation <= 1:
@@ -143,7 +143,7 @@ def fuse(
     fused[-1] /= fused[-1].sum() if shown else 1  # the only dwell of a track stays as it is, to the last digit
     named, reasons = rule(fused)
     doubted, _ = rule(_doubted(fused, named))
-    # the same class, or the odds divided would let the second speak
+    # it must be the same class: with the odds divided another one may be named
     safe = np.where((used > 0) & (named == doubted), named, UNKNOWN)
     first = int(np.argmax(safe != UNKNOWN))
     declared = str(safe[first]) if safe[first] != UNKNOWN else ""
@@ -152,10 +152,10 @@ def fuse(
 
 
 def weights(dwell_s: float) -> dict[int, float]:
-    """What the mean of the looks of each length counts, by their length in dwells of so many seconds.
+    """Weight of the mean of the looks of each length, by their length in dwells of `dwell_s`.
 
-    `LOOKS` was fitted to dwells of `FITTED_DWELL_S`. Looks of other dwells count as those of the same duration, between
-    two of them by the logarithm, and beyond the ends as the last.
+    `LOOKS` was fitted to dwells of `FITTED_DWELL_S`. Looks at dwells of another length weigh as those of the same
+    duration: interpolated over the logarithm of the duration, and beyond the ends as the last.
     """
     known_s = FITTED_DWELL_S * np.array(list(LOOKS))
     counts = np.interp(np.log(dwell_s * np.array(list(LOOKS))), np.log(known_s), list(LOOKS.values()))
@@ -191,7 +191,7 @@ def _heard(
 
 
 def carry_evidence(probabilities: NDArray[np.floating], labels: NDArray[np.str_]) -> NDArray[np.bool_]:
-    """Which looks carry evidence, shape (looks,): none that is "unknown" with 1/3 each."""
+    """Which looks carry evidence, shape (looks,): all but those that are "unknown" with 1/3 each."""
     away = np.abs(probabilities - probabilities.mean(axis=1, keepdims=True))
     return np.asarray((labels != UNKNOWN) | np.any(away >= 1e-6, axis=1), np.bool_)
 

@@ -85,7 +85,7 @@ def run_training(
         {
             "settings": settings.model_dump(mode="json"),
             "pupil_epochs": PUPIL_EPOCHS,
-            "run_records": TASK_RECORDS if stored is None else SHARD_RECORDS,  # kept parts hold so many of these
+            "run_records": TASK_RECORDS if stored is None else SHARD_RECORDS,  # a kept part holds several runs
             "simulator_sha256": simulator,
             "inputs_sha256": inputs_digest(),
             "schema_sha256": schema_hash(),
@@ -104,12 +104,12 @@ def _train_all(
     made_by: dict[str, Any],
     progress: bool,
 ) -> dict[str, Any]:
-    """Draw or read the records, train every model on them, and write these with their account."""
-    # Trees' threads that spin while they wait make training several times slower beside another busy process.
+    """Draw or read the records, train every model on them, and write the models with their account."""
+    # Beside another busy process, threads of boosted trees that spin while waiting slow the training several times.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     started = time.perf_counter()
     resumed = parts.begun
-    for name in settings.models:  # what is damaged is told before any record is drawn
+    for name in settings.models:  # damaged parts are reported before any record is drawn
         for part in (name, epochs_of(name)):
             parts.arrays(part)
     with Progress(visible=progress) as bars:
@@ -124,7 +124,7 @@ def _train_all(
 
         @cache
         def told() -> NDArray[np.float32]:
-            """What the teacher says of the training records, once for all of its pupils."""
+            """The teacher's probabilities of the kinds of the training records, computed once for all pupils."""
             return Classifier(files[f"{TEACHER}.onnx"], source=TEACHER).kind_shares(sets.train.inputs)
 
         for name in sorted(settings.models, key=lambda name: name != TEACHER):
@@ -146,7 +146,7 @@ def _train_all(
         **made_by,
     }
     files[ACCOUNT] = (json.dumps(account, indent=1, allow_nan=False) + "\n").encode()
-    _refuse_others(out, settings)  # nor has another run finished here meanwhile
+    _refuse_others(out, settings)  # again: another run may have finished here meanwhile
     write_together(out, files)
     parts.forget()
     if progress:

@@ -1,4 +1,4 @@
-"""A network's part of a training: its kinds, its teacher, and what an interruption leaves of it."""
+"""The training of one network: its kinds, its teacher, and how it goes on after an interruption."""
 
 import math
 from collections.abc import Callable
@@ -26,21 +26,21 @@ CLASS_OF_KIND = tuple(CLASSES.index(label) for label in KIND_CLASS.values())
 """Class of each kind that networks learn to tell, in the order of `KIND_CLASS`."""
 
 PUPIL_EPOCHS = 2
-"""Times the settings' epochs that a pupil makes: it goes on gaining by what its teacher says (docs/ablation.md)."""
+"""Factor on the settings' epochs for a pupil: it goes on gaining from its teacher's answers (docs/ablation.md)."""
 
 OnFraction = Callable[[float], None]
 
 ScoresOf = Callable[[Gathered], NDArray[np.floating]]
 
 Taught = Callable[[], NDArray[np.floating]]
-"""Gives what a network's teacher says of the training records, shape (n, kinds); asked only by one that is trained."""
+"""Returns the teacher's probabilities of the kinds of the training records, shape (n, kinds); called only to train."""
 
 
 def kinds_of(part: Gathered) -> NDArray[np.int64]:
     """Kind of each record, a place in `KIND_CLASS`.
 
-    A cell that is empty but for its background is ground: were it noise, a rotor that hovers, whose body's line is at
-    rest as the ground's is, would be too.
+    An empty cell with a background is ground, not noise: otherwise a hovering rotor, whose body's line is at rest as
+    the ground's is, would be taken for noise too.
     """
     place = {kind: number for number, kind in enumerate(KIND_CLASS)}
     kinds = np.array([place[kind] for kind in part.truth["kind"]], np.int64)
@@ -49,7 +49,7 @@ def kinds_of(part: Gathered) -> NDArray[np.int64]:
 
 
 def epochs_of(name: str) -> str:
-    """Name of the part that holds what is done of a network."""
+    """Name of the part that holds a network's state after its last whole epoch."""
     return f"{name}-epochs"
 
 
@@ -66,7 +66,8 @@ def train_net(
     Returns
     -------
     scores_of, export, detail
-        What gives the scores of records, what exports it with a calibration, and its part of the account.
+        A function that gives the scores of records, one that exports the network with a calibration, and the network's
+        part of the account.
     """
     from bladewing.models.export import export_network
     from bladewing.models.training import network_scores
@@ -121,7 +122,7 @@ def _trained(
             (_inputs(name, sets.validate), sets.validate.labels),
             Course(**course),
             seed=seed,
-            # no measurement is signed, so only the picture is mirrored
+            # no other input depends on the sign of the velocity, so only the signal is mirrored
             augment=VelocityMirror(signal, -2 if image else -1),
             snapshot=parts.arrays(epochs_part) if parts else None,
             on_snapshot=partial(parts.keep_arrays, epochs_part) if parts else None,
@@ -140,7 +141,7 @@ def _inputs(name: str, part: Gathered) -> dict[str, NDArray]:
 
 
 def _told(metric: str, value: float) -> float | None:
-    """A metric of an epoch as the account holds it; JSON has no word for one that is not finite."""
+    """A metric of an epoch as the account holds it; None if not finite, as JSON cannot hold that."""
     if not math.isfinite(value):
         return None
     return float(f"{value:.3g}") if metric == "learning_rate" else round(value, 4)

@@ -30,7 +30,7 @@ def figures(
     accept: NDArray[np.floating],
     false_alarm: float,
 ) -> dict[str, Any]:
-    """What the table quotes, on records that neither training nor calibration has seen."""
+    """The figures that the table quotes: `accept` sets what is named, `false_alarm` the threshold for detection."""
     winner = probabilities.argmax(axis=1)
     recall = [float(np.mean(winner[labels == index] == index)) for index in range(len(CLASSES))]
     threshold = least_named(probabilities[labels != 0, 0], false_alarm)

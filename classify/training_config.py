@@ -22,7 +22,7 @@ class TrainingConfig(BaseModel):
     #: Records that are trained on; those for validation, calibration and test come on top.
     records: Annotated[int, Field(ge=LEAST_RECORDS, le=10_000_000)] = 30_000
     seed: Annotated[int, Field(ge=0, lt=SEEDS)] = 0
-    #: Looks of a network at every record; twice as many of one that a teacher teaches.
+    #: Passes of a network over the records; a network with a teacher makes twice as many.
     epochs: Annotated[int, Field(ge=1, le=1000)] = 8
     #: Epochs in a row without a lower validation loss after which a network stops; 0: never.
     patience: Annotated[int, Field(ge=0, le=1000)] = 20
@@ -32,12 +32,12 @@ class TrainingConfig(BaseModel):
     weight_decay: Annotated[float, Field(ge=0, le=10)] = 0.3
     #: Whether networks compute in bfloat16 while they learn: faster where the processor or the GPU has it, slower else.
     bfloat16: bool = False
-    #: Rounds of a boosted model, a tree a class each, and leaves of a tree.
+    #: iterations: rounds of a boosted model, each of one tree a class; leaves: leaves of a tree.
     iterations: Annotated[int, Field(ge=1, le=1000)] = 80
     leaves: Annotated[int, Field(ge=2, le=256)] = 15
-    #: Share of the records named each class that is to be right: it sets the thresholds under which "unknown" is said.
+    #: Share of the records named a class that must be right: it sets the thresholds under which "unknown" is said.
     precision: Annotated[float, Field(gt=1 / 3, le=1)] = 0.9
-    #: Share of birds and clutter that may be named UAV: its threshold keeps that as well.
+    #: Largest share of birds and clutter that may be named UAV: the threshold on "uav" keeps to this as well.
     false_alarm: Annotated[float, Field(gt=0, lt=1)] = 0.01
     models: Annotated[tuple[str, ...], Field(min_length=1, strict=False)] = (
         "features-linear",

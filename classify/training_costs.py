@@ -1,4 +1,4 @@
-"""What the models of a training cost, and what two of them are worth in a cascade."""
+"""What the models of a training cost, and the account of the cascade of two of them."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -46,7 +46,7 @@ def add_costs(
     -------
     dict or None
         The names of its two models, how many test records the second is asked about, its figures on them, its cost and
-        its thresholds; None where one model is both the cheapest and the best. The teacher is none of them.
+        its thresholds; None where one model is both the cheapest and the best. The teacher is never one of the two.
     """
     classifiers = {name: Classifier(files[f"{name}.onnx"], source=name) for name in models}
     for name, cost in costs_ffts(classifiers).items():

@@ -1,6 +1,6 @@
-"""Tasks done on several processes, their results in order; Ctrl-C and a killed parent end them all.
+"""Tasks done on several processes, their results in order; Ctrl-C or the death of the parent ends all processes.
 
-Where processes cannot be had, or are lost, the tasks are done without them.
+Where processes cannot be started, or are lost, the tasks are done in this process.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ def workers_at_hand() -> int:
 
 
 def in_order(work: Callable[[Task], Done], tasks: Sequence[Task], workers: int | None = None) -> Iterator[Done]:
-    """Do tasks on several processes; give the results in the order of the tasks, a few a worker under way.
+    """Do tasks on several processes; yield the results in the order of the tasks, a few of them under way a worker.
 
     Parameters
     ----------
     work, tasks
-        What to do with each; both must travel to another process.
+        What to do with each; both must be picklable.
     workers : int, optional
-        Processes; by default one a processor. 1 works in this process, and so does what workers cannot do: where
-        processes, memory or semaphores are short, in a worker of somebody else's pool, or once one is killed.
+        Processes; by default one a processor. With 1 the tasks are done in this process, as are those that workers
+        cannot do: where processes, memory or semaphores are short, in a worker of another pool, or once one is killed.
     """
     workers = workers_at_hand() if workers is None else workers
     done = 0
@@ -71,17 +71,17 @@ def _by_workers(work: Callable[[Task], Done], tasks: Sequence[Task], workers: in
                 yield _result(waiting.pop(0))
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
-            for worker in set(active_children()) - others:  # else what they have begun is waited for
+            for worker in set(active_children()) - others:  # else the tasks that they have begun are waited for
                 worker.terminate()
             raise
 
 
 @contextmanager
 def _told_apart() -> Iterator[None]:
-    """Tell what starting a worker raises from what the work does: within, nothing of the work runs."""
+    """Turn errors of starting a worker into `_NoWorkersError`; no work runs within, so that its errors stay apart."""
     try:
         yield
-    except (OSError, RuntimeError, AssertionError) as error:  # the last of a daemonic process
+    except (OSError, RuntimeError, AssertionError) as error:  # AssertionError: from a daemonic process
         raise _NoWorkersError from error
 
 
@@ -95,14 +95,14 @@ def _result(asked: Future[Done]) -> Done:
 
 @contextmanager
 def _deaf_children() -> Iterator[None]:
-    """Processes started within never hear of Ctrl-C, which a terminal sends to all: they end with their parent.
+    """Processes started within never get Ctrl-C, which a terminal sends to all: they end with their parent.
 
-    It is held back, not ignored: the parent hears of it right after.
+    In the parent it is held back, not ignored: it arrives right after the context.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    resource_tracker.ensure_running()  # whose own start would let it through again
+    resource_tracker.ensure_running()  # started before: its start would unblock the signal
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -114,7 +114,7 @@ def _deaf_children() -> Iterator[None]:
 def _without_main() -> Iterator[None]:
     """Processes started within do not run the caller's script again: their work needs nothing of it.
 
-    They would, to find what is pickled by a name in it, and all that no guard keeps from it with it.
+    Otherwise they would run it to find objects pickled by a name in it, with all of it that no guard excludes.
     """
     names = vars(sys.modules["__main__"])
     kept: dict[str, Any] = {name: names[name] for name in ("__spec__", "__file__") if name in names}
@@ -130,8 +130,8 @@ def _without_main() -> Iterator[None]:
 def _begin() -> None:
     """Begin as a worker: on one thread, and watching the parent.
 
-    There are as many workers as processors; with threads of their own besides they draw two thirds as many records. A
-    worker whose parent was killed would wait for work for ever.
+    There are as many workers as processors; with several threads each they draw two thirds as many records. Unwatched,
+    a worker whose parent was killed would wait for work for ever.
     """
     one_thread.__enter__()
     parent = parent_process()

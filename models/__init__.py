@@ -1,7 +1,7 @@
 """Models: arrays in, scores and self-contained ONNX bytes out; nothing here knows a radar or a file.
 
-The models stand on a ladder from tens of microseconds a record upwards, so that a report can say what each step buys
-(`LADDER`). Their outputs are always in the order uav, bird, clutter.
+The models form a ladder of rising cost (`LADDER`), from tens of microseconds a record, so that a report can say what
+each step gains. Their outputs are always in the order uav, bird, clutter.
 
 Modules
 -------
@@ -10,18 +10,18 @@ tabular
 cnn
     Small convolutional networks on the velocity spectrum or on the joint image, most beside a vector of measurements.
 training, training_state, augment
-    The loop that trains a network, where it stands between two epochs as plain arrays, and the mirrored radial velocity
-    it may train on.
+    The loop that trains a network, its state between two epochs as plain arrays, and the augmentation that mirrors the
+    radial velocity.
 muon
     The optimiser of matrices and kernels.
 calibration
-    From scores to probabilities that mean what they say, and the thresholds below which the answer is "unknown".
+    Calibrated probabilities from scores, and the thresholds below which the answer is "unknown".
 operating
-    The threshold for a false-alarm rate, and what detection remains.
+    The threshold for a false-alarm rate, and the detection probability that remains.
 export, seal
     ONNX with the calibration inside, and the seal that shows any later change of a byte.
 session
-    How a model's session is opened.
+    Opens a model's onnxruntime session.
 
 Importing this package, `seal` or `session` imports no training library.
 """
@@ -39,7 +39,7 @@ class Rung:
     learner
         What is trained: logistic regression, boosted trees or a convolutional network.
     inputs
-        Names of what it reads; a network's signal first.
+        Names of its inputs; of a network's inputs the signal comes first.
     widen
         Factor on the channels of a network.
     """
@@ -61,16 +61,16 @@ LADDER: dict[str, Rung] = {
     "joint-boosted": Rung("boosted", ("joint_features",)),
     "image-cnn": Rung("network", ("image", "joint_features")),
 }
-"""Name of a model (the stem of its file) to what it is."""
+"""Model name (the stem of its file) to its rung."""
 
 TEACHER = "spectrum-cnn-teacher"
-"""The network whose answers the others learn from besides the labels, where it is trained in the same run."""
+"""The teacher: where it is trained in the same run, the other networks learn from its answers besides the labels."""
 
 DEFAULT_MODEL = "spectrum-cnn-wide"
 """The model that is used where none is named."""
 
 KIND_SCORES = "kind_scores"
-"""What a network that knows kinds calls their raw scores, beside those of the classes."""
+"""Name of the output with the raw scores of the kinds, which networks that tell kinds apart give beside the scores."""
 
 WEIGHT_STEPS = 127
-"""Steps of a network's weights that are stored in a byte each, to either side of 0."""
+"""Largest multiple of the quantisation step, to either side of 0, of a network's weights that take a byte each."""

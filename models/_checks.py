@@ -1,4 +1,4 @@
-"""What every training function demands of its arrays, each demand with one clear line."""
+"""Checks of the arrays that training functions take; each check that fails raises one clear line."""
 
 from collections.abc import Sequence
 
@@ -79,12 +79,12 @@ def require_labels(y: NDArray[np.integer], count: int, name: str) -> None:
 
 
 def require_kinds(kinds: NDArray[np.integer], y: NDArray[np.integer], class_of: Sequence[int]) -> None:
-    """Refuse kinds that are not one a record, of the record's class.
+    """Refuse kinds that are not one for each record, or not of the record's class.
 
     Parameters
     ----------
     kinds
-        Array that should have the shape of `y`, each a place in `class_of`.
+        Array that should have the shape of `y`, each an index into `class_of`.
     y
         Labels, shape (n,), whole numbers 0 to 2.
     class_of
@@ -126,12 +126,12 @@ def require_every_class(y: NDArray[np.integer], name: str) -> None:
 
 
 def require_shares(values: NDArray[np.floating], count: int, kinds: int, name: str) -> None:
-    """Refuse probabilities that are not one of each kind a record.
+    """Refuse probabilities that are not one for each record and kind, or whose rows do not sum to 1.
 
     Parameters
     ----------
     values
-        Array that should have the shape (n, kinds), its rows 1 in sum.
+        Array that should have the shape (n, kinds), each row summing to 1.
     count, kinds
         Number of records n, and of kinds.
     name

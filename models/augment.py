@@ -1,4 +1,4 @@
-"""Changes of a training batch that leave its class as it is, because physics says so."""
+"""Augmentation of a training batch: changes that, by the physics, leave the class of each record as it is."""
 
 from collections.abc import Mapping
 
@@ -7,16 +7,16 @@ from torch import Tensor
 
 
 class VelocityMirror:
-    """Let half of the records, drawn at random, recede where they approached.
+    """Mirrors the radial velocity of records drawn at random, each with probability 1/2.
 
     A target flying away has the spectrum of one flying towards the radar, read backwards: the class stays.
 
     Parameters
     ----------
     signal
-        Name of the input that shows the velocity; no other has a sign.
+        Name of the input with a velocity axis; no other input depends on the sign of the velocity.
     axis
-        The axis of velocity in it, the batch being axis 0; it must be symmetric about zero.
+        Its velocity axis, which must be symmetric about zero; axis 0 is the batch.
     """
 
     def __init__(self, signal: str, axis: int) -> None:

@@ -1,4 +1,4 @@
-"""From scores to probabilities that mean what they say, and to the thresholds of an honest "unknown".
+"""Calibrated probabilities from scores, and the thresholds below which the answer is "unknown".
 
 Vector scaling: probabilities = softmax(scale * scores + bias), with one scale and one bias a class, fitted on records
 that the model did not train on. Temperature scaling (Guo et al. 2017), scale = 1 / temperature, is the case without
@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._checks import CLASS_COUNT, require_finite, require_labels
 
-# Widths of the Gaussian priors that hold a fit on few or separable records; a thousand records outweigh them. The prior
-# of the scale is centred where the scaled scores spread by 1, so that the units of the scores do not matter.
+# Standard deviations of the Gaussian priors on the logarithm of the scale and on the biases. The priors keep a fit on
+# few or separable records bounded; a thousand records outweigh them. The prior of the scale is centred where the scaled
+# scores have a standard deviation of 1, so that the units of the scores do not matter.
 _LOG_SCALE_SIGMA = np.log(10.0)
 _BIAS_SIGMA = 1.0
 
@@ -35,7 +36,7 @@ def softmax(scores: ArrayLike) -> NDArray[np.float64]:
         Shape (..., K), each vector sums to 1.
     """
     scores = np.asarray(scores, dtype=np.float64)
-    with np.errstate(over="ignore", under="ignore"):  # what lies beyond float64 below the largest has no share
+    with np.errstate(over="ignore", under="ignore"):  # a score that far below the largest gets 0
         powers = np.exp(scores - scores.max(axis=-1, keepdims=True))
     return powers / powers.sum(axis=-1, keepdims=True)
 
@@ -83,7 +84,7 @@ class Calibration:
 
 
 def fit_vector_scaling(scores: NDArray[np.floating], labels: NDArray[np.integer]) -> Calibration:
-    """Fit one scale and a bias for each class by maximum likelihood, the biases lightly held at 0.
+    """Fit one scale and a bias for each class by maximum likelihood, with weak priors on the scale and the biases.
 
     Parameters
     ----------
@@ -173,7 +174,7 @@ def expected_calibration_error(
 def acceptance_thresholds(
     probabilities: ArrayLike, labels: NDArray[np.integer], precision: float = 0.9, support: int = 10
 ) -> NDArray[np.float64]:
-    """Return, for each class, the least winning probability from which on its answers keep a precision.
+    """Return, for each class, the least winning probability at and above which its answers keep a precision.
 
     Parameters
     ----------
@@ -184,7 +185,7 @@ def acceptance_thresholds(
     precision
         Share of accepted answers that must be right, above 0 and at most 1.
     support
-        Number of accepted answers below which a precision is taken for luck, at least 1.
+        Fewest accepted answers that a threshold may rest on, at least 1: fewer may keep the precision by chance.
 
     Returns
     -------
@@ -235,8 +236,8 @@ def conformal_thresholds(probabilities: ArrayLike, labels: NDArray[np.integer], 
     Returns
     -------
     ndarray
-        Shape (3,): the set of a record holds class c where its probability is at least threshold c. 0, always, where
-        there are too few records of a class to promise more.
+        Shape (3,): the set of a record holds class c where its probability is at least threshold c. 0 (every set holds
+        the class) where there are too few records of the class for any higher threshold.
 
     Raises
     ------

@@ -1,13 +1,13 @@
 """Two small convolutional networks, each reading a signal, most often beside other evidence.
 
-Both have the same anatomy: strided convolutions over the signal, a small branch over each other input (a cadence, a
-vector of measurements), and a common head. Half-way the convolutions are told where on the velocity axis they look, and
-by the evidence what for: an offset of each place, a gain and an offset of each map. What they end with is seen by its
-mean in bands of speed (how much there is of a pattern, and how far from rest) and its maximum (whether it is there).
-The inputs are standardised inside, by buffers that `EvidenceNet.standardise_by` fills: the exported model eats raw
-inputs.
-A network may learn kinds, of which each belongs to a class, and tell the classes: what sets a rotor's comb apart from a
-turbine's and from a wheel's is more than three words can teach.
+Both have the same architecture: strided convolutions over the signal (a stem, then a trunk), a small branch over each
+other input (a spectrum of rates, a vector of measurements), and a common head. Between stem and trunk a learned offset
+marks each place on the velocity axis, and the evidence sets a gain and an offset of each feature map. After the trunk
+each map is reduced to its means in bands of speed (how much there is of a pattern, and how far from rest) and its
+maximum (whether it is there). The inputs are standardised inside, by buffers that `EvidenceNet.standardise_by` fills:
+the exported model takes raw inputs.
+A network may be trained on kinds, each of which belongs to a class; the scores of the classes follow from those of the
+kinds. Three classes alone teach too little of what sets a rotor's comb apart from a turbine's and from a wheel's.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -23,11 +23,11 @@ from ._checks import CLASS_COUNT, require_finite
 
 _BRANCH = 64
 _RATES = (16, 24, 32)  # channels of the convolutions over a spectrum of rates
-_SPEED_BANDS = 4  # of a trunk's places, both signs of the velocity alike
-_HEAD = 128  # 48 were the narrowest place of all (docs/ablation.md)
+_SPEED_BANDS = 4  # bands of the velocity's magnitude over the trunk's places
+_HEAD = 128  # hidden units of the head; with 48 it was the bottleneck of the network (docs/ablation.md)
 _CLIP = 8.0  # standard deviations; beyond them an input says no more than "very much"
 _CHUNK = 1024
-_LEAST_EXPONENT = -100  # of two, of a weight's step: an output whose weights are smaller has none
+_LEAST_EXPONENT = -100  # power of two of a weight's step: an output whose step is not above it is rounded to 0
 
 
 class Standardise(nn.Module):
@@ -86,7 +86,7 @@ class _Convolution(nn.Sequential):
 
 
 class _Residual(nn.Module):
-    """Convolution beside a way around it."""
+    """Residual block: a convolution added to its input, then a rectifier."""
 
     def __init__(self, channels: int, kernel: tuple[int, int]) -> None:
         super().__init__()
@@ -101,15 +101,16 @@ class _Residual(nn.Module):
 
 
 def _left_by(layers: Iterable[nn.Module], places: int) -> tuple[int, int]:
-    """Maps that layers end with, and the places of so many along an axis: each stride halves, rounding up."""
+    """Number of maps after layers, and what they leave of `places` along an axis: each stride halves, rounding up."""
     strided = [layer for layer in layers if isinstance(layer, _Convolution)]
     return strided[-1].outputs, -(-places // 2 ** len(strided))
 
 
 def _branch(shape: tuple[int, ...]) -> nn.Sequential:
-    """From evidence to `_BRANCH` numbers: dense over measurements (F,), convolutions over a spectrum of rates (C, B).
+    """Layers from evidence to `_BRANCH` numbers: dense for measurements (F,), convolutions for rates (C, B).
 
-    Rates keep their place on the axis, as a wing's are not a rotor's: what the convolutions leave goes on bin by bin.
+    The output of the convolutions is flattened, not averaged, which keeps the place of each rate on the axis: a wing's
+    rates are not a rotor's.
     """
     if len(shape) == 1:
         return nn.Sequential(nn.Linear(shape[0], _BRANCH), nn.ReLU())
@@ -123,7 +124,7 @@ def _branch(shape: tuple[int, ...]) -> nn.Sequential:
 
 
 def _speed_bands(places: int) -> Tensor:
-    """What makes of values along an axis of velocity their means in bands of speed, shape (places, bands)."""
+    """Matrix that averages values along a velocity axis in bands of speed, shape (places, bands)."""
     away = torch.arange(places) - (places - 1) / 2
     bands = min(_SPEED_BANDS, (places + 1) // 2)
     own = nn.functional.one_hot((away.abs() / (places / 2) * bands).long(), bands).float()
@@ -131,11 +132,11 @@ def _speed_bands(places: int) -> Tensor:
 
 
 CLASSES_ALONE = tuple(range(CLASS_COUNT))
-"""The kinds of a network that knows none but the classes."""
+"""The kinds of a network that tells only the classes apart: each class is its own kind."""
 
 
 class EvidenceNet(nn.Module):
-    """A signal and other evidence to three scores; the anatomy that both networks share.
+    """Network from a signal and other evidence to three scores; the architecture that both networks share.
 
     Parameters
     ----------
@@ -143,15 +144,15 @@ class EvidenceNet(nn.Module):
         The inputs, name to shape of one record: the signal (C, ...) first, then the evidence, if any: a spectrum of
         rates (C, B), measurements (F,).
     stem, trunk
-        Layers over the signal (n, C, H, W), before and after they are told where they look and what for; velocity lies
-        along W of a signal of one axis (H is 1), along H of an image.
+        Layers over the signal (n, C, H, W), before and after the offsets of place and the evidence are applied.
+        Velocity lies along W of a signal of one axis (H is 1), along H of an image.
     kinds
-        Class of each kind that the network tells apart inside, 0 to 2, rising.
+        Class of each kind that the network tells apart, 0 to 2, in rising order.
 
     Raises
     ------
     ValueError
-        Where the kinds do not rise, or a class has none.
+        Where the kinds are not in rising order, or a class has no kind.
     """
 
     bands: Tensor
@@ -175,18 +176,18 @@ class EvidenceNet(nn.Module):
         self.stem, self.trunk = stem, trunk
         self.branches = nn.ModuleList(_branch(shape) for shape in evidence)
         maps, places = _left_by(stem, signal[1])
-        self.place = nn.Parameter(torch.zeros(maps * places))  # of one dimension, as all that is an offset
+        self.place = nn.Parameter(torch.zeros(maps * places))  # one axis, as every offset has
         self.along = (1, maps, 1, places) if self.flat else (1, maps, places, 1)
         told = _BRANCH * len(evidence)
         self.told = nn.Linear(told, 2 * maps) if told else None
-        if self.told is not None:  # at first the maps are as they are
+        if self.told is not None:  # start with gain 1 and offset 0
             nn.init.zeros_(self.told.weight)
             nn.init.ones_(self.told.bias[:maps])
             nn.init.zeros_(self.told.bias[maps:])
         width, left = _left_by(trunk, places)
         self.register_buffer("bands", _speed_bands(left))
         seen = (self.bands.shape[1] + 1) * width + told
-        # no dropout: with drawn records by the hundred thousand nothing is learned by heart, and it costs accuracy
+        # no dropout: of hundreds of thousands of drawn records none is memorised, and dropout costs accuracy
         self.head = nn.Sequential(nn.Linear(seen, _HEAD), nn.ReLU(), nn.Linear(_HEAD, len(self.kinds)))
 
     def standardise_by(self, inputs: Mapping[str, NDArray[np.floating]]) -> None:
@@ -240,10 +241,10 @@ class EvidenceNet(nn.Module):
         return counts.pop()
 
     def compact(self) -> None:
-        """Fold each normalisation into its convolution and round the weights, for good: see `rounded`.
+        """Fold each batch normalisation into its convolution and round the weights, for good: see `rounded`.
 
-        What is left computes in float32 as before and is stored in a byte a weight without a further change. Call it
-        after training and before calibration, so that every figure is that of the network which is stored.
+        The network computes in float32 as before, and its weights can be stored in a byte each without further change.
+        Call it after training and before calibration, so that every figure is that of the network which is stored.
         """
         self.eval()
         with torch.no_grad():
@@ -275,7 +276,7 @@ class EvidenceNet(nn.Module):
         return self.class_scores(self.kind_scores(signal, *evidence))
 
     def class_scores(self, kind_scores: Tensor) -> Tensor:
-        """Return the scores of the classes, shape (n, 3), whose shares are those of their kinds together."""
+        """Return the scores of the classes, shape (n, 3): a class has the probability of its kinds together."""
         if self.kinds == CLASSES_ALONE:
             return kind_scores
         # record by record: a logarithm of all at once rounds a record by its place in the batch
@@ -300,22 +301,23 @@ class EvidenceNet(nn.Module):
 
 
 def rounded(weights: Tensor) -> Tensor:
-    """Round a layer's weights to what takes a byte each, its offsets to half precision.
+    """Round a layer's weights so that each can be stored in a byte, or its offsets to half precision.
 
     Parameters
     ----------
     weights
-        Finite, outputs first; of one dimension, offsets.
+        Finite, outputs on axis 0; a tensor of one axis holds offsets.
 
     Returns
     -------
     Tensor
-        As many: of each output whole multiples, of at most `WEIGHT_STEPS`, of a step of eleven bits.
+        Same shape. The weights of each output are multiples, -`WEIGHT_STEPS` to `WEIGHT_STEPS`, of a step with a
+        mantissa of eleven bits.
     """
     if weights.ndim == 1:
         return weights.half().float()
     rows = weights.reshape(len(weights), -1)
-    # eleven bits, as half precision has, so that each multiple is exact; but however small the weights are
+    # a mantissa of eleven bits, as in half precision, makes each multiple exact; the exponent may be much lower
     mantissa, exponent = torch.frexp(rows.abs().amax(1, keepdim=True) / WEIGHT_STEPS)
     step = torch.where(exponent > _LEAST_EXPONENT, torch.ldexp((mantissa * 2048).round() / 2048, exponent), 0.0)
     whole = (rows / torch.where(step > 0, step, torch.ones(()))).round().clamp(-WEIGHT_STEPS, WEIGHT_STEPS)

@@ -1,7 +1,8 @@
 """ONNX models that need nothing beside them: raw inputs in, raw scores and calibrated probabilities out.
 
 Every graph reads float32 inputs whose first axis is the batch, the only one that may vary, and gives "scores" and
-"probabilities", both (batch, 3); that of a network that knows kinds gives their raw "kind_scores" too, (batch, kinds).
+"probabilities", both (batch, 3); the graph of a network that tells kinds apart also gives their raw "kind_scores",
+(batch, kinds).
 The calibration is three nodes at the end: Mul, Add, Softmax.
 """
 
@@ -101,7 +102,7 @@ def export_network(net: "EvidenceNet", input_shapes: Mapping[str, tuple[int, ...
             dynamic_shapes=({0: batch}, tuple({0: batch} for _ in example[1:])),
         )
     assert program is not None
-    model = program.model_proto  # made anew at each asking
+    model = program.model_proto  # built anew at each access
     _store_rounded(model.graph)
     return _finish(model, net.input_shapes, calibration, len(net.kinds) if told else 0)
 
@@ -152,7 +153,7 @@ def export_tabular(
 
 
 def attach_metadata(onnx_bytes: bytes, metadata: Mapping[str, str]) -> bytes:
-    """Write a model's metadata, with an empty place for the seal beside them; earlier metadata are replaced.
+    """Write a model's metadata, with a placeholder for the seal; earlier metadata are replaced.
 
     Parameters
     ----------
@@ -182,7 +183,7 @@ def attach_metadata(onnx_bytes: bytes, metadata: Mapping[str, str]) -> bytes:
 
 
 def in_eight_bits(onnx_bytes: bytes) -> bytes:
-    """Give a network with its weights and products in eight bits, to be weighed against the one it was made of.
+    """Quantise a network's weights and products to eight bits, to compare it with the original.
 
     Parameters
     ----------
@@ -192,8 +193,8 @@ def in_eight_bits(onnx_bytes: bytes) -> bytes:
     Returns
     -------
     bytes
-        The network with the same inputs, outputs and metadata, but for the seal, which is to be set again. Weights of
-        8 bits are scaled by tensor, activations by record batch as they come (onnxruntime's dynamic quantisation).
+        The network with the same inputs, outputs and metadata, except the seal, which must be set again. The weights
+        have one scale a tensor; activations are scaled batch by batch at run time (onnxruntime's dynamic quantisation).
     """
     from onnxruntime.quantization import QuantType, quantize_dynamic
 
@@ -202,7 +203,7 @@ def in_eight_bits(onnx_bytes: bytes) -> bytes:
     _widen(graph)
     metadata = {entry.key: entry.value for entry in model.metadata_props}
     level = logging.root.level
-    logging.root.setLevel(logging.ERROR)  # its advice to optimise first is not for here
+    logging.root.setLevel(logging.ERROR)  # hides its advice to optimise the model first
     try:
         with tempfile.TemporaryDirectory() as folder:
             small = Path(folder) / "small.onnx"
@@ -261,7 +262,7 @@ def check_export(
 def _finish(
     model: onnx.ModelProto, input_shapes: Mapping[str, tuple[int, ...]], calibration: Calibration, kinds: int = 0
 ) -> bytes:
-    """Append the calibration, remove what inference does not need, check, serialise; so many kinds are told too."""
+    """Append the calibration, remove what inference does not need, check, serialise; `kinds` > 0 adds their scores."""
     graph = model.graph
     _require_free_batch(graph, input_shapes)
     graph.name = "bladewing"
@@ -299,7 +300,7 @@ def _finish(
 
 
 def _require_free_batch(graph: onnx.GraphProto, input_shapes: Mapping[str, tuple[int, ...]]) -> None:
-    """Refuse a graph whose inputs vary elsewhere than in the batch, or not there: converters err silently."""
+    """Refuse a graph unless the batch is the only free axis of each input: converters err there without a message."""
     found = {}
     for node in graph.input:
         dims = node.type.tensor_type.shape.dim
@@ -311,7 +312,7 @@ def _require_free_batch(graph: onnx.GraphProto, input_shapes: Mapping[str, tuple
 
 @contextmanager
 def _quiet_converters() -> Iterator[None]:
-    """Hold back what converters say of themselves: no torchvision, deprecated calls into each other."""
+    """Hold back messages of the converters: that torchvision is missing, that they call deprecated functions."""
     logger = logging.getLogger("torch.onnx")
     level = logger.level
     logger.setLevel(logging.ERROR)
@@ -324,7 +325,7 @@ def _quiet_converters() -> Iterator[None]:
 
 
 def _store_rounded(graph: onnx.GraphProto) -> None:
-    """Store weights that `cnn.rounded` left exact in a byte each, offsets in two; runtimes widen them as they load."""
+    """Store weights from `cnn.rounded` in a byte each, offsets in two, where exact; runtimes widen them on loading."""
     for weights in list(graph.initializer):
         values = numpy_helper.to_array(weights)
         if weights.data_type != TensorProto.FLOAT or values.size < _LEAST_ROUNDED:
@@ -334,7 +335,7 @@ def _store_rounded(graph: onnx.GraphProto) -> None:
         largest = np.abs(values).max(axis=tuple(range(1, values.ndim)), keepdims=True)
         steps = np.where(largest > 0, largest / np.float32(WEIGHT_STEPS), np.float32(1))
         codes = np.rint(values / steps)
-        if values.ndim > 1 and np.array_equal(codes * steps, values):  # of a vector each value would be a step
+        if values.ndim > 1 and np.array_equal(codes * steps, values):  # in a vector each value is its own step
             graph.initializer.extend(
                 [
                     numpy_helper.from_array(codes.astype(np.int8), in_bytes),
@@ -377,7 +378,7 @@ def _rename(graph: onnx.GraphProto, old: str, new: str) -> None:
 
 
 def _drop_unused_tree_attributes(node: onnx.NodeProto) -> None:
-    """Take out an eighth of a tree ensemble that runtimes ignore."""
+    """Remove the "nodes_hitrates" of a tree ensemble: an eighth of its size, which runtimes ignore."""
     kept = [attribute for attribute in node.attribute if attribute.name != "nodes_hitrates"]
     del node.attribute[:]
     node.attribute.extend(kept)

@@ -1,22 +1,23 @@
-"""Muon: steps along a momentum whose directions all weigh the same, for matrices and the kernels of convolutions."""
+"""Muon, an optimiser for matrices and the kernels of convolutions: its steps are the momentum, made orthogonal."""
 
 from collections.abc import Iterable
 
 import torch
 from torch import Tensor
 
-#: Share of the past in the average of the gradients, with Nesterov's look ahead.
+#: Weight of the past in the running average of the gradients, and of that average in Nesterov's look-ahead.
 MOMENTUM = 0.95
 
-_NEWTON_SCHULZ = (3.4445, -4.7750, 2.0315)  # Jordan's: not exact, singular values end between 0.7 and 1.2
+_NEWTON_SCHULZ = (3.4445, -4.7750, 2.0315)  # K. Jordan's: singular values end between 0.7 and 1.2, not exactly at 1
 _STEPS = 5
 
 
 class Muon(torch.optim.Optimizer):
     """Momentum, orthogonalised (K. Jordan, kellerjordan.github.io/posts/muon, 2024), with decoupled weight decay.
 
-    A gradient of a layer is dominated by few directions; made orthogonal, the rare ones are learnt as fast. torch's own
-    takes matrices alone and computes in bfloat16; here a kernel is the matrix of its outputs, in the precision it has.
+    Few directions dominate the gradient of a layer; in an orthogonal step the rare ones are learnt as fast. torch's own
+    Muon takes only matrices and computes in bfloat16; here a kernel is a matrix with one row for each output, and keeps
+    its precision.
 
     Parameters
     ----------
@@ -48,17 +49,17 @@ class Muon(torch.optim.Optimizer):
 
 
 def orthogonal(matrix: Tensor) -> Tensor:
-    """Bring all singular values of a matrix near 1, its singular vectors kept: Newton and Schulz, no decomposition.
+    """Bring all singular values of a matrix near 1 and keep its singular vectors, by Newton-Schulz iteration.
 
     Parameters
     ----------
     matrix
-        Shape (rows, columns). Of rank 0, what is returned is 0.
+        Shape (rows, columns); a matrix of zeros stays as it is.
 
     Returns
     -------
     Tensor
-        Same shape; singular values 0.7 to 1.2, but for those below about 1/1000 of the whole.
+        Same shape; singular values 0.7 to 1.2, except those that were below about 1/1000 of the matrix's norm.
     """
     a, b, c = _NEWTON_SCHULZ
     tall = matrix.shape[0] > matrix.shape[1]

@@ -11,19 +11,21 @@ from numpy.typing import ArrayLike, NDArray
 from ._checks import CLASS_COUNT, require_finite, require_labels
 from .calibration import NEVER
 
-#: False alarms that a threshold must rest on: with fewer its rate is wrong by more than a third (1 / sqrt(10)).
+#: Fewest false alarms that a threshold may rest on: with n the relative standard deviation of its rate is 1 / sqrt(n),
+#: with 10 about a third.
 SUPPORT = 10
 
-# Renard's series R10 (ISO 3), falling: with most rates their half is there too, which a cascade gives each model.
+# Renard's series R10 (ISO 3), falling. It also holds half of most of its rates, the share that a cascade gives each of
+# its two models.
 _RATES = (5.0, 4.0, 3.15, 2.5, 2.0, 1.6, 1.25, 1.0, 0.8, 0.63)
-_EVERY_WIN = 0.3333333  # the most probable of three reaches it
-_ABOVE = 1e-6  # from a probability to a threshold over it: they are compared as float32, and kept with 7 decimals
+_EVERY_WIN = 0.3333333  # the most probable of three classes always reaches it
+_ABOVE = 1e-6  # from a probability to a threshold over it: larger than the rounding to float32 and to 7 decimals
 
 
 def first_out(scores: NDArray[np.floating], false_alarm: float) -> float:
-    """Give the highest of the non-targets' scores that may no longer pass: what lies above it keeps to the rate.
+    """Return the highest score of a non-target that must not pass: letting only higher ones pass keeps to the rate.
 
-    The threshold for scores of any scale that are at hand: they are compared with it by ``>``.
+    This is the threshold for scores at hand, of any scale: compare them with it by ``>``.
 
     Parameters
     ----------
@@ -39,10 +41,10 @@ def first_out(scores: NDArray[np.floating], false_alarm: float) -> float:
 
 
 def least_named(probabilities: NDArray[np.floating], false_alarm: float) -> float:
-    """Give a probability that at most a share of the non-targets reaches.
+    """Return a probability that at most a given share of the non-targets reaches.
 
-    The threshold that a model keeps: whatever is named later is compared with it by ``>=``, in float32 too. Of records
-    at hand it misses the few that lie over `first_out` by less than the margin, which holds them off.
+    This is the threshold that a model stores: later probabilities are compared with it by ``>=``, in float32 too. It is
+    `first_out` plus a small margin; the few records at hand between the two do not reach it.
 
     Parameters
     ----------
@@ -73,7 +75,7 @@ class OperatingPoint:
 
 @dataclass(frozen=True)
 class OperatingCurve:
-    """What calibration records say of every threshold on "uav", in steps of a tenth of a decade.
+    """Operating points measured on calibration records, their false-alarm rates in steps of a tenth of a decade.
 
     Parameters
     ----------
@@ -95,7 +97,7 @@ class OperatingCurve:
         false_alarm
             Above 0 and below 1.
         models
-            How many share the rate evenly, this one among them.
+            Number of models that share the rate evenly, this one included.
 
         Raises
         ------
@@ -106,7 +108,7 @@ class OperatingCurve:
             raise ValueError(f"false-alarm rate {false_alarm:g}: it must be above 0 and below 1")
         kept = [point for point in self.points if models * point.false_alarm <= false_alarm * (1 + 1e-9)]
         if not kept:
-            # rounded up, or it would be refused in its turn
+            # rounded up: rounded down it would be refused itself
             least = math.ceil(self.points[-1].false_alarm * models * 1e5) / 1e5 if self.points else None
             raise ValueError(
                 f"false-alarm rate {false_alarm:g} cannot be supported by {self.others} calibration records of birds "
@@ -176,7 +178,7 @@ def operating_curve(probabilities: ArrayLike, labels: NDArray[np.integer]) -> Op
     points = []
     for step in itertools.count():
         rate = round(_RATES[step % len(_RATES)] * 10.0 ** (-1 - step // len(_RATES)), 7)
-        rank = math.floor(rate * (len(false) + 1) * (1 + 1e-9))  # the threshold stands just above this one, from 1
+        rank = math.floor(rate * (len(false) + 1) * (1 + 1e-9))  # from 1: the threshold is just above it
         if rank < SUPPORT:
             break
         threshold = max(round(float(false[rank - 1]) + _ABOVE, 7), _EVERY_WIN)

@@ -1,7 +1,7 @@
 """onnxruntime without its telemetry.
 
-Official wheels keep an identity of the machine in the user's home and report to their maker who runs what, if they can.
-Whether they do is read once, from the environment, when the library loads: so it is imported here alone.
+Official wheels store an identity of the machine in the user's home and report usage to their maker where they can. The
+environment variable that turns this off is read once, when the library loads: so it is first imported here.
 """
 
 import os

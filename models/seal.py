@@ -86,7 +86,7 @@ def verify(onnx_bytes: bytes) -> str:
 
 
 def read_metadata(onnx_bytes: bytes) -> dict[str, str]:
-    """Read what a model says of itself from its bytes alone, before any runtime opens it.
+    """Read a model's metadata from its bytes alone, before any runtime opens it.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def read_metadata(onnx_bytes: bytes) -> dict[str, str]:
     Raises
     ------
     ValueError
-        Where it is no ONNX model, says one thing twice, or refers to data outside the file.
+        Where it is no ONNX model, holds a key twice, or refers to data outside the file.
     """
     if b"location" in onnx_bytes:  # the one key by which a tensor can name another file
         raise ValueError("the model refers to data outside its file; use a file that `bladewing train` wrote")
@@ -120,7 +120,7 @@ _METADATA_FIELD = 14  # of the message ModelProto
 
 
 def _fields(message: bytes) -> Iterator[tuple[int, bytes]]:
-    """Numbers and contents of a protocol buffer's fields; of numbers (not lengths) the content is empty."""
+    """Yield number and content of each field of a protocol buffer; the content is empty where the field is a number."""
     at = 0
 
     def varint() -> int:

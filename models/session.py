@@ -1,4 +1,4 @@
-"""Sessions of onnxruntime on the processor, all opened alike."""
+"""Opens onnxruntime sessions on the CPU, all with the same options."""
 
 from .runtime import onnxruntime
 
@@ -11,17 +11,17 @@ def quiet_session(onnx_bytes: bytes, threads: int = 1) -> onnxruntime.InferenceS
     onnx_bytes
         A serialised ONNX model, one that may be trusted.
     threads
-        How many share a batch.
+        Number of CPU threads that share a batch.
 
     Returns
     -------
     onnxruntime.InferenceSession
-        What is wrong with a model comes as an exception; onnxruntime's share no base class.
+        Faults of a model are raised as exceptions; those of onnxruntime have no common base class.
     """
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
-    options.log_severity_level = 4  # its messages come as exceptions; nothing else may reach the user's terminal
+    options.log_severity_level = 4  # faults come as exceptions; nothing else may reach the user's terminal
     return onnxruntime.InferenceSession(
         onnx_bytes,
         options,

@@ -148,7 +148,7 @@ def tabular_scores(model: "Pipeline | HistGradientBoostingClassifier", x: NDArra
 
 
 def _round_thresholds(model: "HistGradientBoostingClassifier") -> None:
-    """Round every threshold down to float32, so that the exported trees, which hold float32, send no record elsewhere.
+    """Round every threshold down to float32, so that the exported trees, which hold float32, route every record alike.
 
     No answer changes: a float32 x is at most t exactly where it is at most the greatest float32 not above t.
     """

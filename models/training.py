@@ -36,10 +36,10 @@ ADAM = 0.3
 """Adam's learning rate over Muon's."""
 
 TAUGHT = 0.75
-"""Share of a teacher's answer in what a network is to say, beside the label."""
+"""Weight of the teacher's answer in a network's target; the label has the rest."""
 
 SMOOTHING = 0.02
-"""Share of the target that is spread over the classes."""
+"""Label smoothing: share of the target that is spread evenly over the classes, or over the kinds."""
 
 WIDE = 400_000
 """Weights from which on a network is computed on two threads."""
@@ -61,12 +61,12 @@ class Lessons:
     labels
         Shape (n,), whole numbers 0 to 2, at least two records of each.
     kinds
-        Kind of each record, shape (n,), a place in the network's `kinds`, of the class that its label says. Where
-        given, the network is to tell these as well: half of the loss is theirs.
+        Kind of each record, shape (n,), an index into the network's `kinds`, of the class that its label says. Where
+        given, the network learns the kinds as well: their loss is added to that of the classes.
     teacher
         Probabilities that another network gives each kind of the records, shape (n, kinds);
-        the targets take the share `TAUGHT` of them. A label is one draw from what a record leaves open and its
-        teacher's answer near the mean of them, so that a step errs less (Hinton, Vinyals and Dean, arXiv:1503.02531),
+        they have the weight `TAUGHT` in the targets. A label is one draw of what a record leaves open, the teacher's
+        answer is near the mean of such draws, so that a step errs less (Hinton, Vinyals and Dean, arXiv:1503.02531),
         also where the teacher is as small as its pupil (Furlanello and others, arXiv:1805.04770).
     """
 
@@ -76,7 +76,7 @@ class Lessons:
     teacher: NDArray[np.floating] | None = None
 
     def require(self, net: EvidenceNet) -> int:
-        """Check that a network can be trained on these, and give their number."""
+        """Check that a network can be trained on these lessons, and return the number of records."""
         count = net.require(self.inputs)
         require_labels(self.labels, count, "labels")
         require_every_class(self.labels, "labels")
@@ -102,12 +102,12 @@ class Course:
     weight_decay
         Of Muon.
     patience
-        Epochs in a row without a lower validation loss after which the training stops; 0: never. The schedule is laid
-        out for all epochs: one that stops early has not seen its end.
+        Epochs in a row without a lower validation loss after which the training stops; 0: never. The learning-rate
+        schedule is laid out for all epochs: a training that stops early does not reach its end.
     bfloat16
-        Compute the scores and their gradients in bfloat16, weights and steps in float32 as ever: on processors that
-        multiply such numbers in hardware (AVX-512 BF16, AMX) a step takes 0.6 of the time, and networks of 96 000
-        records learned no worse (docs/ablation.md); on others it takes longer.
+        Compute the scores and their gradients in bfloat16; weights and steps stay in float32. On processors that
+        multiply such numbers in hardware (AVX-512 BF16, AMX) a step takes 0.6 of the time, and networks trained on
+        96 000 records learned no worse (docs/ablation.md); on others it takes longer.
 
     Raises
     ------
@@ -161,9 +161,10 @@ def _few_threads(
 ) -> Callable[Concatenate[EvidenceNet, _Given], _Result]:
     """Hold torch to one thread for a network, or to two for one of `WIDE`.
 
-    Layers as small as these wait for one another longer than they compute: on one thread a step of 256 records of
-    `spectrum-cnn` takes 0.6 of the time that it takes on two, of the widest on two 0.57 of its time on one. Another
-    busy process slows it by no more than its share, and the bits do not depend on how many processors there are.
+    Threads of layers this small wait for one another longer than they compute: on one thread a step of 256 records of
+    `spectrum-cnn` takes 0.6 of its time on two; of the widest network a step on two threads takes 0.57 of its time on
+    one. Another busy process then slows the training by no more than its share, and the result does not depend, to the
+    bit, on the number of processors.
     """
 
     @wraps(work)
@@ -212,7 +213,7 @@ def train_network(
     augment
         Changes each training batch.
     snapshot
-        Where to go on: what `on_snapshot` was given by a training with the same arguments.
+        State to go on from: what `on_snapshot` was given by a training with the same arguments.
     on_snapshot
         Called after each epoch, before `on_epoch`, with all that the next epochs depend on.
     on_epoch
@@ -321,7 +322,7 @@ def network_scores(net: EvidenceNet, inputs: Inputs) -> NDArray[np.float32]:
 
 
 class _Loss:
-    """What a network is to say of the training records, their classes and, where it is told them, their kinds."""
+    """Loss of a network on training records: that of their classes and, where kinds are given, that of their kinds."""
 
     def __init__(self, net: EvidenceNet, lessons: Lessons, place: torch.device) -> None:
         self._net, self._criterion = net, nn.CrossEntropyLoss(label_smoothing=SMOOTHING)
@@ -338,7 +339,7 @@ class _Loss:
 
 
 def _target(labels: NDArray[np.integer], said: Tensor | None, place: torch.device) -> Tensor:
-    """Labels, or with what a teacher says their mean with that."""
+    """Targets: the labels or, with a teacher's probabilities, the mean of both weighted by `TAUGHT`."""
     truth = torch.as_tensor(labels, dtype=torch.int64)
     if said is not None:
         truth = TAUGHT * said + (1 - TAUGHT) * nn.functional.one_hot(truth, said.shape[1])
@@ -348,14 +349,14 @@ def _target(labels: NDArray[np.integer], said: Tensor | None, place: torch.devic
 def _scheduled(
     net: EvidenceNet, planned: int, course: Course
 ) -> tuple[tuple[torch.optim.Optimizer, ...], tuple[OneCycleLR, ...]]:
-    """Muon for matrices and kernels, Adam for all else, and their rates over so many steps."""
+    """Muon for matrices and kernels, Adam for all else, and their learning-rate schedules over `planned` steps."""
     matrices = [weights for weights in net.parameters() if weights.ndim > 1]
     others = [weights for weights in net.parameters() if weights.ndim <= 1]
     optimisers = (
         Muon(matrices, lr=course.learning_rate, weight_decay=course.weight_decay),
         torch.optim.Adam(others, lr=ADAM * course.learning_rate),
     )
-    rise = max(RISE, 2 / planned)  # a rise of one step has no length
+    rise = max(RISE, 2 / planned)  # two steps or more: a rise of one step has no length
     schedules = tuple(
         OneCycleLR(optimiser, optimiser.defaults["lr"], planned, pct_start=rise, cycle_momentum=False)
         for optimiser in optimisers
@@ -364,7 +365,7 @@ def _scheduled(
 
 
 def _validated(net: EvidenceNet, inputs: Inputs, y: NDArray[np.integer]) -> dict[str, float]:
-    """Loss and accuracy on records that are not learned from."""
+    """Loss and accuracy on records that are not trained on."""
     scores = torch.from_numpy(network_scores(net, inputs))
     labels = torch.as_tensor(y, dtype=torch.int64)
     return {

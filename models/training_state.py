@@ -1,4 +1,4 @@
-"""The state of a training between two epochs, as plain arrays: whoever has it goes on to the same bits."""
+"""The state of a training between two epochs, as plain arrays; a training resumed from it ends with the same bits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 Snapshot = Mapping[str, NDArray[np.generic]]
-"""Name to array; numbers alone, so that it is kept and read without a pickle."""
+"""Name to array of plain numbers, so that it is stored and read without pickle."""
 
 
 class ForeignSnapshot(ValueError):  # noqa: N818 - said of the snapshot
@@ -30,7 +30,7 @@ class Work:
     net
         The network, on its device, standardisation measured.
     optimisers
-        They share its parameters; no step taken yet.
+        The network's parameters are divided among them; they have taken no step yet.
     schedules
         One-cycle schedules over the optimisers.
     rng
@@ -80,12 +80,12 @@ class Work:
         snapshot
             As `snapshot` gave it.
         epochs, steps
-            Of the training, and of one of its epochs.
+            Number of epochs of the training, and of steps of one epoch.
 
         Raises
         ------
         ForeignSnapshot
-            It is not of a training with this network and so many epochs.
+            The snapshot holds no history of 1 to `epochs` epochs, or the arrays of another network.
         """
         columns = {name: values for name, values in snapshot.items() if name.startswith(_HISTORY)}
         told = {_HISTORY + "validation_loss", _HISTORY + "seconds"} <= columns.keys()
@@ -96,7 +96,7 @@ class Work:
             raise ForeignSnapshot(f"the snapshot holds no history of 1 to {epochs} epochs")
         for optimiser in self._optimisers:
             for parameter in (parameter for group in optimiser.param_groups for parameter in group["params"]):
-                if not optimiser.state[parameter]:  # as Adam starts them itself at its first step
+                if not optimiser.state[parameter]:  # what Adam itself creates at its first step
                     averages = {name: torch.zeros_like(parameter) for name in ("exp_avg", "exp_avg_sq")}
                     optimiser.state[parameter] = {"step": torch.tensor(0.0), **averages}
         state = self._net.state_dict()
@@ -129,7 +129,7 @@ class Work:
         self.best = {name: tensors[f"best/{name}"] for name in state} if best_epoch else {}
 
     def _moving(self) -> dict[str, Tensor]:
-        """The tensors that the next epochs depend on, themselves where they are not a generator's."""
+        """The tensors that the next epochs depend on: not copies, except the generator's state."""
         moving = {f"network/{name}": value for name, value in self._net.state_dict().items()}
         held = {parameter: state for optimiser in self._optimisers for parameter, state in optimiser.state.items()}
         for place, parameter in enumerate(self._net.parameters()):
