@@ -116,8 +116,11 @@ class Measured:
         return self._turn(self.values.body_velocity_mps) * self.values.body_velocity_mps
 
     def _turn(self, velocity_mps: np.ndarray) -> np.ndarray:
-        """Factor from a velocity, and from its rate of change, to a speed's: -1 if negative without a direction."""
-        return np.where((velocity_mps < 0) & (not self.direction_known), -1.0, 1.0)
+        """Factor from a velocity, and from its rate of change, to a speed's: -1 if negative without a direction.
+
+        NaN without a direction where the velocity is not known: nor is then whether the speed grows or falls.
+        """
+        return np.where(self.direction_known | (velocity_mps == 0), 1.0, np.sign(velocity_mps))
 
     @property
     def looked_at(self) -> int:

@@ -114,6 +114,12 @@ def test_of_one_channel_a_body_has_a_speed_and_no_direction(tmp_path, capsys):
             assert told["body_velocity_mps"] == pytest.approx(velocity_mps if is_known else 8.0, abs=0.01)
 
 
+def test_of_one_channel_nothing_tells_whether_an_unknown_speed_grows():
+    velocity_mps = np.array([np.nan, -3.0, 0.0, 2.0])
+    for known, factors in ((False, [np.nan, -1, 1, 1]), (True, [1, 1, 1, 1])):
+        np.testing.assert_array_equal(Measured._turn(SimpleNamespace(direction_known=known), velocity_mps), factors)
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 def test_of_one_channel_a_body_that_grows_faster_does_so_whichever_way_it_goes(tmp_path, capsys, sign):
     prf_hz = 4e3
