@@ -64,7 +64,7 @@ def as_steady(data: Periodogram, apart: Rotors) -> Rotors | None:
     numbers = len(fits) * len(DEGREES)
     if steady is None or energy(steady[1]) - energy(apart.rest) > STEADY_FALL * numbers:
         return None
-    known, rest = steady
+    known, rest = sorted(steady[0], key=lambda fit: fit.spacing), steady[1]
     reach = max(max(map(abs, fit.reach)) for fit in known)
     if nearer_than(known, RESOLVED_BINS / (reach * data.pulses)):
         return None
