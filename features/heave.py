@@ -16,22 +16,24 @@ from .lines import squared
 from .spectrum import SPEED_OF_LIGHT_MPS
 from .wingbeat import GAIT_HZ, GAIT_MPS, LEAST_S, WING_MPS
 
-#: Rates that count [Hz]: from a slow walker's steps to the fastest wings.
+#: Range of the rates that are reported [Hz]: from a slow walker's steps to the fastest wings.
 HEAVE_RANGE_HZ = (1.6, 18.5)
 
-#: Rates that are looked at [Hz]: what is highest below the range is the skirt of a slow change of course. Multiples
-#: count up to the last.
+#: SOUGHT_HZ: range in which the strongest line is sought [Hz], wider than HEAVE_RANGE_HZ: a strongest line below that
+#: range is the skirt of a slow change of course. HIGHEST_HZ: fluctuation and multiples count up to this [Hz].
 SOUGHT_HZ, HIGHEST_HZ = (1.4, 19.0), 30.0
 
-#: Half the band about the body in which its phase is followed: wide enough for its velocity [m/s] and rates [Hz].
+#: Half width of the band about the body in which its phase is followed, the larger of the two: wide enough for its
+#: velocity [m/s] and for the rates [Hz].
 BAND_MPS, BAND_HZ = 1.5, 40.0
 
-#: Velocities are averaged so long [s]: in a deep fade single turns of the phase are noise alone.
+#: Length of the window over which turns of the phase are averaged [s]: in a deep fade a single turn is noise alone.
 SMOOTH_S = 0.025
 
-#: The rate's line stands so high over the continuum [dB], and it and its multiples hold this share of all fluctuation.
-#: On simulated tracks of 2.5 s at 0 dB and above: 0.63 of walkers and 0.53 of flapping birds; of others 0.04 of
-#: vehicles (their parts' lines beat) and 0.07 of helicopters.
+#: LEAST_DB: least level of the rate's line over the continuum [dB]. LEAST_SHARE: least share of all fluctuation in the
+#: first MULTIPLES multiples of the rate, the rate itself included. On simulated tracks of 2.5 s at 0 dB and above a
+#: heave is found in 0.63 of walkers and 0.53 of flapping birds; of others in 0.04 of vehicles (their parts' lines beat)
+#: and 0.07 of helicopters.
 LEAST_DB, LEAST_SHARE, MULTIPLES = 20.0, 0.5, 3
 
 #: Least amplitude of the path [m]. Engines and rotors shake an airframe by tenths of a millimetre (the law of
@@ -49,11 +51,11 @@ class Heave:
     Parameters
     ----------
     heave_hz : ndarray of float64, shape (...)
-        Its rate [Hz].
+        Rate of the motion [Hz].
     amplitude_m : ndarray of float64, shape (...)
         Amplitude of the body's path along the line of sight [m].
     walks : ndarray of bool, shape (...)
-        Whether it is the step of a walker: rate and speed are no faster than one's.
+        Whether it may be the step of a walker: rate below `GAIT_HZ` and speed below `GAIT_MPS`.
     """
 
     heave_hz: NDArray[np.float64]
@@ -67,7 +69,7 @@ def heave(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float) 
     Parameters
     ----------
     iq : ndarray of complex, shape (..., pulses)
-        Slow-time samples of one range cell, of 1.5 s or more: nothing is found in less.
+        Slow-time samples of one range cell; in less than 1.5 s nothing is found.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz], > 0.
 
@@ -91,7 +93,7 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[f
         return nothing
     shown, course = followed(normed(iq), carrier_hz, prf_hz)
     speed = abs(course[0])
-    if not speed <= WING_MPS:  # nor without a body
+    if not speed <= WING_MPS:  # NaN where there is no body
         return nothing
     steady = standing(shown, course, carrier_hz, prf_hz)
     velocity, rate_hz = _velocity(steady, carrier_hz, prf_hz)
@@ -117,7 +119,8 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[f
 def _velocity(steady: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[NDArray[np.float64], float]:
     """Velocity of the body about its course [m/s], shape (steps,), and steps a second [Hz].
 
-    From the turn of the phase, step by step, weighted by the power: the mean of a narrow line's frequency.
+    It is computed from the turn of the phase at each step. Turns are weighted by the power, up to its median: so it is
+    the mean frequency of a narrow line. A cubic trend is taken out.
     """
     per_hz = SPEED_OF_LIGHT_MPS / carrier_hz / 2
     half_hz = max(BAND_HZ, BAND_MPS / per_hz)
@@ -129,7 +132,7 @@ def _velocity(steady: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -
     rate_hz = count * prf_hz / pulses
     turns = few[1:] * few[:-1].conj()
     size = np.abs(turns)
-    turns /= np.maximum(np.maximum(size, np.median(size)), 1e-30)  # a strong moment counts no more than a usual one
+    turns /= np.maximum(np.maximum(size, np.median(size)), 1e-30)  # a strong step counts no more than a median one
     smooth = np.hanning(max(round(SMOOTH_S * rate_hz), 1) + 2)[1:-1]
     turns = np.convolve(turns, smooth, "same")
     velocity = np.angle(turns) * rate_hz / (2 * np.pi) * per_hz

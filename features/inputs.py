@@ -1,4 +1,4 @@
-"""From slow-time samples to the named inputs that models take: only what is asked for is computed."""
+"""From slow-time samples to the named inputs that models take: only the inputs asked for are computed."""
 
 from collections.abc import Collection, Iterator
 from functools import cached_property
@@ -24,8 +24,9 @@ from .window import HANN
 #: Fewest pulses that leave anything to measure outside the notches.
 MIN_PULSES = 16
 
-#: Samples worked on at a time: scratch memory stays small whatever the batch. The overlapping frames of an image hold
-#: each sample several times, so fewer records of it fill a processor's cache.
+#: BLOCK_SAMPLES: samples worked on at a time, so that scratch memory stays small whatever the batch. IMAGE_SHARE: their
+#: number is divided by this for images, whose overlapping frames hold each sample several times: fewer records then
+#: fill a processor's cache.
 BLOCK_SAMPLES = 1 << 17
 IMAGE_SHARE = 2
 
@@ -38,15 +39,15 @@ def model_inputs(
     Parameters
     ----------
     iq : array_like of complex, shape (..., pulses)
-        Slow-time samples of one range cell, any gain. Of one channel, I without Q, that holds noise they are made
-        analytic; a side of the spectrum that is empty, as it then is, is filled with noise (`empty_side`), and so are
-        its outer ends where a filter took them out (`stop_band`).
+        Slow-time samples of one range cell, any gain. A record of one channel (I without Q) that holds noise is made
+        analytic. An empty side of the spectrum, as such a record then has, is filled with noise (`empty_side`). So are
+        the outer ends of the spectrum where a filter took them out (`stop_band`).
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz].
     names : collection of str
-        Which of `INPUT_SHAPES`: "features", "levels" (one FFT of the dwell), "spectrum" (the same and one of its
-        parts), "cadence" (an FFT back and half of one more), "combs" (a quarter of one), "joint_features", "image" (an
-        STFT).
+        Which of `INPUT_SHAPES`: "features", "levels" (one FFT of the dwell), "spectrum" (the same and one of the
+        dwell's parts), "cadence" (an inverse FFT and half an FFT more), "combs" (a quarter of an FFT more),
+        "joint_features", "image" (an STFT).
 
     Returns
     -------
@@ -72,7 +73,7 @@ def model_inputs(
 
 
 def in_blocks(samples: NDArray[np.complex64], *, framed: bool = False) -> list[NDArray[np.complex64]]:
-    """Cut records (n, pulses) into as many as are worked on at a time, one block at least; `framed` for an STFT."""
+    """Cut records (n, pulses) into the blocks that are worked on at a time, at least one; `framed` for an STFT."""
     high = max(1, BLOCK_SAMPLES // (IMAGE_SHARE if framed else 1) // samples.shape[-1])
     return [samples[first : first + high] for first in range(0, max(1, len(samples)), high)]
 
@@ -80,29 +81,29 @@ def in_blocks(samples: NDArray[np.complex64], *, framed: bool = False) -> list[N
 def dwells_of(
     samples: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float, names: Collection[str]
 ) -> Iterator["Dwells"]:
-    """Records (n, pulses), a block at a time, for inputs of these names."""
+    """Yield the `Dwells` of records (n, pulses), one block at a time, in blocks that suit the named inputs."""
     framed = "image" in names or "joint_features" in names
     for block in in_blocks(samples, framed=framed):
         yield Dwells(block, carrier_hz=carrier_hz, prf_hz=prf_hz)
 
 
 def _analytic(samples: NDArray[np.complex64], *, carrier_hz: float, prf_hz: float) -> NDArray[np.complex64]:
-    """Records of one channel made analytic, and before that the ends that a filter took out filled in on both sides."""
+    """Make records of one channel analytic, after filling the ends that a filter took out on both sides."""
     made = made_analytic(samples)
-    if made is samples:  # as most are
+    if made is samples:  # no record is of one channel, as usual
         return made
     rows = np.flatnonzero((made != samples).any(axis=-1))
     channel = made[rows].real.astype(np.complex64)
     spectrum = doppler_spectrum(channel, carrier_hz=carrier_hz, prf_hz=prf_hz, window=HANN)
     ended, whole = filled_ends(channel, spectrum)
     if len(ended):
-        added = np.sqrt(np.float32(2)) * (whole - channel[ended]).real  # of one channel too, as strong
+        added = np.sqrt(np.float32(2)) * (whole - channel[ended]).real  # real, as the channel is, and of the same power
         made[rows[ended]] = made_analytic((channel[ended].real + added).astype(np.complex64))
     return made
 
 
 class Dwells:
-    """Records of one radar with what is computed of them: each piece once, when the first input asks for it.
+    """Records of one radar and what is computed from them: each piece once, when an input first needs it.
 
     Parameters
     ----------
@@ -118,7 +119,7 @@ class Dwells:
         spectrum = doppler_spectrum(self._given, **radar, window=HANN)
         rows, filled = filled_sides(self._given, spectrum)
         ended, whole = filled_ends(self._given, spectrum)
-        if len(ended):  # of none is a side empty as well, what one channel lacks there is filled in (`_analytic`)
+        if len(ended):  # none of these has an empty side too: `_analytic` filled the ends of one channel
             rows, filled = np.concatenate([rows, ended]), np.concatenate([filled, whole])
         self._filled = rows, filled
         if len(rows):
@@ -127,7 +128,7 @@ class Dwells:
 
     @cached_property
     def _samples(self) -> NDArray[np.complex64]:
-        """Samples with what was filled in: a copy, which not every model needs."""
+        """Samples with the noise filled in: a copy, made only for inputs that need it."""
         rows, filled = self._filled
         if not len(rows):
             return self._given
@@ -136,7 +137,7 @@ class Dwells:
         return samples
 
     def rows(self, rows: NDArray[np.intp]) -> "Dwells":
-        """Some of the records, with what is computed of them so far."""
+        """Some of the records, with all that was already computed from them."""
         some = object.__new__(Dwells)
         some._samples = self._samples[rows]
         for name, piece in self.__dict__.items():
@@ -148,7 +149,7 @@ class Dwells:
 
     def inputs(self, names: Collection[str]) -> dict[str, NDArray[np.float32]]:
         """The named inputs, each of shape (records, *INPUT_SHAPES[name]); see `model_inputs`."""
-        # the measurements last: they take the mean level from the levels where these are made
+        # "features" last: they reuse the mean level of "levels" if that was computed
         return {name: getattr(self, f"_{name}") for name in sorted(names, key=lambda name: (name == "features", name))}
 
     @cached_property

@@ -1,4 +1,4 @@
-"""The joint time-frequency twin: an STFT image on the same velocity axis, and numbers read off it."""
+"""The joint time-frequency inputs: an STFT image on the shared velocity axis, and numbers read off it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +10,13 @@ from .shape import SPEED_BANDS_MPS, entropy
 from .spectrum import Spectrum
 from .vector import lay_out, radar_columns
 
-#: Frames are this share of the dwell; with the frames of an image they overlap by about 77 %.
+#: A frame is the dwell divided by this; the IMAGE_FRAMES frames of an image then overlap by about 77 %.
 FRAME_SHARE = 8
 
 #: A frame's band is where its level exceeds this [dB over the floor].
 FRAME_BAND_DB = 6.0
 
-#: Bins faster than this are watched for flashes [m/s]: bodies and limbs are slower.
+#: Flashes are sought in bins faster than this [m/s]: bodies and limbs are slower.
 FLASH_MPS = 8.0
 
 
@@ -53,7 +53,7 @@ def joint_vector(image: NDArray[np.float32], spectrum: Spectrum) -> NDArray[np.f
     image : ndarray of float32, shape (..., IMAGE_BINS, IMAGE_FRAMES)
         From `stft_image`.
     spectrum : Spectrum
-        The dwells' spectra, for what the radar allows.
+        The dwells' spectra, for the features of the radar and the leading shape.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def joint_vector(image: NDArray[np.float32], spectrum: Spectrum) -> NDArray[np.f
 
 def _flashes(fast: NDArray[np.float32], spectrum: Spectrum) -> tuple[NDArray, NDArray, NDArray]:
     """Rate and strength of the strongest cadence of the fast bins' power, and the power's peakedness."""
-    # Relative to its mean: a strong target's power to the fourth would leave float32, and nothing here has a scale.
+    # relative to the mean: a strong target's power to the fourth would overflow float32, and no result depends on scale
     mean = fast.mean(axis=-1, keepdims=True)
     swing = fast / np.where(mean > 0, mean, 1) - (mean > 0)
     frames = fast.shape[-1]

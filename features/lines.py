@@ -1,4 +1,4 @@
-"""Unit lines of any frequency against a record: inner products both ways through one short transform."""
+"""Inner products of a record with unit lines of any frequency, and sums of such lines, each through one short FFT."""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-#: Bins of the twice padded spectrum that a line is interpolated from, and the kernel's shape for them: errors of 1e-6.
-#: The kernel is exp(shape x sqrt(1 - x^2)) (Barnett, Magland and af Klinteberg, SIAM J. Sci. Comput. 41, 2019).
+#: TAPS: bins of the twice padded spectrum that a line is interpolated from. _SHAPE: the kernel's shape parameter for so
+#: many. Errors are 1e-6. The kernel is exp(shape x sqrt(1 - x^2)) (Barnett, Magland and af Klinteberg, SIAM J. Sci.
+#: Comput. 41, 2019).
 TAPS = 8
 _SHAPE = 2.3 * TAPS
 
-#: These bins, from the one below the line.
+#: Places of these bins, counted from the bin below the line.
 TAP = np.arange(1 - TAPS // 2, 1 + TAPS // 2)
 
 #: Products of lines worked out at once: they must stay in the cache.
@@ -25,22 +26,22 @@ def squared(amplitude: NDArray[np.complexfloating]) -> NDArray[np.floating]:
 
 
 def energy(samples: NDArray[np.complexfloating]) -> float:
-    """Sum of their powers."""
+    """Sum of the samples' powers."""
     return float(squared(samples).sum())
 
 
 def from_whole(turns: NDArray[np.floating]) -> NDArray[np.floating]:
-    """How far turns are from the nearest whole ones, -0.5 to 0.5: folds frequencies [cycles a sample] into the span."""
+    """Turns less the nearest whole number, -0.5 to 0.5: folds frequencies [cycles a sample] into the span."""
     return np.asarray(turns - np.rint(turns))
 
 
 def middle_times(pulses: int) -> NDArray[np.float64]:
-    """Of each pulse, its time from the middle of the record [samples]."""
+    """Time of each pulse from the middle of the record [samples]."""
     return np.asarray(np.arange(pulses) - (pulses - 1) / 2, np.float64)
 
 
 def _bell(away: NDArray[np.floating]) -> NDArray[np.float64]:
-    """The kernel, -1 <= away <= 1."""
+    """The kernel at -1 <= away <= 1, scaled to 1 at 0."""
     return np.asarray(np.exp(_SHAPE * (np.sqrt(np.maximum(1 - away**2, 0)) - 1)), np.float64)
 
 
@@ -71,7 +72,7 @@ def _turned_taps(frequency: NDArray[np.floating], pulses: int) -> tuple[NDArray[
 
 
 class LinesSeen:
-    """Records ready to be seen by unit lines of any frequencies, as often as one likes.
+    """Records prepared for inner products with unit lines of any frequencies, any number of times.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ class LinesSeen:
         self._spectra = fft.fft(samples * shape, size)
 
     def means(self, frequency: NDArray[np.floating]) -> NDArray[np.complex128]:
-        """Means of the samples against unit lines whose time counts from the middle, shape (rows, lines).
+        """Mean of conj(unit line) x samples, time counted from the middle of the record, shape (rows, lines).
 
         Parameters
         ----------
@@ -115,7 +116,7 @@ class LineSpace:
         return LinesSeen(np.stack([self.samples, self.samples * middle_times(len(self.samples))]))
 
     def at(self, frequency: NDArray[np.floating]) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-        """Mean of the samples, and of the samples times time, against unit lines.
+        """Mean of conj(unit line) x samples, and of conj(unit line) x time x samples.
 
         Parameters
         ----------
@@ -167,7 +168,7 @@ def line_products(
         ratio = np.multiply(low_cosine, over, out=low_cosine)
         own = np.matmul(top_rows[some], top_sines, out=plain[some])
         own *= over
-        # a whole PRF apart lines are one, but for a sign where time counts from between two pulses
+        # lines whole PRFs apart are one, but for a sign: -1 at odd PRFs where time counts from between two pulses
         turns = np.rint(np.subtract.outer(frequency[some], frequency)[near])
         sign = 1.0 - 2.0 * (np.abs(turns) % 2) * (pulses % 2 == 0)
         own[near] = sign
@@ -185,6 +186,6 @@ def line_products(
 def _of_differences(
     angle: NDArray[np.floating],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Rows, columns of sines and columns of cosines: products of these are those of differences, column less row."""
+    """Rows, and columns that give with them the sines, and the cosines, of the differences, column less row."""
     sine, cosine = np.sin(angle), np.cos(angle)
     return np.stack([cosine, sine], axis=1), np.stack([sine, -cosine]), np.stack([cosine, sine])

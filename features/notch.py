@@ -16,10 +16,10 @@ NOTCH_MPS = 3.0
 #: The notch is never narrower than the main lobe of the wider window, this many bins to each side.
 LOBE_BINS = 5
 
-#: Of bins within this share of the strongest the first one counts: rounding must not choose in a flat spectrum.
+#: The first bin of at least this share of the top power is the strongest: in a flat spectrum rounding must not choose.
 EQUAL_SHARE = np.float32(1 - 1e-5)
 
-#: What is left outside the notch is at least this share of the noise [1].
+#: Lower bound of the mean power outside the notches, over the noise floor [1].
 LEAST_RESIDUAL = 1e-2
 
 #: A top that curves less than this, relative to its height, is flat.
@@ -27,7 +27,7 @@ LEAST_CURVE = np.float32(1e-5)
 
 _AROUND = np.array([-1, 0, 1])
 
-#: True, or 1, where a spectrum counts.
+#: True, or 1, in the bins of a spectrum that count.
 Mask = NDArray[np.bool_] | NDArray[np.float32]
 
 
@@ -55,7 +55,7 @@ class Body:
 
 
 def strongest_bin(spectrum: Spectrum) -> NDArray[np.intp]:
-    """The strongest bin of each spectrum, the first of like ones, shape (...)."""
+    """The strongest bin of each spectrum, the first of equal ones, shape (...)."""
     power = spectrum.relative_power
     return (power >= np.maximum.reduce(power, axis=-1, keepdims=True) * EQUAL_SHARE).argmax(axis=-1)
 
@@ -80,7 +80,7 @@ def body_line(spectrum: Spectrum, index: NDArray[np.intp] | None = None) -> Body
     power, bins = spectrum.relative_power, spectrum.bins
     index = strongest_bin(spectrum) if index is None else index
     around = (index + _AROUND.reshape(-1, *([1] * index.ndim))) % bins
-    around += np.arange(0, index.size * bins, bins).reshape(index.shape)  # each spectrum's first: one behind the other
+    around += np.arange(0, index.size * bins, bins).reshape(index.shape)  # spectra lie one behind the other
     left, middle, right = to_db(power.reshape(-1)[around])
     step = spectrum.prf_hz / bins * spectrum.wavelength_m / 2
     velocity = spectrum.velocity_mps[index] - parabola_offset(left, middle, right) * step
@@ -92,7 +92,7 @@ def parabola_offset(
 ) -> NDArray[np.floating]:
     """Where a parabola through three neighbours has its top, -0.5..0.5 from the middle one; 0 where it has none."""
     curve = 2 * middle - left - right
-    # of equal neighbours the curve is rounding alone
+    # between equal neighbours the curvature is rounding alone
     offset = (right - left) * (curve > LEAST_CURVE * np.abs(middle)) / np.maximum(2 * curve, np.float32(1e-30))
     return np.minimum(np.maximum(offset, np.float32(-0.5)), np.float32(0.5))
 
@@ -100,9 +100,9 @@ def parabola_offset(
 def notch_mask(spectrum: Spectrum, index: NDArray[np.intp]) -> NDArray[np.bool_]:
     """True outside the notches about the body line and about velocity zero, shape (..., bins).
 
-    They reach `NOTCH_MPS` to each side. Distances are taken around the circle of the unambiguous velocities. The bin at
-    half the PRF does not count: it is on neither side, and what is measured shall not depend on the sign of the
-    velocity.
+    They reach `NOTCH_MPS` to each side, within the limits of `half_width_bins`. Distances are taken around the circle
+    of the unambiguous velocities. The bin at half the PRF does not count: it is on neither side, and no measurement
+    shall depend on the sign of the velocity.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def notch_mask(spectrum: Spectrum, index: NDArray[np.intp]) -> NDArray[np.bool_]
 
 
 def half_width_bins(spectrum: Spectrum) -> int:
-    """Bins to each side of a notch's middle that it takes out."""
+    """Half width of a notch: bins that it takes out to each side of its middle."""
     step = spectrum.prf_hz / spectrum.bins * spectrum.wavelength_m / 2
     # At least the main lobe, at most a third of the span: a slow radar must keep something to look at.
     return min(max(LOBE_BINS, int(np.ceil(NOTCH_MPS / step))), max(1, spectrum.bins // 6))
@@ -128,7 +128,7 @@ def half_width_bins(spectrum: Spectrum) -> int:
 
 @lru_cache(maxsize=64)
 def notches(bins: int, half: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Mask about the middle bin, and the mask about bin i in row bins - i."""
+    """Mask with a notch about the middle bin, and a table whose row bins - i is the mask with a notch about bin i."""
     position = np.arange(2 * bins)
     distance = position % bins
     far = np.minimum(distance, bins - distance) > half
@@ -143,7 +143,7 @@ def weights(mask: Mask) -> NDArray[np.float32]:
 
 
 def residual(spectrum: Spectrum, mask: Mask | None = None) -> NDArray[np.float32]:
-    """Power over the floor outside the notches (if any), in units of the floor, shape (..., bins); 0 below noise."""
+    """Power less the floor outside the notches (if any), in units of the floor, shape (..., bins); 0 below it."""
     excess = at_least(spectrum.relative_power, 1)
     excess -= np.float32(1)
     if mask is not None:

@@ -8,22 +8,22 @@ from typing import Any
 
 @lru_cache(maxsize=1)
 def _libraries() -> Any:
-    """The libraries for linear algebra of this process; to look for them takes milliseconds."""
-    import scipy.linalg  # noqa: F401  its library is another than NumPy's, and must be there to be found
+    """The libraries for linear algebra of this process, kept, because finding them takes milliseconds."""
+    import scipy.linalg  # noqa: F401  it has a library of its own, which is found only once loaded
     from threadpoolctl import ThreadpoolController  # type: ignore[import-untyped]
 
     return ThreadpoolController()
 
 
 def _give_up() -> None:
-    """Let any thread set the limit: by itself threadpoolctl hears the one alone that set the first."""
+    """Let any thread set the limit: otherwise threadpoolctl obeys only the thread that set the first."""
     from threadpoolctl import OpenBLASController
 
     OpenBLASController.clear_controlling_thread(force=True)
 
 
 class _OneThread:
-    """Holds while anyone is inside: the first sets the limit, the last takes it away, in whichever order they leave."""
+    """Limit to one thread while anyone is inside: the first to enter sets it, the last to leave removes it."""
 
     def __init__(self) -> None:
         self._lock, self._inside, self._limit = Lock(), 0, None

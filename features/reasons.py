@@ -1,4 +1,4 @@
-"""How the reasons begin for which no rotor could have been seen in a dwell, or one that is seen cannot be told."""
+"""Beginnings of the reasons why a dwell could not have shown a rotor, or a rotor that it shows is not measured."""
 
 from .dropouts import BEYOND_FILLING_IN
 

@@ -16,34 +16,37 @@ from .lines import squared
 #: Multiples of the rate that are looked at.
 HARMONICS = 6
 
-#: What each further multiple must bring [standard deviations of noise].
+#: Taken off the evidence for each multiple that is used, the first included [standard deviations of noise].
 HARMONIC_COST = 1.0
 
-#: A faster rate that has no less evidence than this [standard deviations], or share, under the best one's is the rate:
-#: the best one is then a fraction of it.
+#: The fastest rate that has nearly the best evidence is the rate: the best one is then a fraction of it. Its evidence
+#: may be less by FASTER_LESS [standard deviations], or by FASTER_SHARE of the best one's, whichever is more.
 FASTER_LESS, FASTER_SHARE = 15.0, 0.03
 
-#: The rate itself or twice it holds this share of the evidence.
+#: The rate itself, or twice the rate, must hold at least this share of the evidence.
 LOW_SHARE = 0.15
 
-#: Zeros appended: the spectrum is read between its bins.
+#: Transform length over that of the record: zeros are appended, so that the spectrum can be read between its bins.
 _PADDING = 8
 
-#: Span over which the continuum of fluctuations is followed [Hz], and where it begins.
+#: _CONTINUUM_HZ: width of the running median that gives the continuum of fluctuations [Hz]. _SLOWEST_HZ: lowest rate
+#: that its level is taken from [Hz].
 _CONTINUUM_HZ, _SLOWEST_HZ = 6.0, 2.0
 
-#: Fluctuation of a level that is rounding [natural logarithm of a float32 power].
+#: A level that fluctuates by less than this only shows rounding [natural logarithm of a float32 power].
 _ROUNDING = 1e-5
 
-#: What pauses, its phase held meanwhile, spreads the power about its rate over lines: those within so much of it [Hz]
-#: hold this share and more outside the main one, so many bins of the recording to each side. Steady wings' held none,
-#: those of birds that glide or bound in between a fifth to a third.
+#: Wings that pause, their phase held meanwhile, spread the power about their rate over several lines. They pause where
+#: lines within _ABOUT_HZ of the rate [Hz] hold at least _PAUSES_SHARE of their power outside the main line, which
+#: reaches _MAIN_BINS bins of the recording to each side. Lines of steady wings held none outside it, those of birds
+#: that glide or bound in between a fifth to a third.
 _ABOUT_HZ, _PAUSES_SHARE, _MAIN_BINS = 1.8, 0.05, 2.0
 
-#: Cells' power over so much of chance counts there; their centre is off by up to so much of how far it is spread.
+#: _OVER_CHANCE: power counts there only above this many times that of chance. _CENTRE_SHARE: least standard deviation
+#: of the centre of these lines, as a share of their spread.
 _OVER_CHANCE, _CENTRE_SHARE = 2.0, 1 / 4
 
-#: Stated deviations count neighbouring cells and frames as so much less than independent [1 of the variance].
+#: Factor by which stated variances allow for neighbouring cells and frames that are not independent [1].
 _OVERLAP = 2.3
 
 
@@ -56,9 +59,9 @@ class Repetition:
     rate_hz, rate_hz_std : float
         [Hz]
     evidence : float
-        What is left at the rate's multiples beside the common course, over what chance leaves [standard deviations].
+        Power at the rate's multiples without the common course, in excess of that of chance [standard deviations].
     moving_share : float
-        Share of the repeating pattern that is no common course of all velocities, 0..1.
+        Share of the repeating pattern that no common course of all velocities explains, 0..1.
     cells : ndarray of bool, shape (cells,)
         Where the pattern repeats.
     """
@@ -72,7 +75,7 @@ class Repetition:
 
 @dataclass(frozen=True)
 class LevelSpectrum:
-    """Spectrum over time of each cell's level, over its continuum.
+    """Spectrum over time of each cell's level, relative to its continuum.
 
     Parameters
     ----------
@@ -81,9 +84,9 @@ class LevelSpectrum:
     moving : ndarray of complex128, same shape
         The same without the common course.
     weight : ndarray of float64, shape (cells,)
-        How much a cell has to say, 0..1.
+        Weight of a cell, 0..1: 0 where it holds noise alone.
     step_hz : float
-        From rate to rate [Hz].
+        Step between the rates [Hz].
     """
 
     whole: NDArray[np.complex128]
@@ -97,18 +100,18 @@ class LevelSpectrum:
         return np.asarray(over / np.sqrt(2 * (self.weight**2).sum() + 1e-9), np.float64)
 
     def used(self, cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """These cells, or all that have something to say where these are none, shape (cells,)."""
+        """The given cells, or, if there are none, all of a weight above 0, shape (cells,)."""
         return cells if cells.any() else self.weight > 0
 
     def at(self, rate_hz: float) -> float:
-        """Excess of what is no common course at the first multiples of a rate, together."""
+        """Excess without the common course at the first multiples of a rate together [standard deviations]."""
         place = self.places(rate_hz, 1) * np.arange(1, HARMONICS + 1)
         excess = self.excess(self.moving)
         place = place[place < len(excess)]
         return float(excess[place].sum() / np.sqrt(len(place)))
 
     def places(self, rate_hz: NDArray[np.float64] | float, order: int) -> NDArray[np.intp]:
-        """Index of a multiple of rates."""
+        """Index of the multiple `order` of each rate."""
         return np.asarray(np.rint(np.asarray(rate_hz) * order / self.step_hz), np.intp)
 
 
@@ -133,7 +136,7 @@ def level_spectrum(
     LevelSpectrum or None
         None where no cell is over the noise, or nothing fluctuates.
     """
-    from scipy.ndimage import median_filter  # here, because dwells are judged without
+    from scipy.ndimage import median_filter  # here, because judging dwells needs no such import
 
     mean = power.mean(axis=0, dtype=np.float64)
     weight = np.maximum(mean / floor - 1.3, 0)  # cells of noise alone say nothing
@@ -153,10 +156,10 @@ def level_spectrum(
     own = np.median(lines[slowest:], axis=0) + 1e-12
     lines /= own
     course = median_filter(lines.mean(axis=1), size=int(_CONTINUUM_HZ / step_hz) | 1, mode="nearest")
-    # the median of an exponential is log 2 of its mean
+    # the median of an exponential is log 2 times its mean
     course *= np.median(lines[slowest:] / course[slowest:, None]) / np.log(2)
     whole = spectrum / np.sqrt(own * course[:, None])
-    # a common gain shows in a cell by as much as its echo is over the noise
+    # a common gain changes the level of a cell the more, the further its echo is over the noise
     common = mean / (mean + floor) / np.sqrt(own)
     weighed = common * weight
     moving = whole - np.outer(whole @ weighed / (weighed @ common), common)
@@ -186,7 +189,7 @@ def repetition(levels: LevelSpectrum, low_hz: float, high_hz: float) -> Repetiti
         total += np.where(inside, excess[np.minimum(place, len(excess) - 1)] - HARMONIC_COST, -np.inf)
         better = total > best
         best[better], orders[better] = total[better], order
-    # a rate of which only a high multiple is seen is a fraction of that one's
+    # a rate of which only a high multiple is seen is a fraction of the true rate
     low = np.maximum(*(excess[np.minimum(levels.places(rates, k), len(excess) - 1)] for k in (1, 2)))
     best[low < LOW_SHARE * best] = -np.inf
     peaks = 1 + np.flatnonzero((best[1:-1] >= best[:-2]) & (best[1:-1] > best[2:]))
@@ -206,14 +209,14 @@ def repetition(levels: LevelSpectrum, low_hz: float, high_hz: float) -> Repetiti
 
 
 def while_moving(levels: LevelSpectrum, found: Repetition) -> tuple[float, float]:
-    """The rate of what repeats while it does, and its deviation: another than the pattern's where it pauses.
+    """Rate of a motion while it lasts, and its standard deviation: not the pattern's rate where the motion pauses.
 
     Parameters
     ----------
     levels : LevelSpectrum
         From `level_spectrum`.
     found : Repetition
-        From `repetition`: of what pauses one of several lines, as far apart as its pauses come.
+        From `repetition`. Where the motion pauses, this is one of several lines, spaced by the rate of the pauses.
 
     Returns
     -------
@@ -234,7 +237,7 @@ def while_moving(levels: LevelSpectrum, found: Repetition) -> tuple[float, float
 
 
 def _moving_share(levels: LevelSpectrum, place: NDArray[np.intp]) -> float:
-    """Share of the pattern at these places that no single course over time, whichever it be, explains."""
+    """Share of the pattern at these places that no course over time common to all cells explains."""
     rows = levels.whole[place] * np.sqrt(levels.weight)
     strength = np.linalg.svd(np.concatenate([rows.real, rows.imag]), compute_uv=False) ** 2
     number = 2 * len(place)

@@ -1,4 +1,4 @@
-"""What is asked of samples and of a radar before anything is computed of them, and the samples' safe scale."""
+"""Checks of samples and radars before anything is computed from them, and a scale that is safe for float32."""
 
 import math
 from numbers import Real
@@ -8,38 +8,42 @@ from numpy.typing import ArrayLike, NDArray
 
 from .fast import ones
 
-#: Of a radar [Hz]: beyond, a frequency was given in another unit.
+#: Ranges of a radar's frequencies [Hz]: a value outside was given in another unit.
 CARRIER_RANGE_HZ, PRF_RANGE_HZ = (1e8, 1e12), (1.0, 1e8)
 
-#: What is to be done about samples that are missing.
+#: Advice about missing samples.
 FILL_IN = "interpolate them from their neighbours (zeros in their place, or a cut, would draw lines beside every line)"
 
-#: What is said of samples that are not finite.
+#: Error text for samples that are not finite.
 NOT_FINITE = f"iq holds values that are not finite: {FILL_IN}"
 
-#: What is said of samples that are finite, but not in complex64.
+#: Error text for samples that are finite as given, but not in complex64.
 TOO_LARGE = "iq holds values that are too large for complex64: lower the gain"
 
-#: What is said of a record that is none in complex64.
+#: Error text for a record that is not 0 as given, but is in complex64.
 TOO_SMALL = "iq holds a record that complex64 holds as 0: raise the gain"
 
 #: A record whose largest part is below this has lost its digits among float32's denormal numbers: 9 bits are left here.
 LEAST_PART = 2.0**-140
 
-# Energies of a record: neither its lines, at most that strong, nor its floor leave float32.
+# Range of a record's energy in which float32 holds the powers of its lines, at most that strong, and its floor.
 _SAFE_ENERGY = np.array(1e-14, np.float32), np.array(1e30, np.float32)
 
-# Without axes: to NumPy a number is one more thing to convert at every call.
+# An array without axes, because NumPy would convert a plain number at every call.
 _ONE = np.array(1, np.float32)
 
 
 def as_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
-    """Samples as complex64; real ones would pass for a spectrum with two like sides, and a mask would be forgotten.
+    """Samples as complex64.
+
+    Real samples are refused, because they have a spectrum of two equal sides; masked ones, because their mask would be
+    dropped.
 
     Raises
     ------
     ValueError
-        If they are not complex, some are masked, or the last axis holds fewer than `least` pulses.
+        If they are not complex, some are masked, rows differ in length, or the last axis holds fewer than `least`
+        pulses.
     """
     if np.ma.is_masked(iq):
         raise ValueError(f"iq holds masked samples: {FILL_IN}")
@@ -54,7 +58,7 @@ def as_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
         raise ValueError(f"iq has shape {samples.shape}: its last axis must hold at least {pulses}")
     if samples.dtype == np.complex64:
         return samples
-    with np.errstate(over="ignore"):  # what overflows is not finite, and found as that
+    with np.errstate(over="ignore"):  # a sample that overflows is refused later, as not finite
         return samples.astype(np.complex64)
 
 
@@ -64,8 +68,8 @@ def finite_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
     Raises
     ------
     ValueError
-        If they are not complex or not finite, some are masked, a record is 0 in complex64 alone, or the last axis
-        holds fewer than `least` pulses.
+        If they are not complex or not finite, some are masked, a record is 0 in complex64 but not as given, or the
+        last axis holds fewer than `least` pulses.
     """
     samples = as_complex(iq, least)
     if not np.isfinite(samples).all():
@@ -76,7 +80,7 @@ def finite_complex(iq: ArrayLike, least: int = 1) -> NDArray[np.complex64]:
 
 
 def require_radar(carrier_hz: float, prf_hz: float) -> tuple[float, float]:
-    """Both frequencies [Hz] in float64, as phases need them; what is none is refused.
+    """Check both frequencies, and return them in float64, as phases need them [Hz].
 
     Raises
     ------
@@ -91,7 +95,7 @@ def require_radar(carrier_hz: float, prf_hz: float) -> tuple[float, float]:
 
 
 def beyond_radars(carrier_hz: float, prf_hz: float) -> str:
-    """Which of both is no frequency of a radar, and the rule; empty where both are."""
+    """Which of the two is out of a radar's range, and that range; empty where neither is."""
     for name, value, (low, high) in (("carrier", carrier_hz, CARRIER_RANGE_HZ), ("PRF", prf_hz, PRF_RANGE_HZ)):
         if not low <= value <= high:
             return f"the {name} is {value:g} Hz: it must be {low:g} to {high:g} Hz"
@@ -124,7 +128,7 @@ def unit_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
 
 
 def energies(iq: NDArray[np.complex64]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Energy of each record, shape (...), and whether float32 holds the squares that it is the sum of."""
+    """Energy of each record, shape (...), and whether float32 holds the squares that it sums."""
     parts = np.ascontiguousarray(iq).view(np.float32)
     with np.errstate(over="ignore", under="ignore"):
         energy = np.vecdot(parts, parts)
@@ -133,7 +137,7 @@ def energies(iq: NDArray[np.complex64]) -> tuple[NDArray[np.float32], NDArray[np
 
 
 def safe_scale(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """`unit_scale` of the records that need it, 1 of the others: it changes no digit, and to scale is a pass more."""
+    """`unit_scale` of the records that need it, 1 of the others: scaling changes no digit, and takes another pass."""
     _, safe = energies(iq)
     if np.count_nonzero(safe) == safe.size:
         return ones(safe.size).reshape(*safe.shape, 1)

@@ -1,4 +1,4 @@
-"""The one table of what models eat: every feature with its unit, range and meaning, and the shape of every input."""
+"""The one table of what models take: every feature with its unit, range and meaning, and the shape of every input."""
 
 import hashlib
 import json
@@ -152,7 +152,7 @@ INPUT_SHAPES: dict[str, tuple[int, ...]] = {
 
 
 def schema_hash() -> str:
-    """SHA-256 (hex) of names, units, ranges, meanings and shapes: no model made for another may be called."""
+    """SHA-256 (hex) of names, units, ranges, meanings and shapes: a model made for another is refused."""
     table = {
         "features": [asdict(f) for f in FEATURES],
         "joint_features": [asdict(f) for f in JOINT_FEATURES],

@@ -30,7 +30,7 @@ def band_levels_db(
     Returns
     -------
     stronger, weaker : ndarray of float32, shape (..., bands)
-        [dB over the floor]; a band wholly outside the unambiguous span holds the axis's own mark for "unseen".
+        [dB over the floor]; a band wholly outside the unambiguous span holds `axis.UNSEEN_DB`.
     """
     both = (band_shares(axis_db.shape[-1]) @ axis_db[..., None])[..., 0]
     count = len(SPEED_BANDS_MPS) - 1
@@ -76,19 +76,19 @@ def symmetry(root: NDArray[np.float32], body: Body) -> NDArray[np.float32]:
     root : ndarray of float32, shape (..., bins)
         Root of the significant energy of each bin, >= 0.
     body : Body
-        The middle.
+        The body lines, about which the sides are compared.
 
     Returns
     -------
     ndarray of float32, shape (...)
-        -1..1, of the roots of the roots.
+        -1..1; the square roots of `root` are correlated.
     """
     bins = root.shape[-1]
     reach = bins // 2 - 1
-    twice = np.empty((body.index.size, 2 * bins), np.float32)  # the circle, cut open anywhere
+    twice = np.empty((body.index.size, 2 * bins), np.float32)  # the circle of bins twice, so that no side is cut
     np.sqrt(root.reshape(-1, bins), out=twice[:, :bins])
     twice[:, bins:] = twice[:, :bins]
-    # the sides one behind the other, from the far end of the left one to the far end of the right one
+    # both sides of each spectrum, each from the body outwards
     both = np.empty((len(twice), 2, reach), np.float32)
     for row, circle, index in zip(both, twice, body.index.reshape(-1).tolist(), strict=True):
         row[0] = circle[index + 1 : index + 1 + reach]

@@ -1,4 +1,4 @@
-"""Smearing index: how fast the comb's lines widen with their order, which unlike rotor rates make them do."""
+"""Smearing index: how fast the comb's lines widen with their order, as they do where rotor rates differ."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +11,15 @@ from .spectrum import Spectrum
 #: The index of lines that fill the space between orders evenly: the standard deviation of a uniform order, 1/sqrt(12).
 FULLY_SMEARED = 0.2887
 
-#: Orders that take part: far ones of a weak comb are noise.
+#: Highest order that takes part: higher ones of a weak comb are noise.
 MAX_ORDER = 24
 
-#: Of rates further apart the outer lines fill all there is between the orders and widen no more. Fewer orders are asked
-#: then: these, where the index times them says so [orders].
+#: Where rates are further apart, the outer lines fill the space between the orders and widen no more. FEWER_ORDERS:
+#: highest orders that are then tried in place of MAX_ORDER, one after the other. SATURATED: the index from fewer orders
+#: counts if it is more than this when multiplied by their highest [orders].
 FEWER_ORDERS, SATURATED = (12, 8), 0.2
 
-#: Orders squared that vary less than this do not show whether lines widen with them.
+#: Variance of the squared orders up to which they do not show whether lines widen.
 LEAST_VARIANCE = 1e-3
 
 
@@ -46,7 +47,7 @@ def smearing_index(
     chopping : Chopping
         The comb's spacing.
     root : ndarray of float32, shape (..., bins), optional
-        Root of the energy if it is at hand.
+        Root of the energy, if it was computed already.
 
     Returns
     -------
@@ -60,14 +61,14 @@ def smearing_index(
 def wide_smearing_index(
     spectrum: Spectrum, energy: NDArray[np.float32], body: Body, chopping: Chopping
 ) -> NDArray[np.float32]:
-    """`smearing_index` of rates that differ by up to about 4 %: by fewer orders where the outer ones' lines fill all.
+    """`smearing_index` of rates that differ by up to about 4 %, from fewer orders where the outer lines fill all space.
 
-    Of rates further apart even the inner lines fill the space between the orders, and nothing widens.
+    At rates further apart even the inner lines fill the space between the orders, and none widens.
 
     Parameters
     ----------
     spectrum, energy, body, chopping
-        As there.
+        As in `smearing_index`.
     """
     nearest, away = _squared_orders(spectrum, body, chopping)
     root = np.sqrt(energy)
@@ -94,11 +95,12 @@ def _squared_orders(
 def _growth(
     nearest: NDArray[np.float32], away: NDArray[np.float32], root: NDArray[np.float32], most: int
 ) -> NDArray[np.float32]:
-    """Root of the slope of `away` over `nearest`, which is overwritten, by so many orders; NaN where none holds energy.
+    """Root of the slope of `away` over `nearest` from the orders 1 to `most`; NaN where none holds energy.
 
-    Roots of the energy weigh the bins: one strong low line must not outvote the many weak high ones.
+    `nearest` is overwritten. Bins are weighted by the root of their energy: one strong low line must not outvote the
+    many weak high ones.
     """
-    counts = nearest <= most**2  # nowhere without a spacing
+    counts = nearest <= most**2  # false for the NaN of a missing spacing
     counts &= nearest > 0
     weight = root * weights(counts)
     total = sums(weight)

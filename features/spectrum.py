@@ -14,24 +14,26 @@ from .window import KAISER, Window
 #: Speed of light [m/s].
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 
-#: Without any noise (a synthetic line) the floor is this share of the record's power, not what rounding leaves.
+#: Least noise floor, as a share of the record's mean power: without any noise (a synthetic line) rounding would set it.
 LEAST_FLOOR = np.float32(1e-9)
 
-# Without axes: to NumPy a number is one more thing to convert at every call.
+# An array without axes, because NumPy would convert a plain number at every call.
 _HALF = np.array(0.5, np.float32)
 
-#: Under any power that is not 0: divides in its stead.
+#: Least divisor in place of a power that may be 0; smaller than any power that is not.
 LEAST_POWER = np.array(1e-36, np.float32)
 
-#: Noise shows where the least floor is at most this share of the floor, whatever rounding makes of a mean.
+#: Noise shows where the least floor is below this share of the floor: less than 1, because a mean is rounded.
 SHOWN_SHARE = np.float32(0.99)
 
 _FLOOR_QUANTILE = 0.25
 
-#: Blocks of a side of the spectrum whose quartile is the floor; a side so many times below the other holds no noise.
+#: FLOOR_BLOCKS: a side of the spectrum is summed in this many blocks, up to twice as many, or one a bin if it has fewer
+#: bins; their lower quartile gives its floor. EMPTY_RATIO: a side whose floor is more than this many times below the
+#: other's holds no noise.
 FLOOR_BLOCKS, EMPTY_RATIO = 64, np.array(4, np.float32)
 
-#: What a spectrum holds of each record.
+#: Fields of `Spectrum` that hold values of each record.
 _OF_RECORDS = ("relative_power", "transform_floor", "scale", "transform", "side_floors")
 
 
@@ -42,7 +44,7 @@ class Spectrum:
     Parameters
     ----------
     relative_power : ndarray of float32, shape (..., bins)
-        Power over the noise floor [1], centred (fftshift): noise alone has mean 1 within 3 % from 700 pulses on; of
+        Power over the noise floor [1], centred (fftshift): noise alone has mean 1 within 3 % from 700 pulses on; in
         shorter dwells the floor is too high, through Kaiser's window by 0.2 dB at 128 to 500 pulses, 0.4 at 64, 1 at 32
         and 1.7 at 16, through Hann's by 0.6 times that.
     transform_floor : ndarray of float32, shape (...)
@@ -56,9 +58,9 @@ class Spectrum:
     transform : ndarray of complex64, shape (..., bins)
         The centred transform of the scaled and windowed samples, whose power this is.
     window : Window
-        Theirs.
+        Window of those samples.
     side_floors : ndarray of float32, shape (..., 2)
-        Noise power of a bin of `transform` on the lower and on the upper side, of which the floor is made.
+        Noise power of a bin of `transform` on the lower and on the upper side, from which the floor is taken.
     """
 
     relative_power: NDArray[np.float32]
@@ -72,12 +74,12 @@ class Spectrum:
     side_floors: NDArray[np.float32]
 
     def rows(self, rows: NDArray[np.intp] | tuple[int, ...]) -> "Spectrum":
-        """The spectra of some of the records, of shape (records, bins), or of the one of such an index."""
+        """The spectra of some records of a batch (records, bins), or of the one record at an index of any batch."""
         return replace(self, **{name: getattr(self, name)[rows] for name in _OF_RECORDS})
 
     def with_rows(self, rows: NDArray[np.intp], others: "Spectrum") -> "Spectrum":
-        """Spectra of shape (records, bins), some replaced by others, which are written over these, not into copies."""
-        scale = self.scale.copy()  # it may be one for all records there are
+        """Replace some of the spectra, shape (records, bins), by others; arrays other than `scale` are overwritten."""
+        scale = self.scale.copy()  # it may be a shared array that must not be written to
         out = replace(self, scale=scale)
         for name in _OF_RECORDS:
             getattr(out, name)[rows] = getattr(others, name)
@@ -190,7 +192,7 @@ def centred_power(iq: NDArray[np.complex64], bins: int | None = None, *, window:
 
 
 def centred_transform(iq: NDArray[np.complex64], bins: int | None = None, *, window: Window) -> NDArray[np.complex64]:
-    """The transform whose power `centred_power` gives, for the same samples; its phases are those of its own start."""
+    """The transform whose power `centred_power` gives, of the same samples; its phases refer to the first of them."""
     pulses = iq.shape[-1]
     bins = fft.next_fast_len(pulses) if bins is None else bins
     even = bins % 2 == 0
@@ -201,7 +203,7 @@ def centred_transform(iq: NDArray[np.complex64], bins: int | None = None, *, win
 
 
 def per_floor(floor: NDArray[np.float32]) -> NDArray[np.float32]:
-    """What a power is multiplied by to be in units of its floor; finite where there is none, and no power either."""
+    """Factor that brings a power into units of its floor; finite also where the floor, and so the power, is 0."""
     return np.reciprocal(np.maximum(floor, LEAST_POWER))
 
 
@@ -216,7 +218,7 @@ def noise_floor(power: NDArray[np.float32], window: Window) -> NDArray[np.float3
     power : ndarray of float32, shape (..., bins)
         Power spectrum.
     window : Window
-        Of the samples: it makes neighbouring bins alike.
+        Window of the samples, which correlates neighbouring bins.
 
     Returns
     -------
@@ -242,14 +244,14 @@ def _side_floors(power: NDArray[np.float32], window: Window) -> NDArray[np.float
 
 
 def _floor_of(sides: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The floor that both sides' (..., 2) come to, shape (...)."""
+    """Noise floor of spectra, shape (...), from those of their two sides, shape (..., 2)."""
     one, other = sides[..., 0], sides[..., 1]
     least, most = np.minimum(one, other), np.maximum(one, other)
     return np.where(most > EMPTY_RATIO * least, most, (least + most) * _HALF)
 
 
 def side_sums(power: NDArray[np.float32]) -> tuple[NDArray[np.float32], int]:
-    """Sums over blocks of so many neighbouring bins of both sides of centred power spectra of at least 4 bins.
+    """Sums over blocks of neighbouring bins on both sides of centred power spectra of at least 4 bins.
 
     Returns
     -------
@@ -264,28 +266,28 @@ def side_sums(power: NDArray[np.float32]) -> tuple[NDArray[np.float32], int]:
     # two sides alike, each in its blocks, without the bin at half the PRF, which has no mirror
     lower = (power.shape[-1] + 1) % 2
     sides = windows(power, (2, blocks, size), (power.shape[-1] - lower - blocks * size, size, 1), lower)
-    # rows of so few numbers are read in whole registers, and what lies behind the last, if no number, raises a flag
+    # short rows are read in whole registers: a NaN in memory behind the last number would cause a warning
     with np.errstate(invalid="ignore"):
         return np.matmul(sides, ones(size)), size
 
 
 @lru_cache(maxsize=64)
 def quartile_of_noise(bins: int, size: int, blocks: int, window: Window) -> NDArray[np.float32]:
-    """Lower quartile of the sums of so many neighbouring bins in white noise of unit power, of so many sums."""
-    # a gamma of as many degrees of freedom as the sum has: the window makes neighbours alike
+    """Lower quartile of `blocks` sums of `size` neighbouring bins each, in white noise of unit power."""
+    # a gamma law with the sum's degrees of freedom: fewer than its bins, because the window correlates neighbours
     alike = bins_alike(bins, bins, window)[1:size]
     shape_k = size**2 / (size + 2 * np.arange(size - 1, 0, -1) @ alike)
-    share = (quartile_rank(blocks) + 1) / (blocks + 1)  # mean of the uniform of that rank
+    share = (quartile_rank(blocks) + 1) / (blocks + 1)  # mean of that rank among uniform numbers
     return np.array(size / shape_k * special.gammaincinv(shape_k, share), np.float32)
 
 
 def quartile_rank(blocks: int) -> int:
-    """Rank of the lower quartile of so many, from 0."""
+    """Rank of the lower quartile of so many blocks, counted from 0."""
     return round(_FLOOR_QUANTILE * (blocks - 1))
 
 
 def _least_floor(power: NDArray[np.float32]) -> NDArray[np.float32]:
-    """What the floor of power spectra is at least, shape (...)."""
+    """Lower bound of the floor of power spectra, shape (...)."""
     return sums(power) * (LEAST_FLOOR / np.float32(power.shape[-1]))
 
 

@@ -1,7 +1,7 @@
 """A comb that stays: the same chopping frequency in dwell after dwell of a recording, as a rotor's does.
 
-In one dwell a few strong bins of noise, or what a spur and a fading target make of each other, may pass for a comb.
-They do not pass for the same one again.
+In one dwell a few strong bins of noise, or a spur together with a fading target, may pass for a comb. In other dwells
+they do not pass for the same comb again.
 """
 
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ from .rotor.even_pulses import even_pulses
 from .rotor.periodogram import prepare
 from .spectrum import SPEED_OF_LIGHT_MPS
 
-#: Length of a dwell [s], short enough for a rate that changes, and its pulses at least and at most: more cost time and
-#: find little more.
+#: DWELL_S: length of a dwell [s], short enough for a rate that changes. PULSES: its fewest and most pulses; more would
+#: cost time and find little more.
 DWELL_S, PULSES = 0.08, (32, 4096)
 
-#: Dwells that are looked at, spread over the recording, and how many must show the comb.
+#: DWELLS: most dwells that are looked at, spread over the recording. LEAST: fewest of them that must show the comb.
 DWELLS, LEAST = 8, 3
 
-#: Chopping frequencies are the same where their logarithms differ by less: in flight a controller moves them so far.
+#: Chopping frequencies count as the same if their logarithms differ by less: a controller moves them so far in flight.
 SAME = 0.08
 
 
@@ -47,8 +47,7 @@ def steady_comb(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: f
     Parameters
     ----------
     iq : ndarray of complex, shape (..., pulses)
-        Slow-time samples of one range cell, of three dwells or more, at a PRF of 400 Hz or more: nothing is found in
-        less.
+        Slow-time samples of one range cell; in fewer than three dwells, or below a PRF of 400 Hz, nothing is found.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz], > 0.
 
@@ -79,7 +78,7 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple[f
         choppings = np.append(choppings, chopping_hz)
         same = np.abs(np.log(choppings[:, None] / choppings)) < SAME
         shown = same.sum(axis=1)
-        if shown.max() >= LEAST:  # no further dwell changes that, and each takes time
+        if shown.max() >= LEAST:  # enough: further dwells would only take time
             return (float(np.median(choppings[same[shown.argmax()]])),)
     return (np.nan,)
 
@@ -90,7 +89,7 @@ def _rotor_hz(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> fl
     if data is None:
         return None
     comb, _ = find_comb(data)
-    if comb is None or len(even_pulses(data, comb.fit.spacing)):  # nor another radar's pulses
+    if comb is None or len(even_pulses(data, comb.fit.spacing)):  # or they are another radar's pulses
         return None
     per_mps = 2 * carrier_hz / SPEED_OF_LIGHT_MPS
     reach_mps = comb.last * comb.fit.spacing * prf_hz / per_mps

@@ -18,7 +18,8 @@ PAPER_SETTINGS = ((1e-3, 0.9), (4e-3, 0.9), (4e-3, 0.5), (10e-3, 0.9))
 #: Window of HERM lines [s]: several turns of a rotor, so that its flashes are lines.
 HERM_WINDOW_S = 0.04
 
-#: A flash train must correlate with itself by so much [1], and by so many standard deviations of noise.
+#: Least autocorrelation of a flash train at its period: FLASH_CORRELATION [1] and FLASH_DEVIATIONS [standard deviations
+#: of noise], whichever is more.
 FLASH_CORRELATION, FLASH_DEVIATIONS = 0.15, 3.5
 
 #: Frames this share of a window apart count as independent.
@@ -37,7 +38,7 @@ class Stft:
     power : ndarray of float32, shape (..., frames, bins)
         Power, centred in Doppler: bin `bins // 2` is velocity zero.
     carrier_hz, prf_hz : float
-        Of the radar [Hz].
+        Carrier and pulse repetition frequency [Hz].
     hop : int
         Samples from frame to frame, at least 1.
     """
@@ -59,7 +60,7 @@ class Stft:
 
     @property
     def floor(self) -> NDArray[np.float32]:
-        """Noise power of a bin, shape (...): the median over all frames and bins, of exponential noise."""
+        """Noise power of a bin, shape (...): from the median over all frames and bins, for exponential noise."""
         return np.median(self.power, axis=(-2, -1)) / np.float32(np.log(2))
 
 
@@ -131,25 +132,25 @@ def flash_period_s(frames: Stft) -> NDArray[np.float64]:
     away = (np.arange(bins) - body + bins // 2) % bins - bins // 2
     bin_mps = frames.prf_hz / bins * SPEED_OF_LIGHT_MPS / frames.carrier_hz / 2
     notch = max(3, int(np.ceil(NOTCH_MPS / bin_mps)))
-    # each side's power over the time, relative to its mean: nothing here has a scale
+    # power of each side over time, relative to its mean: the period does not depend on the gain
     sides = np.stack([(power @ ((sign * away > notch)[..., None]).astype(np.float32))[..., 0] for sign in (-1, 1)])
     level = sides.mean(axis=-1, keepdims=True, dtype=np.float64)
     swing = sides / np.where(level > 0, level, 1) - (level > 0)
     size = fft.next_fast_len(2 * count, real=True)
     spectrum = (np.abs(fft.rfft(swing, n=size, axis=-1)) ** 2).sum(axis=0)
-    # coarse hops: the correlation of a band-limited level is known between the frames too
+    # coarse hops are interpolated: the correlation of a band-limited level is known between the frames too
     finer = int(np.ceil(8 * frames.hop / bins))
     lags = finer * count
     correlation = fft.irfft(spectrum, n=size * finer, axis=-1)[..., :lags] * (lags / (lags - np.arange(lags)))
     rate_hz = frames.frame_rate_hz * finer
     low, high = CHOPPING_RANGE_HZ
-    # frames nearer than this share samples, behind a Hann window: no period can be told there
+    # the last bound: frames less than SHARED windows apart share samples, so that no period can be told there
     first = max(2, int(np.ceil(rate_hz / high)), int(np.ceil(SHARED * bins / frames.hop * finer)))
     last = min(int(rate_hz / low), lags // 2)
     out = np.full(lead, np.nan)
     if last - first < 3:
         return out
-    # two sides of so many independent frames
+    # number of independent frames, of both sides together
     independent = 2 * count * min(1.0, 1.5 * frames.hop / bins)
     least = max(FLASH_CORRELATION, FLASH_DEVIATIONS / np.sqrt(independent))
     for index in np.ndindex(lead):
@@ -177,7 +178,7 @@ def _period(row: NDArray[np.float64], first: int, last: int, least: float) -> fl
 
 
 def _top(row: NDArray[np.float64], peak: int) -> float:
-    """Place of a peak below the bin, by a parabola."""
+    """Place of a peak, refined to a fraction of a lag by a parabola."""
     return peak + float(parabola_offset(*row[peak - 1 : peak + 2]))
 
 
@@ -217,7 +218,7 @@ def cadence_velocity(frames: Stft) -> tuple[NDArray[np.float32], NDArray[np.floa
     diagram : ndarray of float32, shape (..., frames // 2 + 1, bins)
         Magnitude over each record's mean amplitude [1]; the steady part is taken out.
     cadence_hz : ndarray of float64, shape (frames // 2 + 1,)
-        Its rows [Hz].
+        Cadence of each row [Hz].
     """
     amplitude = np.sqrt(frames.power)
     count = amplitude.shape[-2]
@@ -240,7 +241,7 @@ def cepstrogram(frames: Stft) -> tuple[NDArray[np.float32], NDArray[np.float64]]
     heights : ndarray of float32, shape (..., frames, bins // 2 + 1)
         Magnitude of the transform of the level over the floor [dB].
     period_s : ndarray of float64, shape (bins // 2 + 1,)
-        Its columns [s].
+        Period of each column [s].
     """
     bins = frames.power.shape[-1]
     floor = np.where(frames.floor > 0, frames.floor, 1)[..., None, None]

@@ -1,7 +1,8 @@
 """The outer ends of a spectrum that a filter took out, filled with noise.
 
-What was sampled faster than its filter passes, or resampled, holds noise as far as that and next to nothing beyond, on
-both sides alike. Models saw noise end so of rotors alone, and call it UAV, surely (docs/ablation.md).
+A record that was sampled faster than its filter passes, or resampled, holds noise up to the filter's edge and next to
+nothing beyond, on both sides alike. Models have seen noise end like this with rotors alone, and are sure that such a
+record is a UAV (docs/ablation.md).
 """
 
 import numpy as np
@@ -13,44 +14,48 @@ from .fast import means, sums
 from .lines import squared
 from .spectrum import Spectrum
 
-#: Each side is looked at in 24 to 32 blocks of neighbouring bins, each of as many as tell noise, or of eight at least.
+#: Each side is split into LEAST_BLOCKS to MOST_BLOCKS blocks of neighbouring bins. ENOUGH_BINS: bins of a block that
+#: suffice to tell noise. LEAST_BINS: with fewer bins a block nothing is filled.
 LEAST_BLOCKS, MOST_BLOCKS, ENOUGH_BINS, LEAST_BINS = 24, 32, 16, 8
 
-#: Beyond the band the power is less by this factor than in so many blocks within, from the next but so many inwards.
+#: Beyond the band no block has more than 1 / DROP of the power of any of WITHIN blocks further in; the NEXT blocks
+#: between them are left out.
 DROP, WITHIN, NEXT = 200.0, 3, 5
 
-#: There it is noise: no block is so many times another, and the median of its bins is its mean as noise's is, to this.
+#: Those WITHIN blocks hold noise: none has FLAT times the power of another, and the median of their bins is over this
+#: share (LIKE_NOISE) of that of noise of their mean.
 FLAT, LIKE_NOISE = 6.0, 0.7
 
-#: And further in it is nowhere less than this share.
+#: Further in, but for the innermost block, the power must be over this share of that noise.
 LEAST_SHARE = 0.25
 
-#: A rotor's band may end so too, but its blades flash: mean fourth power over that of the square, of the outer so large
-#: a share of the band, in the middle of the dwell. Of noise it is 2.
+#: A rotor's band may end so too, but its blades flash. FLASHES: mean fourth power of the amplitude over the square of
+#: the mean power, above which they do; noise has 2. OUTER_SHARE: share of the band beyond which its bins count. MIDDLE:
+#: share of the dwell, about its middle, that counts.
 FLASHES, OUTER_SHARE, MIDDLE = 2.7, 0.5, 0.6
 
-#: Of the noise.
+#: Seed of the noise.
 _SEED = 21
 
 _NONE = np.empty(0, np.intp)
 
 
 def filled_ends(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray[np.intp], NDArray[np.complex64]]:
-    """Records whose outer ends a filter took out, and these with noise there as strong as within.
+    """Find records whose outer ends a filter took out, and fill these ends with noise as strong as within.
 
     Parameters
     ----------
     iq : ndarray of complex64, shape (records, pulses)
         Slow-time samples.
     spectrum : Spectrum
-        Of these.
+        Their spectra.
 
     Returns
     -------
     rows : ndarray of int, shape (filled,)
         Which of the records.
     samples : ndarray of complex64, shape (filled, pulses)
-        Theirs.
+        These records, filled.
     """
     middle, half = spectrum.bins // 2, (spectrum.bins - 1) // 2
     size = max(half // MOST_BLOCKS, min(ENOUGH_BINS, half // LEAST_BLOCKS))
@@ -58,7 +63,7 @@ def filled_ends(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray[
         return _NONE, iq[:0]
     count, power = half // size, spectrum.relative_power
 
-    # most records have noise at the ends that is no less than further in: they are not looked at more closely
+    # most records have as much noise at the ends as further in: they are passed over here
     near, far = half // 8, half * 3 // 16
     within = np.minimum(sums(power[:, middle - far : middle - near]), sums(power[:, middle + near : middle + far]))
     ends = np.maximum(sums(power[:, middle - half : middle - half + size]), sums(power[:, middle + half - size :]))
@@ -78,10 +83,10 @@ def filled_ends(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray[
 
 
 def _end_of_noise(blocks: NDArray[np.float32]) -> tuple[int, float]:
-    """How many blocks of both sides, shape (2, blocks, bins), a filter passes, and the noise there; 0 if none ends."""
+    """Blocks a side that a filter passes, of (2, blocks, bins), and the noise power there; 0 if noise has no end."""
     mean = means(blocks)
     most, least = mean.max(axis=0), mean.min(axis=0)
-    beyond = np.maximum.accumulate(most[::-1])[::-1]  # the most there is from each block outwards
+    beyond = np.maximum.accumulate(most[::-1])[::-1]  # largest power from each block outwards
     inner = np.minimum(np.minimum(least[:-2], least[1:-1]), least[2:])
     falls = inner[: len(least) - WITHIN - NEXT] > DROP * beyond[WITHIN + NEXT :]
     for end in np.flatnonzero(falls) + WITHIN:
@@ -99,9 +104,9 @@ def _noise_level(power: NDArray[np.float32]) -> float:
 
 
 def _flashes(spectrum: Spectrum, row: int, end: int, *, real: bool) -> bool:
-    """Whether the outer part of a band of so many bins to each side comes and goes as blades do.
+    """Whether the outer part of a band of `end` bins to each side comes and goes as blades do.
 
-    Of one channel (`real`) one side is asked: both are a real signal, whose noise has 3.
+    For one channel (`real`) one side is used: both together are a real signal, whose noise has 3 in place of 2.
     """
     away = np.arange(spectrum.bins) - spectrum.bins // 2
     away = away if real else np.abs(away)

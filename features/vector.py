@@ -18,16 +18,17 @@ from .shape import band_levels_db, entropy, ripple_db, symmetry
 from .smearing import smearing_index
 from .spectrum import SPEED_OF_LIGHT_MPS, Spectrum
 
-#: Energy over the floor counts from here on, where the level is 6 dB: noise passes it in 2 % of the bins.
+#: Power over the floor above which a bin's energy counts, at a level of 6 dB: noise exceeds it in 2 % of the bins.
 SIGNIFICANT = np.float32(10 ** (6.0 / 10) - 1)
 
-#: Of an empty side of the spectrum there is this share of its noise, at least; turns of a rotor in a dwell, at least.
+#: EMPTIEST: lower bound of a side's mean power over the floor, for empty sides. LEAST_TURNS: lower bound of the
+#: chopping periods in a dwell.
 EMPTIEST, LEAST_TURNS = 1e-2, 0.01
 
 #: Names of the bands' levels on the stronger and on the weaker side.
 BANDS = tuple([f.name for f in FEATURES if f.name.startswith(stem)] for stem in ("strong_", "weak_"))
 
-#: Speeds that part the change over the dwell into slow, middle and fast [m/s].
+#: Speeds that divide the change over the dwell into slow, middle and fast [m/s].
 _CHANGE_MPS = (3.0, 20.0)
 
 
@@ -42,7 +43,7 @@ def axis_plan(bins: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
 @lru_cache(maxsize=64)
 def radar_columns(carrier_hz: float, prf_hz: float, pulses: int) -> dict[str, float]:
-    """What the radar allows to be seen, as logarithms."""
+    """The features that depend on the radar and the dwell alone, as logarithms to base 10."""
     wavelength_m, dwell_s = SPEED_OF_LIGHT_MPS / carrier_hz, pulses / prf_hz
     return {
         "velocity_step_log": math.log10(wavelength_m / (2 * dwell_s)),
@@ -134,7 +135,7 @@ def feature_vector(
     half_wavelength_m = np.float32(spectrum.wavelength_m / 2)
     dwell_s = np.float32(spectrum.pulses / spectrum.prf_hz)
 
-    speed_mps = np.abs(body.velocity_mps)  # refined from the bin at half the PRF it may lie beyond: folded back
+    speed_mps = np.abs(body.velocity_mps)  # refined from the bin at half the PRF, it may lie beyond: folded back below
 
     columns: dict[str, ArrayLike] = {
         **radar_columns(spectrum.carrier_hz, spectrum.prf_hz, spectrum.pulses),

@@ -14,41 +14,42 @@ from .stft import stft
 #: Wingbeats that are sought [Hz]: the slowest is a swan's in a slow beat, the fastest a small songbird's.
 WINGBEAT_RANGE_HZ = (2.4, 20.0)
 
-#: Rates so far below the slowest are looked at too: their flank must not pass for it [Hz].
+#: The search begins this far below the slowest wingbeat [Hz]: the flank of a slower rate must not pass for a wingbeat.
 SLOWER_HZ = 0.2
 
 #: Shortest recording [s]: several beats of a slow bird.
 LEAST_S = 1.5
 
-#: Frames of the sequence last so long [s], the longer the lower the carrier, for cells of this width [m/s]; and from
-#: frame to frame [s].
+#: FRAME_S: shortest and longest frame of the sequence [s]; frames are longer at a lower carrier, for velocity cells of
+#: CELL_MPS [m/s]. HOP_S: time from frame to frame [s].
 FRAME_S, CELL_MPS, HOP_S = (0.012, 0.024), 1.0, 0.003
 
 #: Wings move within this of the body [m/s], and birds fly no faster.
 WING_MPS = 25.0
 
-#: Cells of speed that wings must reach over for what repeats in them to be seen.
+#: Fewest velocity cells within WING_MPS of the body in which wings can be seen.
 LEAST_CELLS = 4
 
-#: A repetition must have this much evidence [standard deviations], and this share of it must move through the
-#: velocities: what rises and falls at all of them alike is fading, or lines that beat.
+#: LEAST_EVIDENCE: least evidence of a repetition [standard deviations]. LEAST_MOVING_SHARE: least share of its pattern
+#: that moves through the velocities: what rises and falls at all of them alike is fading, or lines that beat.
 LEAST_EVIDENCE, LEAST_MOVING_SHARE = 40.0, 0.08
 
-#: As much evidence of the same rate further than the wings from the body speaks of a rotor [standard deviations].
+#: Evidence above which the same rate, seen beyond WING_MPS of the body, is a rotor's [standard deviations].
 FAR_EVIDENCE = 15.0
 
-#: Rates up to this are looked at, for the multiples of the beat [Hz].
+#: Highest rate that is looked at, for the multiples of the beat [Hz].
 HIGHEST_HZ = 48.0
 
-#: The window's main lobe to each side [cells].
+#: Half width of the window's main lobe [cells].
 LOBE_CELLS = 1.5
 
-#: Wings are no further than this below the body [dB], and flash: their power swings by this much over a beat. Limbs and
-#: wheels echo all the time.
+#: MOST_BODY_DB: most that wings may be below the body [dB]. LEAST_SWING: least swing of their power over a beat
+#: (`_Motion`): wings flash, limbs and wheels echo all the time.
 MOST_BODY_DB, LEAST_SWING = 32.0, 0.5
 
-#: A walker's legs swing in step, so that the pattern repeats at twice the gait, up to this [Hz]; the body moves no
-#: faster than this [m/s], and the feet about it at most so many times as fast.
+#: Limits of a walker. GAIT_HZ: highest rate of the pattern [Hz], which repeats at twice the gait, because the legs
+#: swing in step. GAIT_MPS: highest speed of the body [m/s]. LIMB_SPEEDS: speed of the feet about the body over the
+#: body's, at most (1 m/s is added).
 GAIT_HZ, GAIT_MPS, LIMB_SPEEDS = 4.6, 3.0, 2.5
 
 
@@ -59,7 +60,7 @@ class Wingbeat:
     Parameters
     ----------
     wingbeat_hz, wingbeat_hz_std : ndarray of float64, shape (...)
-        Wingbeat rate [Hz], while the wings beat: of a bird that glides or bounds in between less well known.
+        Wingbeat rate while the wings beat [Hz]; less well known for a bird that glides or bounds in between.
     velocity_mps : ndarray of float64, shape (...)
         Radial velocity of the body in the middle of the recording [m/s].
     acceleration_mps2, acceleration_mps2_std : ndarray of float64, shape (...)
@@ -78,16 +79,16 @@ class Wingbeat:
 
 @dataclass(frozen=True)
 class _Motion:
-    """What repeats, beside the body.
+    """Motion and power of what repeats, compared with the body.
 
     Parameters
     ----------
     reach_mps : float
-        Half the range of its radial velocities [m/s], the cells' own width taken off; 0 within the body's.
+        Half the range of its radial velocities less `LOBE_CELLS` [m/s]; 0 if it stays within the body's main lobe.
     body_db : float
-        The body's power over it [dB].
+        The body's power over its own [dB]; inf if it stays within the body's main lobe.
     swing : float
-        How far its power, all velocities together, swings over a beat: rms over mean times the root of 2 [1].
+        Swing of its power over a beat, all velocities together: rms of its multiples of the rate, over its mean [1].
     """
 
     reach_mps: float
@@ -99,9 +100,9 @@ def wingbeat(iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: floa
     """Wingbeat rate and body acceleration of long recordings, or why there is no wingbeat.
 
     A background at rest and the body's trend are taken out first. Then a rate is sought at which the pattern of levels
-    over velocity and time repeats (`repetition`). It is a wingbeat where wings can be what moves: not what rises and
-    falls at all velocities alike (fading), nor what repeats beyond the wings' speeds as well (rotors), nor what a
-    walker's limbs or a vehicle's wheels would do.
+    over velocity and time repeats (`repetition`). This rate is a wingbeat unless the pattern rises and falls at all
+    velocities alike (fading), repeats beyond the wings' speeds as well (rotors), or is what a walker's limbs or a
+    vehicle's wheels would give.
 
     Parameters
     ----------
@@ -135,7 +136,7 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     if prf_hz * wavelength_m / 4 < 1.1 * WING_MPS:
         # a rotor folded into the wings' speeds cannot be told from them
         return (*nothing, f"no wingbeat: unambiguous only to {prf_hz * wavelength_m / 4:.1f} m/s")
-    iq = iq[unbroken(iq)]  # silences repeat, and what is there comes and goes with them
+    iq = iq[unbroken(iq)]  # silences may repeat, and the signal then comes and goes with them
     if len(iq) < LEAST_S * prf_hz:
         return (*nothing, f"no wingbeat: silences leave less than {LEAST_S:g} s in one piece")
     shown, body = followed(normed(iq), carrier_hz, prf_hz)
@@ -151,7 +152,7 @@ def _one(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tuple:
     # closing on the radar is a positive Doppler shift, and a velocity below the body's
     velocities = velocity - frames.frequency_hz * wavelength_m / 2
     near = np.abs(velocities - velocity) <= WING_MPS
-    if near.sum() < LEAST_CELLS:  # the frames are too short for so long a wave
+    if near.sum() < LEAST_CELLS:  # the frames are too short for so long a wavelength
         return (np.nan, np.nan, *body, "no wingbeat: wings are slower than this carrier tells apart")
     levels = level_spectrum(frames.power[:, near], floor, frames.frame_rate_hz, HIGHEST_HZ)
     if levels is None:
@@ -173,7 +174,7 @@ def _motion(
     body_mps: float,
     frame_rate_hz: float,
 ) -> _Motion:
-    """How what repeats moves: power of the cells, shape (frames, cells), at these radial velocities."""
+    """The `_Motion` of what repeats, from the power of cells (frames, cells) at these radial velocities."""
     lobe = LOBE_CELLS * float(np.abs(np.diff(velocity_mps[:2])[0]))
     inner = np.abs(velocity_mps - body_mps) <= lobe
     cells = found.cells & ~inner

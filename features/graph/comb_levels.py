@@ -24,7 +24,7 @@ def broad_power(radar: Spectrum, transform: Value, floor: Value, band: slice) ->
     """As `comb_levels.broad_power`: from parts (n, 2, bins) and the floor to power (n, bins of the band)."""
     bins, first, stop = radar.bins, band.start, band.stop
     around = transform
-    if not (first and stop < bins):  # beyond an end lies the other
+    if not (first and stop < bins):  # bins are on a circle: beyond one end lies the other
         around = transform.graph.concat(transform.slice(bins - 1, bins), transform, transform.slice(0, 1))
         first, stop = first + 1, stop + 1
     beside = around.slice(first - 1, stop - 1) + around.slice(first + 1, stop + 1)
@@ -45,7 +45,7 @@ def comb_levels_db(radar: Spectrum, transform: Value, floor: Value, kept: Value)
     nats = line_nats(broad_power(radar, transform, floor, plan.band)).reshape(-1, plan.blocks, size)
     mean = (nats * counts).sum() / counts.sum().at_least(1.0)
     line = ((nats - mean) * counts).reshape(-1, stop - first).pad(0, plan.length - (stop - first))
-    # one coefficient more than there are: what lies beyond the last counts as the mean
+    # one coefficient more, of height 0: multiples of a period beyond the last one count as noise of mean height
     beyond = plan.length // 2 + 1
     squares = dft_power(line, plan.length, beyond + 1)
     number = kept.slice(first, stop).sum().at_least(1.0)

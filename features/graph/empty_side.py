@@ -13,20 +13,20 @@ from .spectrum import noise_floor, noise_shows, side_floors
 def filled_sides(
     packed: Value, transform: Value, power: Value, pulses: int, bins: int, window: Window
 ) -> tuple[Value, Value]:
-    """As `empty_side.filled_sides`, of samples and of their transform, to which the noise's own is added.
+    """As `empty_side.filled_sides`, for samples and for their transform, to which the transform of the noise is added.
 
     Parameters
     ----------
     packed : Value
         Samples, shape (n, 2, pulses).
     transform : Value
-        Theirs, shape (n, 2, bins).
+        Their transform, shape (n, 2, bins).
     power : Value
-        Of that, shape (n, bins).
+        Power of the transform, shape (n, bins).
     pulses, bins : int
-        Their numbers.
+        Pulses of a record, and bins of its transform.
     window : Window
-        Of the transform.
+        Window of the transform.
 
     Returns
     -------

@@ -53,19 +53,19 @@ IN_GRAPH = ("features", "levels", "spectrum", "cadence", "combs")
 IQ = "iq"
 
 
-#: How unlike samples of a converter's least step may be: others are as alike by chance alone.
+#: Largest relative difference between samples of a converter's least step: others are as alike by chance alone.
 _OF_A_STEP = 1e-5
 
 
 def input_graph(
     graph: Graph, *, carrier_hz: float, prf_hz: float, pulses: int, names: Collection[str]
 ) -> tuple[dict[str, Value], Value]:
-    """Append what makes model inputs of the value named `IQ`.
+    """Append the operators that make model inputs from the value named `IQ`.
 
     Parameters
     ----------
     graph : Graph
-        To be appended to.
+        The graph that they are appended to.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz], > 0.
     pulses : int
@@ -78,8 +78,8 @@ def input_graph(
     inputs : dict of str to Value
         As `inputs.model_inputs` gives them, shape (records, *INPUT_SHAPES[name]).
     live : Value
-        Whether a record holds a signal, of two channels where there is noise, only finite samples and no lost pulses,
-        shape (records, 1).
+        Whether a record holds a signal, only finite samples, no lost pulses and, if it holds noise, two channels; shape
+        (records, 1).
 
     Raises
     ------
@@ -95,7 +95,7 @@ def input_graph(
     flat = iq.reshape(-1, 2 * pulses)
     largest = flat.apply("Abs").max()
     scaled = flat * unit_scale(largest)
-    # no sum of what is not finite is within any limit; such a record spoils no other, and its answer is replaced
+    # a sum with a value that is not finite is in no limit; such a record spoils no other, and its answer is replaced
     live = (largest >= LEAST_PART) & (scaled.sum().apply("Abs") <= 8.0 * pulses)
     of_pulses = scaled.reshape(-1, pulses, 2)
     size = of_pulses.apply("Abs")
@@ -142,9 +142,9 @@ def input_graph(
 def _none_lost(graph: Graph, size: Value, pulses: int) -> Value:
     """Whether no pulses were lost, and no silence breaks a record, much as `dropouts` tells them, shape (records, 1).
 
-    Fewer than three zeros are never enough. A converter that gives so many has as many samples of its least step: there
-    are eight such places for one that is 0. Of what hardly reaches that step this does not hold, and such a record
-    counts as one of lost pulses, unless it has hardly another size.
+    Fewer than three zeros are never lost pulses. Where a converter gives the zeros, more samples have its least step:
+    eight places are that step from 0, for one that is 0. This does not hold for a signal that hardly reaches that step:
+    such a record counts as one with lost pulses, unless its samples have hardly any other size.
     """
     is_there = size > 0.0
     there = is_there.count()
@@ -152,7 +152,7 @@ def _none_lost(graph: Graph, size: Value, pulses: int) -> Value:
     least = others.min()
     steps = (others <= least * (1 + _OF_A_STEP)).count()
     zeros = pulses - there
-    # beside a strong line at rest samples are nearly alike as well: none is as large as the next step
+    # beside a strong line at rest samples are nearly alike too, but then none is as large as a next step
     is_step = (size.max() >= least * AS_NEAR) | (size.max() <= least * (1 + _OF_A_STEP))
     hardly_steps = (size.max() <= least * LEAST_DISTINCT) & (there <= steps * LEAST_DISTINCT)
     upto = is_there.cumsum().pad(1, 0)
@@ -162,15 +162,15 @@ def _none_lost(graph: Graph, size: Value, pulses: int) -> Value:
 
 
 def _two_channels(of_pulses: Value) -> Value:
-    """Whether there are two, much as `one_channel.one_channel` tells them, shape (records, 1).
+    """Whether a record has two channels, much as `one_channel.one_channel` tells them, shape (records, 1).
 
-    I and Q of the pulses have shape (records, pulses, 2).
+    `of_pulses` holds I and Q, shape (records, pulses, 2).
     """
     real, imaginary = of_pulses.slice(0, 1), of_pulses.slice(1, 2)
     apart = of_pulses.graph.concat(real - imaginary, real + imaginary).apply("Abs").max(axis=-2, keep=False)
     highest, lowest = of_pulses.max(axis=-2, keep=False), -((-of_pulses).max(axis=-2, keep=False))
     spans = highest - lowest
-    still = spans.max() <= 0.0  # what is the same in every pulse is of no channel
+    still = spans.max() <= 0.0  # a record that is the same in every pulse is not of one channel
     return still | (of_pulses.graph.concat(spans, apart).min() > 0.0)
 
 
@@ -184,7 +184,7 @@ def _feature_vector(
     parts_db: Value,
     change: Value,
 ) -> Value:
-    """As `vector.feature_vector`, without its NaN: a feature that has no value is 0."""
+    """As `vector.feature_vector`: a feature that has no value is 0 from the start, never NaN."""
     graph, bins = relative_power.graph, radar.bins
     over = (relative_power - 1.0).at_least(0.0)
     excess = over * kept

@@ -1,4 +1,4 @@
-"""The numbers of the feature vector in graph operators, each as its definition in the module it is named after.
+"""The numbers of the feature vector in graph operators, each as defined in the module that its docstring names.
 
 A number of a record has the shape (n, 1), a spectrum (n, bins).
 """
@@ -24,7 +24,7 @@ def log10(value: Value) -> Value:
 
 
 def ratio(above: Value, below: Value) -> Value:
-    """A ratio, over 1 instead where the divisor is not above 0."""
+    """Ratio of two values; the divisor counts as 1 where it is not above 0."""
     return above / below.graph.where(below > 0.0, below, 1.0)
 
 
@@ -47,7 +47,7 @@ def _vertex(left: Value, middle: Value, right: Value) -> Value:
 
 
 def _around(index: Value, bins: int) -> Value:
-    """Places on a circle of bins."""
+    """Index modulo the number of bins, which lie on a circle."""
     return index.graph.op("Mod", index, np.array(bins))
 
 
@@ -72,7 +72,7 @@ def notch_weights(radar: Spectrum, body: Body) -> Value:
 
 
 def threshold_width_hz(radar: Spectrum, relative_power: Value, kept: Value) -> Value:
-    """As the difference of what `bandwidth.threshold_band_hz` gives at its own threshold."""
+    """Width of the band that `bandwidth.threshold_band_hz` gives at `bandwidth.noise_threshold_db` [Hz]."""
     threshold = 10 ** (bandwidth.noise_threshold_db(radar.bins) / 10)
     over = (relative_power > threshold).to(np.float32) * kept
     frequency = over.graph.constant(radar.frequency_hz, np.float32)
@@ -120,7 +120,7 @@ def symmetry(radar: Spectrum, energy: Value, body: Body) -> Value:
     """As `shape.symmetry`."""
     bins, reach = radar.bins, radar.bins // 2 - 1
     root = energy.apply("Sqrt").apply("Sqrt")
-    twice = energy.graph.concat(root, root)  # the circle, cut open anywhere
+    twice = energy.graph.concat(root, root)  # the circle of bins twice, so that no side is cut
     away = np.arange(reach) + 1
     right, left = (twice.pick(body.index + places) for places in (away, bins - away))
     right, left = right - right.mean(), left - left.mean()
@@ -135,7 +135,7 @@ def band_levels_db(axis_db: Value, bins: int) -> tuple[Value, Value]:
 
 
 def _marked(level_db: Value) -> Value:
-    """Levels within rounding of the floor's or of "unseen" as exactly these: trees split there."""
+    """Levels, set to exactly `LOWEST_DB` or `UNSEEN_DB` where they are that but for rounding: trees split there."""
     for mark_db in (LOWEST_DB, UNSEEN_DB):
         level_db = level_db.graph.where((level_db - mark_db).apply("Abs") > 1e-4, level_db, mark_db)
     return level_db

@@ -129,7 +129,7 @@ class Value:
         return self.graph.op("CumSum", self.to(np.float64), np.array(-1))
 
     def ranked(self, rank: int, count: int = 1) -> "Value":
-        """The values of so many ranks of the last axis (0 the smallest), the highest one first, shape (..., count)."""
+        """The values of `count` ranks of the last axis from `rank` on (0 the smallest), highest first, (..., count)."""
         lowest = self.graph.op("TopK", self, np.array([rank + count]), outputs=2, largest=0, sorted=0)
         return self.graph.op("TopK", lowest, np.array([count]), outputs=2)
 
@@ -143,7 +143,7 @@ class Value:
         return self.graph.op("Slice", self, *(np.array([number]) for number in (start, stop, axis)), dtype=self.dtype)
 
     def take(self, index: NDArray[np.integer], axis: int = -1) -> "Value":
-        """What stands at fixed places of an axis, which becomes those of the index."""
+        """Elements at fixed places of an axis, which is replaced by the axes of the index."""
         return self.graph.op("Gather", self, index.astype(np.int64), dtype=self.dtype, axis=axis)
 
     def pick(self, index: "Value") -> "Value":
@@ -175,7 +175,7 @@ class Value:
 
 
 def needed(nodes: Sequence[NodeProto], outputs: Iterable[str]) -> list[NodeProto]:
-    """The nodes, in their order, that some of the named outputs come from; runtimes compute the others as well."""
+    """The nodes, in their order, that the named outputs depend on: a runtime would compute the others as well."""
     wanted, kept = set(outputs), []
     for node in reversed(nodes):
         if wanted.intersection(node.output):
@@ -190,7 +190,7 @@ class Graph:
     Parameters
     ----------
     prefix : str
-        Of every name, so that graphs can be joined.
+        Beginning of every name, so that graphs can be joined.
     """
 
     def __init__(self, prefix: str = "iq") -> None:

@@ -37,9 +37,9 @@ def dft(packed: Value, length: int, count: int) -> Value:
 
 
 def dft_power(samples: Value, length: int, count: int, *, parts: int = 1, conjugate: bool = False) -> Value:
-    """Squared magnitude of the transform of real samples (n, length), or of 2 `parts` (n, 2, length): (n, count).
+    """Squared magnitude of the transform of real samples (n, length), or, for 2 `parts`, (n, 2, length): (n, count).
 
-    With `conjugate` that of the conjugate of the samples: with its sign, the way back.
+    With `conjugate` the samples are conjugated first: this gives that of the inverse transform, without 1 / length.
     """
     full, rows, wanted = _by_rows(samples, length, count, parts=parts, conjugate=conjugate)
     squares = full * full
@@ -80,13 +80,16 @@ def centred_transform(packed: Value, pulses: int, bins: int, window: Window) -> 
 
 
 def power_of(transform: Value, bins: int) -> Value:
-    """As `spectrum.power_of`: from parts (n, 2, bins) to power (n, bins)."""
+    """As `fast.power_of`: from parts (n, 2, bins) to power (n, bins)."""
     squares = (transform * transform).reshape(-1, 2 * bins)
     return squares.slice(0, bins) + squares.slice(bins, 2 * bins)
 
 
 def unit_scale(largest: Value) -> Value:
-    """What brings each record's largest part to 1, unless it is beyond all use; `spectrum.unit_scale` rounds to 2^k."""
+    """Factor that brings each record's largest part to 1, at most 2^126 and at least 2^-126.
+
+    `samples.unit_scale` takes a power of two.
+    """
     return 1.0 / largest.at_least(2.0**-126).at_most(2.0**126)
 
 
@@ -109,7 +112,7 @@ def noise_floor(power: Value, sides: Value) -> Value:
 
 
 def noise_shows(power: Value, floor: Value) -> Value:
-    """Whether the floor is noise, not the share of the power that it is at least, shape (n, 1)."""
+    """Whether the floor is noise, more than its lower bound, as `Spectrum.noise_shows`, shape (n, 1)."""
     return power.mean() * float(definition.LEAST_FLOOR / definition.SHOWN_SHARE) < floor
 
 
@@ -121,9 +124,9 @@ def to_db(relative_power: Value, lowest_db: float = LOWEST_DB) -> Value:
 def spans_of(
     values: Value, length: int, starts: NDArray[np.intp], counts: NDArray[np.intp]
 ) -> tuple[Value, NDArray[np.bool_]]:
-    """Neighbouring elements of the last axis that belong together, side by side.
+    """Take spans of neighbouring elements of the last axis, one span a row.
 
-    They are taken by blocks, as a runtime copies block by block: one by one takes three times as long.
+    They are taken in whole blocks, which a runtime copies at once: one by one takes three times as long.
 
     Parameters
     ----------
@@ -142,7 +145,7 @@ def spans_of(
         Which of them are the span's.
     """
     size = int(2 ** np.round(np.log2(counts.max()) / 2))
-    blocks, number = -(-length // size), int(counts.max() + size - 2) // size + 1  # and those that a span may touch
+    blocks, number = -(-length // size), int(counts.max() + size - 2) // size + 1  # in all, and touched by a span
     places = (starts // size)[:, None] + np.arange(number)
     tiles = values.pad(0, blocks * size - length).reshape(-1, blocks, size)
     taken = tiles.take(np.minimum(places, blocks - 1), axis=-2).reshape(-1, len(starts), number * size)
@@ -151,7 +154,7 @@ def spans_of(
 
 
 def pooled(relative_power: Value, length: int, pool: Pooling | CadencePlan) -> Value:
-    """As `Pooling.mean_and_peak_db` of so many bins or lines, shape (n, 2, axis bins)."""
+    """As `Pooling.mean_and_peak_db` of `length` bins or lines, shape (n, 2, axis bins)."""
     starts, counts = pool.spans
     elements, within = spans_of(relative_power, length, starts, counts)
     held = elements * within.astype(np.float32)
@@ -161,7 +164,7 @@ def pooled(relative_power: Value, length: int, pool: Pooling | CadencePlan) -> V
 
 
 def pooled_mean(relative_power: Value, pool: Pooling) -> Value:
-    """As `Pooling.mean_db` where levels far under the strongest need not be exact."""
+    """As `Pooling.mean_db`, but levels far below the strongest are not exact."""
     starts, counts = pool.spans
     upto = relative_power.cumsum().pad(1, 0)
     total = upto.take(starts + counts) - upto.take(starts)
