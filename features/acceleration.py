@@ -12,48 +12,51 @@ from .one_channel import made_analytic
 from .samples import LEAST_PART, finite_complex, largest_part, require_radar, scaled, unit_scale
 from .spectrum import SPEED_OF_LIGHT_MPS
 
-#: Accelerations that are tried [m/s^2]: five times gravity; in long dwells of short waves fewer, up to those that smear
-#: a line over an eighth of the span.
+#: Largest acceleration tried [m/s^2]: five times gravity. In long dwells of short waves the limit is lower: there it is
+#: the acceleration that smears a line over an eighth of the unambiguous span.
 MAX_MPS2 = 50.0
 
-#: A body line must stand so high over the median of the spectrum [dB].
+#: Least height of a body line over the noise, which is told from the median of the spectrum [dB].
 LEAST_LINE_DB = 20.0
 
-#: What lies within so many bins beside the line moves it as noise of that power would: blades, wings, a background. The
-#: line must stand so high over it [dB].
+#: BESIDE_BINS: what lies within this many bins beside the line (blades, wings, a background) moves the line as noise of
+#: that power would. LEAST_OVER_BESIDE_DB: least height of the line over that power [dB].
 BESIDE_BINS, LEAST_OVER_BESIDE_DB = 6, 10.0
 
-#: The smear is taken out where it is sure by so many standard deviations: a third of a bin leaves enough of strong
-#: lines to pass for a second rotor. (In front of ground up to half a bin that is not there is so in one of a hundred.)
+#: The smear is sure, and taken out, if the acceleration exceeds this many standard deviations. Even a third of a bin of
+#: smear, if left in, leaves enough of strong lines to pass for a second rotor. (In front of ground, one dwell in a
+#: hundred seems surely smeared, by up to half a bin, where there is no smear.)
 SURE_DEVIATIONS = 5.0
 
-#: Ground that sways in the wind bends its own line, by up to ten bins, and for so sure in three to eight of a hundred
-#: dwells where it is the strongest. So a line about velocity zero must stand so high over what lies beside it [dB]: a
-#: hovering body 15 dB over ground does.
+#: Least height of a line about velocity zero over what lies beside it, if its smear seems sure [dB]. Ground that sways
+#: in the wind smears its own line by up to ten bins: where ground is the strongest line, the smear seems sure in three
+#: to eight of a hundred dwells. A hovering body 15 dB over ground stands high enough.
 LEAST_OVER_BESIDE_AT_REST_DB = 22.0
 
-#: And it is bent by more than shows beside it: by so many times what that bends it, where that stands so high over the
-#: noise of the span [dB]. (Of a hovering drone before ground the errors were 2.7 deviations, rms.)
+#: A line about velocity zero is moved by more than shows beside it. Its standard deviation is multiplied by SWAY_FACTOR
+#: where what lies beside it stands more than SWAY_DB over the noise of the span [dB]. (Of a hovering drone before
+#: ground the errors were 2.7 deviations, rms.)
 SWAY_FACTOR, SWAY_DB = 2.5, 6.0
 
-#: A line that is smeared over more bins than these rises at least by this power of their number when the smear is taken
-#: out; what does not is no line. (One alone rises by 2.4 dB from three bins, 4.2 from four and 8.8 from eleven; blades'
-#: lines that fall together by chance by 2 to 3 dB from six to eleven.)
+#: A line smeared over n bins, more than SHOWN_STEPS, must rise by a factor n^RISE_EXPONENT when the smear is taken out;
+#: else it is no line. (A single line rises by 2.4 dB from three bins, 4.2 from four and 8.8 from eleven; blades' lines
+#: that coincide by chance rise by 2 to 3 dB from six to eleven.)
 SHOWN_STEPS, RISE_EXPONENT = 3.2, 0.4
 
-#: Pulses that a line's smear can be told from, at least.
+#: Least number of pulses that show a line's smear.
 LEAST_PULSES = 32
 
-#: A dwell of many steps is searched in fourths, then in halves: a line smears over one bin of a part by the square of
-#: their number as much, and so a sixteenth of the steps is enough. So many of the best, and none at all, which is what
-#: most targets have, are looked at more closely.
+#: PARTS, MANY_STEPS: a dwell of more than MANY_STEPS steps to each side is searched in fourths, then in halves, then as
+#: a whole. The acceleration that smears a line over one bin of a part grows with the square of the number of parts, so
+#: fourths need only a sixteenth of the steps. CANDIDATES: this many of the best steps are searched more closely, and
+#: zero acceleration, which most targets have.
 PARTS, MANY_STEPS, CANDIDATES = (4, 2, 1), 256, 8
 
 
 def body_acceleration(
     iq: NDArray[np.complexfloating], *, carrier_hz: float, prf_hz: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Acceleration at which the strongest line is sharpest: its maximum likelihood for a steady echo.
+    """Acceleration at which the strongest line is sharpest: the maximum-likelihood estimate for a steady echo.
 
     Parameters
     ----------
@@ -65,11 +68,12 @@ def body_acceleration(
     Returns
     -------
     acceleration_mps2, std_mps2 : ndarray of float64, shape (...)
-        Positive when the radial velocity grows; NaN where no line stands out, it may be ground that sways, or more
-        pulses were lost than can be filled in. The deviation is the bound of a chirp's rate, 90 / (SNR pulses^5) rad^2
-        (Peleg and Porat 1991), and `SWAY_FACTOR` times that for a line about velocity zero beside a background.
+        Positive when the radial velocity grows; NaN where no line stands out, where the line may be that of swaying
+        ground, or where more pulses were lost than can be filled in. The standard deviation is the bound of a chirp's
+        rate, 90 / (SNR pulses^5) rad^2 (Peleg and Porat 1991), and `SWAY_FACTOR` times that for a line about velocity
+        zero beside a background.
     smeared : ndarray of bool, shape (...)
-        Whether the line is smeared for sure, so that `without_acceleration` is of use.
+        Whether the smear is sure (see `SURE_DEVIATIONS`), so that `without_acceleration` is of use.
 
     Raises
     ------
@@ -91,7 +95,7 @@ def body_acceleration(
     def heights_at(
         steps: NDArray, dwells: NDArray[np.complex64], parts: int = 1, finer: int = 1
     ) -> NDArray[np.float32]:
-        # value by value: a long dwell has hundreds of steps, and together they would fill the memory
+        # one step at a time: a long dwell has hundreds of steps, which together would fill the memory
         values = (_sharpened(dwells, one * step, wavelength_m, prf_hz, finer * size, parts) for one in steps)
         return np.stack([value.max(axis=-1).sum(axis=-1) for value in values], axis=-1)
 
@@ -132,7 +136,7 @@ def body_acceleration(
         smeared[index] = abs(value[index]) > SURE_DEVIATIONS * std[index]
         if smeared[index] and at_rest and height < beside * 10 ** (LEAST_OVER_BESIDE_AT_REST_DB / 10):
             value[index], std[index], smeared[index] = np.nan, np.nan, False
-    for (row,), stretch in stretches.items():  # what is measured of a dwell that a silence breaks
+    for (row,), stretch in stretches.items():  # of a dwell broken by silence, the longest whole stretch is measured
         if stretch != NOTHING:
             own = body_acceleration(flat[row, stretch], carrier_hz=carrier_hz, prf_hz=prf_hz)
             value[row], std[row], smeared[row] = own
@@ -150,7 +154,7 @@ def without_acceleration(
     iq : ndarray of complex, shape (..., pulses)
         Dwells.
     acceleration_mps2 : ndarray, shape (...)
-        What to take out [m/s^2]; 0 leaves the samples as they are.
+        Acceleration to take out [m/s^2]; 0 leaves the samples as they are.
     carrier_hz, prf_hz : float
         Carrier and pulse repetition frequency [Hz], > 0.
 
@@ -179,7 +183,7 @@ def without_acceleration(
         raise ValueError(
             f"acceleration_mps2 has shape {acceleration.shape}: it must have that of the records of iq, {records}"
         ) from None
-    if np.count_nonzero(each):  # turned, one channel would pass for two: its other side is left out before
+    if np.count_nonzero(each):  # turned in phase, one channel would pass for two: it is made analytic before
         samples = np.where(each != 0, made_analytic(mended(samples)[0]), samples)
     return _steadied(samples, each, SPEED_OF_LIGHT_MPS / carrier_hz, prf_hz)
 
@@ -187,7 +191,7 @@ def without_acceleration(
 def _steadied(
     samples: NDArray[np.complex64], acceleration_mps2: NDArray[np.float64], wavelength_m: float, prf_hz: float
 ) -> NDArray[np.complex64]:
-    """Samples (..., pulses) with an acceleration taken out; the phase grows, and is float64."""
+    """Samples (..., pulses) with an acceleration taken out; the phase grows large and so is float64."""
     pulses = samples.shape[-1]
     time_s = middle_times(pulses) / prf_hz
     phase = 2 * np.pi / wavelength_m * acceleration_mps2 * time_s**2
@@ -197,11 +201,12 @@ def _steadied(
 def _beside(
     samples: NDArray[np.complex64], acceleration_mps2: float, wavelength_m: float, prf_hz: float, size: int
 ) -> float:
-    """Power of the noise that moves the strongest line of one dwell as what lies beside it does.
+    """Power of the noise that would move the strongest line of one dwell as much as what lies beside it does.
 
-    An acceleration and the line are taken out first. What lies k bins off bends the line's phase by the second Legendre
-    polynomial's part of it, which falls with 1 / k^2: the nearest bins count most, all alike where it is noise. It is
-    no less than the noise of the whole span, nor than what single precision rounds of the line itself.
+    The acceleration and the line are taken out first. Power k bins off bends the line's phase by its component along
+    the second Legendre polynomial, whose amplitude falls with 1 / k^2: the nearest bins count most. In noise all bins
+    are alike. The larger of both means is returned, and at least the noise of the whole span and the rounding error of
+    the line itself in single precision.
     """
     pulses = len(samples)
     steady = _steadied(samples, np.asarray(acceleration_mps2), wavelength_m, prf_hz)
@@ -210,7 +215,7 @@ def _beside(
     offset = parabola_offset(*np.log(np.abs(spectrum[np.array([top - 1, top, top + 1]) % size])))
     still = steady * np.exp(-2j * np.pi * ((top + offset) / size) * np.arange(pulses))
     half = pulses // 2
-    for _ in range(2):  # the parabola is off by a hundredth of a bin, at which strong lines leave much of themselves
+    for _ in range(2):  # the parabola is off by a hundredth of a bin, which would leave much of a strong line
         turn = np.angle(still[-half:].sum() * still[:half].sum().conj()) / (pulses - half)
         still = still * np.exp(-1j * turn * np.arange(pulses))
     rest = fft.fft(still - still.mean())

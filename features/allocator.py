@@ -1,20 +1,20 @@
-"""How the memory of arrays that are freed is kept for the next ones."""
+"""Keep the memory of freed arrays for the next arrays."""
 
 from functools import lru_cache
 
 import numpy as np
 
-#: More than the largest arrays of a record, or of a block of them [bytes].
+#: More than the largest arrays of a record, or of a block of records, take [bytes].
 KEPT_BYTES = 1 << 24
 
 
 @lru_cache(maxsize=1)
 def keep_freed() -> None:
-    """Have the C library keep what is freed, up to twice `KEPT_BYTES`, instead of giving it back at each call.
+    """Have the C library keep freed memory, up to twice `KEPT_BYTES`, instead of giving it back at each call.
 
-    glibc maps arrays of 128 kB and more anew each time, and the system clears every page of them, until it has seen
-    one freed that is larger: from then on it keeps what is smaller than that. One array is enough, and none of its
-    pages is touched. Fits of several combs take an eighth less time so, answers in batches a twentieth. Other C
-    libraries are left as they are.
+    glibc maps an array of 128 kB or more anew each time, and the system clears every page of it, until a larger array
+    has been freed: from then on glibc keeps the memory of all arrays smaller than that one. Freeing one array is
+    enough, and none of its pages is touched. Fits of several combs then take an eighth less time, answers in batches a
+    twentieth less. Other C libraries are left as they are.
     """
     np.empty(KEPT_BYTES, np.uint8)

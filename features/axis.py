@@ -33,7 +33,7 @@ def axis_velocities_mps(bins: int) -> NDArray[np.float64]:
 
 
 def expected_peak(counts: NDArray[np.intp], bandwidth: float) -> NDArray[np.float32]:
-    """Mean of the largest of so many bins of noise of unit power, of which `bandwidth` neighbours are alike."""
+    """Mean of the largest of `counts` bins of unit-power noise, of which one in `bandwidth` is independent."""
     independent = np.maximum(counts / bandwidth, 1)
     return np.maximum(np.log(independent) + np.euler_gamma, 1).astype(np.float32)
 
@@ -73,9 +73,9 @@ class Pooling:
         power : ndarray of float32, shape (..., spectrum bins)
             Power spectra.
         per_unit : ndarray of float32, shape (..., 1), optional
-            What brings them into units of the noise floor, if they are not.
+            Factors that bring them into units of the noise floor, if they are in others.
         from_floor : bool
-            Count nothing below the floor: 0 dB there, and where nothing is seen.
+            Whether levels below the noise floor, and outside the unambiguous span, become 0 dB.
 
         Returns
         -------
@@ -91,9 +91,9 @@ class Pooling:
         return self._levels(out, 0.0 if from_floor else LOWEST_DB)
 
     def mean_and_peak_db(self, relative_power: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Mean level of each axis bin, and its largest over that of noise in as many [dB], shape (..., 2, bins).
+        """Mean and peak level of each axis bin [dB], shape (..., 2, bins).
 
-        Of spectra through Hann's window.
+        The peak is relative to the expected peak of noise in as many spectrum bins. For spectra through Hann's window.
         """
         flat = relative_power.reshape(-1, relative_power.shape[-1])
         rows, seen = self._blank((len(flat), 2))
@@ -104,19 +104,19 @@ class Pooling:
         return self._levels(rows, LOWEST_DB).reshape(*relative_power.shape[:-1], 2, self.bins)
 
     def _blank(self, shape: tuple[int, ...]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Room for the axis with 0 where nothing is seen, and the part of it that is to be filled."""
+        """Zeros for the whole axis, and a view of the seen part, which is to be filled."""
         out = np.zeros((*shape, self.bins), np.float32)
         return out, out[..., self.seen]
 
     def _mean(self, power: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-        """Write the mean power of each seen axis bin, in rising velocity; a row a spectrum."""
-        # one by one: products of matrices take a third of the time for many spectra, but libraries sum in another order
-        # by how many there are, and a record would have other last digits among others than alone
+        """Write the mean power of each seen axis bin, in rising velocity; one row per spectrum."""
+        # bin by bin: for many spectra matrix products take a third of the time, but their order of summation depends on
+        # the number of spectra, so that a record's last digits would differ between alone and within a batch
         self._pooled(np.add, power, out)
         out *= self._shares
 
     def _levels(self, out: NDArray[np.float32], lowest_db: float) -> NDArray[np.float32]:
-        """Power to level in place: of the whole axis, which lies in one piece and so takes half the time."""
+        """Convert power to level, in place: on the whole axis, which is contiguous and so takes half the time."""
         to_db(out, lowest_db, out=out)
         if self.seen.start and lowest_db < UNSEEN_DB:
             out[..., : self.seen.start] = out[..., self.seen.stop :] = UNSEEN_DB
@@ -131,12 +131,12 @@ class Pooling:
 
     @cached_property
     def _shares(self) -> NDArray[np.float32]:
-        """One over the number of spectrum bins in each."""
+        """One over the number of spectrum bins in each seen axis bin."""
         return (1 / self.spans[1]).astype(np.float32)
 
     @cached_property
     def expected_peak(self) -> NDArray[np.float32]:
-        """Mean of the largest of so many exponentials, in rising velocity."""
+        """Expected peak of unit-power noise in each seen axis bin, in rising velocity."""
         return expected_peak(self.spans[1], HANN.noise_bandwidth_bins)
 
     @cached_property
@@ -147,7 +147,7 @@ class Pooling:
         """Write the sum or the largest of the spectrum bins of each seen axis bin, in rising velocity."""
         side, middle, reach = len(self.starts), self.spectrum_bins // 2, int(self.starts[-1] + self.counts[-1])
         alone = self._alone
-        if alone:  # copied, at a tenth of the price
+        if alone:  # copied, which takes a tenth of the time
             out[..., side - alone : side + alone] = relative_power.take(self._copied, axis=-1)
         if alone < side:
             outer = self.starts[alone:]
@@ -158,13 +158,13 @@ class Pooling:
 
     @cached_property
     def _alone(self) -> int:
-        """Axis bins of a side, from velocity zero outwards, that hold one spectrum bin."""
+        """Number of axis bins of a side, from velocity zero outwards, before the first that holds several."""
         more = np.flatnonzero(self.counts > 1)
         return int(more[0]) if len(more) else len(self.counts)
 
     @cached_property
     def _copied(self) -> NDArray[np.intp]:
-        """The spectrum bin of each of these, in rising velocity."""
+        """The spectrum bin of each of the `_alone` axis bins of both sides, in rising velocity."""
         side = len(self.starts)
         return self.spans[0][side - self._alone : side + self._alone]
 
@@ -190,7 +190,7 @@ def pooling(spectrum_bins: int, carrier_hz: float, prf_hz: float, bins: int) -> 
     edges = axis_edges_mps(bins)[bins // 2 :] / step_mps  # of one side, in bins of the spectrum
     centre = (edges[:-1] + edges[1:]) / 2
     within = centre <= spectrum_bins / 2
-    within[0] = True  # the innermost bins hold frequency 0, however slow the radar
+    within[0] = True  # the innermost bins hold frequency 0, however low the PRF
     side, reach = np.count_nonzero(within), (spectrum_bins + 1) // 2
     first = np.minimum(np.ceil(edges[: side + 1]).astype(np.intp), reach)
     nearest = np.rint(centre[:side]).astype(np.intp)

@@ -11,10 +11,10 @@ from .spectrum import Spectrum
 #: Share of the residual energy left out on each side of the energy band.
 TAIL_SHARE = 0.025
 
-#: Share of the spectra in which noise alone exceeds the threshold.
+#: False-alarm rate: share of the spectra in which noise alone exceeds the threshold.
 FALSE_ALARM = 1e-2
 
-#: Bins summed together before the energy is followed bin by bin, where it matters.
+#: Bins of a block: energy is added up block by block, and bin by bin only in the block that crosses a level.
 _BLOCK = 32
 _WITHIN_BLOCK = np.arange(_BLOCK)
 
@@ -23,7 +23,7 @@ _TAILS = np.array([[TAIL_SHARE], [1 - TAIL_SHARE]])
 
 @lru_cache(maxsize=64)
 def noise_threshold_db(bins: int) -> float:
-    """Level that noise alone exceeds in any of so many bins with probability `FALSE_ALARM` [dB over the floor]."""
+    """Level that noise alone exceeds in any of `bins` bins with probability `FALSE_ALARM` [dB over the floor]."""
     return float(10 * np.log10(np.log(bins / FALSE_ALARM)))
 
 
@@ -37,8 +37,8 @@ def threshold_band_hz(
     spectrum : Spectrum
         Spectra, shape (..., bins).
     threshold_db : float
-        Threshold over the noise floor [dB]; the paper takes 30 (simulated) and 20 (measured) over the mean amplitude at
-        8-10 kHz; `noise_threshold_db` is what noise alone seldom exceeds.
+        Threshold over the noise floor [dB]. The paper takes 30 (simulated) and 20 (measured) over the mean amplitude at
+        8-10 kHz; noise alone seldom exceeds `noise_threshold_db`.
     mask : ndarray of bool, shape (..., bins), optional
         True where the spectrum counts, as from `notch_mask`; by default everywhere.
 
@@ -60,7 +60,7 @@ def threshold_band_hz(
 def energy_band_mps(
     spectrum: Spectrum, energy: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Velocities between which all but the tails of the residual energy lies, and the share of bins that carry it.
+    """Velocities between which all residual energy but its tails lies, and the share of bins there that hold any.
 
     Parameters
     ----------
@@ -103,14 +103,14 @@ def _block_sums(energy: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _upto(values: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Sums up to and with each value."""
+    """Running sums, each with its own value."""
     return np.add.accumulate(values, axis=-1, dtype=np.float64)
 
 
 def _crossings(
     energy: NDArray[np.float32], total: NDArray[np.float64], levels: NDArray[np.float64]
 ) -> NDArray[np.intp]:
-    """First bin up to which the energy adds up to each level.
+    """First bin at which the running sum of the energy reaches each level.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def _crossings(
     total : ndarray of float64, shape (records, blocks)
         Energy up to the end of each block of `_BLOCK` bins.
     levels : ndarray of float64, shape (levels, records)
-        At most the energy of all.
+        At most the total energy.
 
     Returns
     -------

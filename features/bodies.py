@@ -1,4 +1,4 @@
-"""Lines of bodies beside the strongest one of a spectrum: what hides in the flank or the skirt of another."""
+"""Lines of further bodies beside the strongest line of a spectrum, also in its flank or in a background's skirt."""
 
 from dataclasses import replace
 
@@ -14,16 +14,17 @@ from .spectrum import Spectrum
 #: bin of 10 000 spectra stood at 13 dB.
 LINE_DB = 17.0
 
-#: A second body's line stands so far over all others but the first one's [dB]: a bird's beside a drone, or a drone's.
+#: A second body's line stands more than this over all lines that are not known [dB]: that of a bird beside a drone, or
+#: of another drone.
 OTHER_OVER_DB = 8.0
 
-#: A slow body's line stands so far over all that lies across velocity zero, within so many bins [dB]: of two places in
-#: a background's skirt one is 13 dB over the other once in twenty times.
+#: A slow body's line stands at least ACROSS_DB [dB] over the level at the opposite velocity, the highest within
+#: ACROSS_BINS of that place. Of two places in a background's skirt one is 13 dB over the other once in twenty times.
 ACROSS_DB, ACROSS_BINS = 13.0, 1
 
 
 def within(size: int, centre: float, half: float) -> NDArray[np.bool_]:
-    """True in the bins of a spectrum in FFT order so near to a place [cycles a sample]."""
+    """True in the bins of a spectrum in FFT order that are within `half` of `centre` [cycles a sample]."""
     return np.asarray(np.abs(from_whole(np.arange(size) / size - centre)) <= half)
 
 
@@ -33,26 +34,26 @@ def turns_of(spectrum: Spectrum, line: Body) -> float:
 
 
 def tops(levels: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """True in the bins no lower than both beside them, around the circle."""
+    """True in the bins that are no lower than either neighbour, around the circle."""
     return np.asarray((levels >= np.roll(levels, 1)) & (levels >= np.roll(levels, -1)))
 
 
 def _strongest(spectrum: Spectrum, where: NDArray[np.bool_]) -> Body:
-    """The strongest line where this is True."""
+    """The strongest line among the bins where `where` is True."""
     return body_line(replace(spectrum, relative_power=np.where(where, spectrum.relative_power, np.float32(0))))
 
 
 def line_among(spectrum: Spectrum, where: NDArray[np.bool_], known: list[float]) -> Body:
-    """The strongest line of a part of the spectrum, whole where only its flank lies there.
+    """The strongest line that reaches into a part of the spectrum; its top may lie outside.
 
     Parameters
     ----------
     spectrum : Spectrum
         Of one record.
     where : ndarray of bool, shape (bins,)
-        True where it is looked for.
+        True in the part in which the line is looked for.
     known : list of float
-        Lines whose flanks are no other's [cycles a sample].
+        Known lines, whose flanks are no lines of their own [cycles a sample].
     """
     power, place = spectrum.relative_power, np.arange(spectrum.bins)
     first = top = int(_strongest(spectrum, where).index)
@@ -63,18 +64,21 @@ def line_among(spectrum: Spectrum, where: NDArray[np.bool_], known: list[float])
     away = np.rint(np.abs(from_whole((place - top) / spectrum.bins)) * spectrum.bins)
     own = away <= LOBE_BINS + 1
     known_bins = (np.rint(np.array(known) * spectrum.bins).astype(np.intp) + spectrum.bins // 2) % spectrum.bins
-    # with both bins beside it, wherever it is looked for
+    # the top counts with both bins beside it, also outside `where`
     return _strongest(spectrum, where & ~own if top != first and own[known_bins].any() else away <= 1)
 
 
 def _beside(spectrum: Spectrum, lines: list[float], half_bins: float) -> NDArray[np.bool_]:
-    """True in the bins further than so much from all these lines [cycles a sample]."""
+    """True in the bins further than `half_bins` from each of the lines [cycles a sample]."""
     near = [within(spectrum.bins, line, half_bins / spectrum.pulses) for line in lines]
     return np.asarray(~fft.fftshift(np.logical_or.reduce(near)))
 
 
 def other_body(spectrum: Spectrum, known: list[float], half_bins: float) -> Body | None:
-    """A line that stands out of all others beside these [cycles a sample], each with so much about it: another body."""
+    """Another body's line, which stands out of all others; None where there is none.
+
+    Not looked at is what lies within `half_bins` of the lines `known` [cycles a sample].
+    """
     left = _beside(spectrum, known, half_bins)
     line = line_among(spectrum, left, known)
     left &= _beside(spectrum, [turns_of(spectrum, line)], half_bins)
@@ -84,7 +88,7 @@ def other_body(spectrum: Spectrum, known: list[float], half_bins: float) -> Body
 
 
 def slow_body(spectrum: Spectrum, known: list[float], rest: NDArray[np.bool_]) -> Body | None:
-    """A line near velocity zero that is no background's: nothing is as strong on the other side.
+    """A line near velocity zero that is no background's, as nothing is as strong on the other side; None if none is.
 
     Parameters
     ----------
@@ -93,7 +97,7 @@ def slow_body(spectrum: Spectrum, known: list[float], rest: NDArray[np.bool_]) -
     known : list of float
         Lines that are known [cycles a sample].
     rest : ndarray of bool, shape (bins,)
-        True in what is taken out about velocity zero: there it is looked for.
+        True in the band taken out about velocity zero, in which the line is looked for.
     """
     from scipy.ndimage import maximum_filter1d  # here, because predicting needs no such import
 

@@ -1,4 +1,4 @@
-"""The body's velocity with a deviation that knows what else may be the body's line, and what lies beside it."""
+"""The body's velocity and its standard deviation, which allows for rival lines and for what lies beside the line."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,49 +12,54 @@ from .rotor.periodogram import Periodogram
 from .spectrum import Spectrum
 from .window import KAISER, KAISER_BETA
 
-#: What the interpolation between bins is off by [bins], and by how much noise moves it where a line stands at its floor
-#: [bins]: it falls with the line's amplitude. The window makes it 2.5 times the bound of a line's frequency.
+#: INTERPOLATION_BINS: error of the interpolation between bins [bins]. NOISE_BINS: standard deviation by noise of a line
+#: as strong as the noise floor [bins]; it falls with the line's amplitude. The window makes it 2.5 times the bound of a
+#: line's frequency.
 INTERPOLATION_BINS, NOISE_BINS = 0.01, 0.68
 
-#: And what the slow part of a background moves it by, where a line lies in one: leaves in a wind [bins].
+#: Standard deviation that the slow part of a background, leaves in a wind, adds to a line within it [bins].
 BACKGROUND_BINS = 0.05
 
-#: Where the body's line and its comb's centre differ by so many deviations, the comb is not one.
+#: If the body's line and its comb's centre differ by more than this many standard deviations, the comb is not that of a
+#: single rotor, and the difference adds to the standard deviation.
 APART_DEVIATIONS = 3.0
 
-#: Without a comb that tells which line is the body's, one that is so much weaker than the strongest is as likely
-#: beside it as 1 to e, and none that is weaker by more than the second [dB].
+#: Without a comb, several lines may be the body's. One that is RIVAL_DB weaker than the line chosen is less likely by a
+#: factor of e; one that is weaker by more than WEAKEST_DB does not count [dB].
 RIVAL_DB, WEAKEST_DB = 2.0, 8.0
 
-#: Nor one that noise alone might be: the highest bin of 10 000 spectra stood at 13 dB.
+#: A line up to this level may be noise alone and does not count [dB]: the highest bin of 10 000 spectra stood at 13 dB.
 NOISE_TOP_DB = 13.5
 
-#: Before something at rest a line that moves is the body's where it stands so far over all on the other side of rest
-#: [dB]: a moving body's did in all but 5 of 2900 (drones, birds and cars before ground, 3.3 to 35 GHz), the strongest
-#: line of a hovering drone's blades in none of 351.
+#: In front of something at rest, a line that moves is the body's if it stands this far over all on the other side of
+#: rest [dB]: a moving body's did in all but 5 of 2900 (drones, birds and cars before ground, 3.3 to 35 GHz), the
+#: strongest line of a hovering drone's blades in none of 351.
 OTHER_SIDE_DB = 8.0
 
-#: Nor where a line stands on that side as far from the one at rest as this on its own, to so many bins: blades whose
-#: edges reflect unlike leave there a line of any level.
+#: The line that moves is not the body's if another line lies, within this many bins, at its mirror image about the line
+#: at rest: blades whose edges reflect unlike leave a line of any level there.
 MIRROR_BINS = 1.5
 
-#: One that does not is the body's all the same so often, at most: 5 of 450 were.
+#: Probability, at most, that a line that moves is the body's although it fails these tests: 5 of 450 were.
 MOVES_SHARE = 0.05
 
-#: What is stronger at rest is a hovering body and no background where its top is so far off rest [bins] and all that
-#: lies about it stands so far below it [dB]: of 351 hovering drones 222 were, of 3200 backgrounds one.
+#: A stronger line near rest is that of a hovering body, not of a background, if its top is at least OFF_REST_BINS off
+#: rest [bins] and all else about rest is more than PURE_DB weaker [dB]: so were 222 of 351 hovering drones and one of
+#: 3200 backgrounds.
 OFF_REST_BINS, PURE_DB = 1.0, 25.0
 
-#: A line is the one at a comb's centre up to so far from it [bins].
+#: A line no further than this from a comb's centre is the line at that centre [bins].
 AT_CENTRE_BINS = 1.0
 
-#: What is known to this share of the unambiguous span is not known: anywhere in it is 0.29.
+#: Standard deviation, as a share of the unambiguous span, from which on no velocity is reported: that of a velocity
+#: anywhere in the span is 0.29.
 UNTOLD_SHARE = 0.2
 
-#: Lines from and up to so far off pull at the body's [bins]: nearer ones are one with it, the lobe ends further out.
+#: Lines at distances from the first to the second of these pull at the body's [bins]: nearer lines are one with the
+#: body's, and the lobe of a line further out ends before it.
 BESIDE_BINS = (1.5, 8.0)
 
-#: Noise beside the line is hardly above this, in units of the floor: the bound of the line's frequency knows it.
+#: Noise beside the line is hardly above this, in units of the floor. That much is left out: NOISE_BINS allows for it.
 NOISE_BESIDE = 4.0
 
 
@@ -78,21 +83,21 @@ def body_velocity(
     fit : CombFit, optional
         The rotor's comb, or that of one of several; None where there is none.
     steady : bool
-        False for unresolved rotors, or a rate that is not steady: the comb's centre has no true deviation then.
+        False for unresolved rotors, or a rate that is not steady: the centre's standard deviation is then not true.
     open_std : float
-        What the choice of the comb's centre adds to the deviation [cycles a sample].
+        What the choice of the comb's centre adds to the standard deviation [cycles a sample].
     blades : bool
-        Where no comb is given: that one is there, and lines that move are blades'.
+        Where no comb is given: True if there is one all the same, so that lines that move are blades'.
 
     Returns
     -------
     velocity_mps, std_mps : float
-        Positive when the range grows. Without a comb, that of the strongest line, if one moves of that; NaN where none
-        stands out, or where it may lie anywhere.
+        Positive when the range grows. Without a comb, the velocity of the line that is most likely the body's: as a
+        rule the strongest that moves, if any does. NaN where no line stands out, or where it may lie anywhere.
     """
     own, level_db = data.strong.lines[0]
     if fit is not None:
-        # before a background that is stronger: the line at the comb's centre, where one is seen
+        # a background may be stronger than the body: take the line at the comb's centre, where one is seen
         at_centre = (
             line for line in data.strong.lines if abs(folded(line[0] - fit.centre)) * data.pulses < AT_CENTRE_BINS
         )
@@ -107,10 +112,10 @@ def body_velocity(
     turns, std = own, own_std / data.pulses
     if fit is not None:
         offset = abs(folded(own - fit.centre))
-        # rotors that were taken for one move its comb, and a body that turns has a line whose top is not its mean
+        # several rotors taken for one displace the comb; the line of a body that turns has its top beside its mean
         apart = offset if offset > APART_DEVIATIONS * np.hypot(std, fit.centre_std) else 0.0
         if offset * data.pulses > AT_CENTRE_BINS:
-            # no background lies beside rest: a line there is as likely a slow body's
+            # a background lies at rest itself: a line beside rest is as likely a slow body's
             slow = AT_REST_BINS < abs(own) * data.pulses <= data.rest_half * data.pulses
             turns, std = fit.centre, float(np.hypot(fit.centre_std, offset * slow))
         elif abs(own) < min(data.rest_half, AT_REST_BINS / data.pulses):
@@ -124,17 +129,18 @@ def body_velocity(
 
 
 def _likeliest(data: Periodogram, spectrum: Spectrum, blades: bool) -> tuple[float, float, float]:
-    """The line that is the body's most likely where no comb tells, its level [dB], and its deviation by the others.
+    """The line most likely the body's where no comb tells, its level [dB], and its standard deviation by rival lines.
 
-    It is the strongest that leaves do not make in a wind, or one that stands out of what they make, if there is any and
-    blades do not: what stands at rest is a background then, or a rival where it is hardly stronger. Where it is much
-    stronger, and a hovering body's by its shape, or lines that move are as strong on both sides of it, these are a
-    hovering drone's blades. Places in [cycles a sample].
+    The strongest line that moves is taken: one faster than leaves in a wind, or else one that stands out of theirs. If
+    there is none, or if lines that move are blades', the strongest line of all is taken. What stands at rest beside a
+    line that moves is a background, or a rival if it is hardly stronger. If it is much stronger, it is a hovering
+    drone's body, and the lines that move are its blades', in two cases: its shape is that of a hovering body, or the
+    lines that move are as strong on both sides of it. Places in [cycles a sample].
     """
     lines = data.strong.lines
     loud = [] if blades else [line for line in lines if line[1] >= LINE_DB]
     moving = [line for line in loud if abs(line[0]) >= data.rest_half]
-    if not moving and abs(lines[0][0]) * data.pulses <= LOBE_BINS:  # else the strongest is leaves' own
+    if not moving and abs(lines[0][0]) * data.pulses <= LOBE_BINS:  # further out, the strongest line is that of leaves
         moving = [line for line in loud if abs(line[0]) * data.pulses > LOBE_BINS]
     own, level_db = (moving or lines)[0]
     slow, slow_db = lines[0]
@@ -149,9 +155,9 @@ def _likeliest(data: Periodogram, spectrum: Spectrum, blades: bool) -> tuple[flo
 
 
 def _on_both_sides(spectrum: Spectrum, line: float, level_db: float, slow: float, rest: float) -> bool:
-    """Whether what is on the other side of rest, further from it than so much, says that a line is one of blades.
+    """Whether what lies on the other side of rest, further from it than `rest`, says that a line is one of blades.
 
-    It is about as strong, or a line as far from that at rest.
+    It does if it is about as strong as `line`, or if a line there is as far from `slow`, the line at rest.
     """
     turns = spectrum.frequency_hz / spectrum.prf_hz
     across = (np.abs(turns) > rest) & (turns * line < 0)
@@ -161,7 +167,7 @@ def _on_both_sides(spectrum: Spectrum, line: float, level_db: float, slow: float
 
 
 def _is_hovering(spectrum: Spectrum, line: float, level_db: float, rest: float) -> bool:
-    """Whether a line that is slower than so much is a body's, as no background is: off rest, and nothing about it."""
+    """Whether a line slower than `rest` is a hovering body's: unlike a background, off rest, with nothing about it."""
     turns = np.abs(spectrum.frequency_hz) / spectrum.prf_hz
     about = (turns <= rest) & (np.abs(_bins_from(spectrum, line)) > LOBE_BINS)
     pure = bool(about.any()) and float(spectrum.level_db[about].max()) < level_db - PURE_DB
@@ -169,12 +175,12 @@ def _is_hovering(spectrum: Spectrum, line: float, level_db: float, rest: float) 
 
 
 def folded(turns: float) -> float:
-    """A frequency within the unambiguous span, -0.5 to 0.5 [cycles a sample]: a comb's centre may be fitted beyond."""
+    """A frequency folded into the unambiguous span, -0.5 to 0.5 [cycles a sample]: comb centres may lie beyond."""
     return turns - round(turns)
 
 
 def _lobe(bins: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Amplitude of the window's main lobe (Kaiser and Schafer 1980)."""
+    """Amplitude of the window's main lobe, 1 at its top, at distances from it [bins] (Kaiser and Schafer 1980)."""
     root = np.sqrt(np.maximum(KAISER_BETA**2 - (np.pi * bins) ** 2, 1e-9))
     return np.asarray(np.sinh(root) / root * (KAISER_BETA / np.sinh(KAISER_BETA)))
 
@@ -187,7 +193,8 @@ def _bins_from(spectrum: Spectrum, place: float) -> NDArray[np.float64]:
 def _pulled_bins(spectrum: Spectrum, own: float) -> float:
     """How far lines beside a line may pull the top of its lobe [bins].
 
-    A share d of the amplitude at one of the two bins beside the top moves the parabola's top by d over twice its curve.
+    If one of the two bins beside the top is raised by a share d of its amplitude, the parabola's top moves by d over
+    twice the parabola's curvature.
     """
     away = np.abs(_bins_from(spectrum, own))
     near = (away >= BESIDE_BINS[0]) & (away <= BESIDE_BINS[1])
@@ -204,9 +211,10 @@ def _pulled_bins(spectrum: Spectrum, own: float) -> float:
 def _rivals_std(
     spectrum: Spectrum, own: float, rest: float, at_rest: list[float], as_likely_db: float | None = None
 ) -> float:
-    """Deviation of a line's place, where others may be the body's: so far from rest and further, or at these places.
+    """Standard deviation of the body's place about a line, as other lines may be the body's [cycles a sample].
 
-    One of the line's own level is as likely as that, or one of the level given.
+    Rivals are lines at least `rest` from velocity zero, and those at the places `at_rest`. A rival is as likely as the
+    line itself if it has the same level, or the level `as_likely_db` where that is given.
     """
     power, level_db = spectrum.relative_power, spectrum.level_db
     away = _bins_from(spectrum, own)

@@ -1,7 +1,7 @@
-"""Cadence: at what rates the power outside the notches comes and goes within the dwell.
+"""Cadence: the rates at which the power outside the notches comes and goes within the dwell.
 
-A blade's flash lasts a hundredth of its period and stands out of the noise there by a hundred times what its lines do
-on the mean, so the power over time shows rotors that the levels of the spectrum do not.
+A blade's flash lasts a hundredth of its period. During that time it stands out of the noise a hundred times as far as
+the blade's lines do on average, so the power over time shows rotors that the levels of the spectrum do not.
 """
 
 from dataclasses import dataclass
@@ -21,10 +21,10 @@ from .window import HANN, Window
 #: Range of the shared axis of rates [Hz]: from slow wings to the tenth flash of the fastest propeller.
 CADENCE_RANGE_HZ = (1.5, 6000.0)
 
-#: The window is undone where it is at least this share of its largest value: beyond, rounding would be blown up.
+#: The window is undone where it is at least this share of its largest value: elsewhere, rounding would be blown up.
 LEAST_TAPER = 0.03
 
-#: Power over its mean that counts at most: a spoilt pulse is one sample, a flash is many.
+#: The power over time is clipped at this multiple of its mean: a spoilt pulse is one sample, a flash is many.
 CLIP = 16.0
 
 #: The mean power counts as at least this share of the noise floor: less is what rounding leaves of a lone line.
@@ -38,9 +38,9 @@ class CadencePlan:
     Parameters
     ----------
     span : slice
-        Samples that are looked at: those that the window leaves enough of.
+        Samples used: those at which the window is large enough to be undone.
     per_taper : ndarray of float32, shape (samples,)
-        One over the square of the window there.
+        One over the square of the window at these samples.
     hann : ndarray of float32, shape (samples,)
         Taper of the power over time, of unit noise gain.
     spans : tuple of ndarray of int, shape (seen,) each
@@ -61,7 +61,7 @@ class CadencePlan:
 
     @cached_property
     def expected_peak(self) -> NDArray[np.float32]:
-        """Mean of the largest of so many exponentials, a bin."""
+        """Expected peak of unit-power noise in each seen bin of the axis."""
         return expected_peak(self.spans[1], HANN.noise_bandwidth_bins)
 
 
@@ -107,19 +107,19 @@ def cadence_plan(pulses: int, prf_hz: float, window: Window) -> CadencePlan:
 
 
 def power_over_time(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
-    """Power outside the notches over time, over its mean; the ends of the dwell, which the window dims, left out.
+    """Power outside the notches over time, relative to its mean, without the ends of the dwell, which the window dims.
 
     Parameters
     ----------
     spectrum : Spectrum
         Spectra, shape (..., bins).
     mask : ndarray of bool or float32, shape (..., bins)
-        From `notch_mask`, or its `weights`: body and rest would be all there is to see.
+        From `notch_mask`, or its `weights`: without notches, body and background would hide all else.
 
     Returns
     -------
     ndarray of float32, shape (..., samples)
-        Mean 1, less where hardly anything is left. Noise gives the exponential law.
+        Mean 1, or less where the notches leave hardly anything. Noise gives the exponential law.
     """
     plan = cadence_plan(spectrum.pulses, spectrum.prf_hz, spectrum.window)
     # a centred spectrum gives samples of alternating sign: their power is the same
@@ -144,8 +144,8 @@ def cadence_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     Returns
     -------
     ndarray of float32, shape (..., 2, CADENCE_BINS)
-        Mean level of the lines in each bin of the axis, and the largest over that of noise in as many [dB];
-        `UNSEEN_DB` at rates that the dwell does not tell or the PRF does not hold.
+        Mean level of the lines in each bin of the axis, and the largest level over that expected of noise in as many
+        lines [dB]; `UNSEEN_DB` at rates for which the dwell is too short or the PRF too low.
     """
     plan = cadence_plan(spectrum.pulses, spectrum.prf_hz, spectrum.window)
     power = power_over_time(spectrum, mask)

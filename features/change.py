@@ -13,10 +13,10 @@ from .spectrum import Spectrum, centred_power, per_floor
 #: Parts of a dwell, half overlapping, each a quarter of it long.
 PARTS = 7
 
-#: Levels count towards a part's centroid from here on [dB].
+#: Levels above this count towards a part's centroid, by their excess over it [dB].
 CENTROID_DB = 6.0
 
-#: Products with these give the mean of the parts, and each less that mean: half the time of sums over the parts.
+#: Products with these matrices give the mean of the parts, and each part less that mean, in half the time of sums.
 _MEAN = np.full(PARTS, 1 / PARTS, np.float32)
 _LESS_MEAN = (np.eye(PARTS) - 1 / PARTS).astype(np.float32)
 
@@ -27,7 +27,9 @@ def part_length(pulses: int) -> int:
 
 
 def frames(iq: NDArray[np.complex64], length: int, count: int) -> NDArray[np.complex64]:
-    """Evenly spaced frames of a record as a view, shape (..., count, length); the last ends within the record.
+    """Evenly spaced frames of a record, shape (..., count, length), the last of which ends with the record.
+
+    They are a view where `frame_starts` gives a hop, else a copy.
 
     Parameters
     ----------
@@ -36,7 +38,7 @@ def frames(iq: NDArray[np.complex64], length: int, count: int) -> NDArray[np.com
     length : int
         Samples a frame, at most `pulses`.
     count : int
-        Frames, at least 2. Where the record is too short for a hop of one sample, the last frame repeats.
+        Frames, at least 2. Where the record is too short for hops of one sample, frames repeat.
     """
     starts, hop = frame_starts(iq.shape[-1], length, count)
     if hop:
@@ -61,7 +63,7 @@ def frame_power(iq: NDArray[np.complex64], spectrum: Spectrum, length: int, coun
 def _frame_power(
     iq: NDArray[np.complex64], spectrum: Spectrum, length: int, count: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Power spectra of frames, shape (..., count, bins), and what brings them into units of the floor, (..., 1, 1)."""
+    """Power spectra of frames, shape (..., count, bins), and factors to units of the floor, shape (..., 1, 1)."""
     per_unit = per_floor(spectrum.transform_floor)[..., None, None]
     return centred_power(frames(scaled(iq, spectrum.scale), length, count), window=spectrum.window), per_unit
 

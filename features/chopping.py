@@ -15,28 +15,30 @@ from .window import Window
 #: Range in which a chopping frequency is sought [Hz]: a slow main rotor to a small propeller of four blades.
 CHOPPING_RANGE_HZ = (18.0, 1600.0)
 
-#: Lines nearer than this cannot be told apart behind the window [bins].
+#: Lines nearer to each other than this cannot be told apart through the window [bins].
 MIN_SPACING_BINS = 3.5
 
-#: A peak at a multiple of the period is passed over for one at the period itself if that has this share of it (unlike
-#: rotor rates blur the high orders, and with them the first peak) and is no accident of noise.
+#: The best peak may be at a multiple of the period. It gives way to a peak at a fraction of its period that has at
+#: least FUNDAMENTAL_SHARE of its height and FUNDAMENTAL_STRENGTH times the rms of noise. (Unlike rotor rates blur the
+#: high orders, and with them the first peak.)
 FUNDAMENTAL_SHARE, FUNDAMENTAL_STRENGTH = 0.4, 3.5
 
-#: A period counts for its own peak, for this share of the one at twice the period (a comb repeats, a ripple of the
-#: band's envelope does not), and the longer the more, by this power: such ripples crowd the short periods.
+#: A period's score is its own peak plus REPEAT_SHARE of the peak at twice the period (a comb repeats, a ripple of the
+#: band's envelope does not), times the period to the power LENGTH_POWER: such ripples crowd the short periods.
 REPEAT_SHARE, LENGTH_POWER = 0.5, 0.15
 
-#: Lines stand out of the spectrum by no more than this [dB], so that one strong line does not become the cepstrum.
+#: Levels are clipped this far over the floor [dB], so that one strong line does not dominate the cepstrum.
 CLIP_DB = 30.0
 
 #: Median of Rayleigh heights, as those of noise are, over their rms: sqrt(ln 2).
 MEDIAN_OVER_RMS = 0.8326
 
-_LEAST = np.float32(1e-30)  # divides in the stead of 0
+_LEAST = np.float32(1e-30)  # least divisor, in place of 0
 _BLOCK = 32
 _BEFORE = np.triu(np.ones((_BLOCK, _BLOCK), np.float32), 1)
 
-#: Blocks of one product: larger ones are shared by threads, which on a busy machine wait for one another for 30 ms.
+#: Most blocks in one product: larger products are split among threads, which on a busy machine wait for one another for
+#: 30 ms.
 _MOST_BLOCKS = 128
 
 #: A peak and those beside it; fractions of a peak's period that may be the period; multiples at which a comb repeats.
@@ -50,7 +52,7 @@ class Chopping:
     Parameters
     ----------
     frequency_hz : ndarray of float32, shape (...)
-        Chopping frequency [Hz]; NaN where the dwell holds no range to search.
+        Chopping frequency [Hz]; NaN where the dwell holds no range to search, or the record is 0.
     strength : ndarray of float32, shape (...)
         Prominence of its peak over the rms of the cepstrum of noise [1]; seldom over 4 in noise.
     repeats : ndarray of float32, shape (...)
@@ -85,8 +87,8 @@ def noise_shape(pulses: int, bins: int, window: Window) -> NDArray[np.float32]:
 def cepstrum(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     """Magnitude of the cepstrum of the notched, floored log spectrum, shape (..., bins // 2 + 1).
 
-    Index k is a period of k / PRF. Both signs of Doppler count, and a one-sided comb is one too, hence the magnitude.
-    Each period is divided by what noise gives there (`noise_shape`).
+    Index k is a period of k / PRF. The magnitude is taken because lines of both signs of Doppler count, also where the
+    comb lies on one side alone. At each period it is divided by what noise gives there (`noise_shape`).
 
     Parameters
     ----------
@@ -132,7 +134,7 @@ def prominence(heights: NDArray[np.float32]) -> NDArray[np.float32]:
     count = heights.shape[-1]
     edges, shares = surroundings(count)
     before = _sums_before(heights)
-    means = before.take(edges[1], axis=-1, mode="wrap")  # all lie within: to wrap is cheapest
+    means = before.take(edges[1], axis=-1, mode="wrap")  # no index is out of range: this mode is the fastest
     means -= before.take(edges[0], axis=-1, mode="wrap")
     means *= shares
     out = heights - np.maximum(means[..., 0, :], means[..., 1, :])
@@ -143,9 +145,10 @@ def prominence(heights: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _sums_before(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Sum of all values before each, shape (..., some more than values), the sum of all at their number.
+    """Sum of all values before each index, shape (..., more than values); the sum of all is at index `count`.
 
-    Within blocks by a product with a triangle of ones: half the time of a running sum, and no long chain of roundings.
+    Within blocks it is a product with a triangle of ones: half the time of a running sum, and no long chain of
+    roundings.
     """
     lead, count = values.shape[:-1], values.shape[-1]
     blocks = count // _BLOCK + 1
@@ -162,7 +165,7 @@ def _sums_before(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=64)
 def surroundings(count: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
-    """First and last of the periods below and above each, shape (2, 2, count), and 1 / their number, (2, count)."""
+    """Ranges below and above each period: start and stop, shape (2, 2, count), and 1 / length, shape (2, count)."""
     period = np.arange(count)
     low, high = (np.array(shares)[:, None] for shares in ((0.6, 1.15), (0.85, 1.4)))
     start = np.minimum((low * period).astype(np.intp), count - 1)
@@ -171,7 +174,7 @@ def surroundings(count: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
 
 
 def searched_periods(spectrum: Spectrum) -> tuple[int, int]:
-    """First and last period in which a chopping frequency is sought [samples]; nothing is where fewer than 5 remain."""
+    """First and last period of a chopping frequency that is sought [samples]; none is sought among fewer than 5."""
     low, high = CHOPPING_RANGE_HZ
     first = max(2, int(np.ceil(spectrum.prf_hz / high)))
     return first, int(min(spectrum.prf_hz / low, spectrum.bins / MIN_SPACING_BINS))
@@ -200,7 +203,7 @@ def cepstral_chopping(spectrum: Spectrum, mask: Mask) -> Chopping:
         return Chopping(np.full(shape, np.nan, np.float32), nothing, nothing)
     flat = prominence(heights.reshape(-1, heights.shape[-1]))
     count = flat.shape[1]
-    begin = np.arange(0, flat.size, count)  # of each record in all of them, one behind the other
+    begin = np.arange(0, flat.size, count)  # index of each record in the flattened array
     every = flat.reshape(-1)
     # a comb's own peaks do not move the median
     rms = _median(heights.reshape(flat.shape)[:, first : last + 1]) * np.float32(1 / MEDIAN_OVER_RMS)
@@ -226,10 +229,10 @@ def cepstral_chopping(spectrum: Spectrum, mask: Mask) -> Chopping:
 
 
 def _evidence(peaks: NDArray[np.float32], first: int, last: int) -> NDArray[np.float32]:
-    """What speaks for each period from `first` to `last` as that of a comb, shape (records, last - first + 1)."""
+    """Score of each period from `first` to `last` as that of a comb, shape (records, last - first + 1)."""
     out = peaks[:, first : last + 1].copy()
     stop = min(last, (peaks.shape[1] - 2) // 2)
-    if stop >= first:  # twice the period, or a sample beside it: the period is no whole number
+    if stop >= first:  # twice the period, or a sample beside it: the true period need not be a whole number
         twice = peaks[:, 2 * first - 1 : 2 * stop + 2]
         again = np.maximum(twice[:, :-2:2], twice[:, 2::2])
         np.maximum(again, twice[:, 1:-1:2], out=again)

@@ -9,26 +9,29 @@ from .fast import means, power_of
 from .lines import squared
 from .samples import energies, safe_scale, scaled
 
-#: A click: one sample so many times over the noise, and over both beside it; fewer in a record than a rotor's flashes.
-#: A flash is as long as the rotor's band is narrow: its samples beside are as strong.
+#: A click is a single sample with more than CLICK_POWER times the noise power, and more than CLICK_OVER_BESIDE times
+#: that of both samples beside it. (A flash lasts the longer the narrower the rotor's band is: the samples beside its
+#: peak are as strong.) A record has at most MOST_CLICKS, fewer than a rotor's flashes.
 CLICK_POWER, CLICK_OVER_BESIDE, MOST_CLICKS = 25.0, 4.0, 5
 
-#: Noise that swells and falls stands as high over its mean where it is loud: what lies so many pulses around tells.
+#: Pulses about a click that tell the noise there: noise that swells and falls stands as high over its mean where it is
+#: loud.
 _AROUND = np.arange(-64, 65)
 
-#: Or as many as this share of the pulses, where no distance from click to click, a pulse more or less, is that of more
-#: than so large a share of them: interference at random times.
+#: Interference at random times may have more clicks, up to CLICKED_SHARE of the pulses. Times are random if fewer than
+#: PERIOD_SHARE pairs per click are the same distance apart, a pulse more or less.
 CLICKED_SHARE, PERIOD_SHARE = 1 / 64, 0.4
 
-#: A click fills the whole span and leaves it empty; a sample cut out of a rotor's band fills what was empty beside it.
-#: Where that rises by this factor they were no clicks.
+#: If the lower quartile of the spectrum rises by this factor when clicks are cut out, they were no clicks. A click
+#: fills the whole span, which is empty without it; a sample cut out of a rotor's flash fills what was empty beside the
+#: rotor's band.
 EMPTY_RISE = 1.1
 
-#: Records as they are given are looked through from so many pulses on, a shorter one holds a rotor's one flash; and
-#: where a sample alone has so many times the mean power: of noise one in 9 million has.
+#: `clicks_filled` searches records of at least LEAST_PULSES, as a shorter one may hold a single flash of a rotor; and
+#: only if a sample has more than OVER_MEAN times the mean power, which one in 9 million samples of noise has.
 LEAST_PULSES, OVER_MEAN = 256, 16.0
 
-#: What a click hid is told by the lines of the record: bins with so many times the median power.
+#: A sample that a click hid is restored from the lines of the record: bins with more than this times the median power.
 LINE_POWER = 15.0
 
 
@@ -43,7 +46,7 @@ def clicks(samples: NDArray[np.complexfloating]) -> NDArray[np.bool_]:
     Returns
     -------
     ndarray of bool, same shape
-        False throughout where there are none, or nothing but them.
+        False throughout where there are no clicks, or nothing but clicks.
     """
     power = squared(samples)
     noise = float(_of_rank(power, 0.5)) / np.log(2)
@@ -63,7 +66,7 @@ def clicks(samples: NDArray[np.complexfloating]) -> NDArray[np.bool_]:
 
 
 def without_clicks(samples: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Samples with clicks set to 0: two of them are as far apart as the flashes of some rotor.
+    """Samples with clicks set to 0, because two clicks are as far apart as the flashes of some rotor.
 
     Parameters
     ----------
@@ -74,28 +77,28 @@ def without_clicks(samples: NDArray[np.complex128]) -> NDArray[np.complex128]:
 
 
 def clicks_filled(iq: NDArray[np.complex64], largest: NDArray[np.float32]) -> NDArray[np.complex64]:
-    """Records with what their lines tell of the pulses that clicks hid in their place.
+    """Records with each click replaced by what the record's lines come to at that pulse.
 
-    One click lifts the floor under all of the spectrum: what lies below it is no longer seen. An autoregressive law,
-    which fills in lost pulses (`dropouts`), takes thirty times as long.
+    One click lifts the floor of the whole spectrum and hides what lies below. The autoregressive law that fills in lost
+    pulses (`dropouts`) would take thirty times as long.
 
     Parameters
     ----------
     iq : ndarray of complex64, shape (records, pulses)
         Records as they were received, finite.
     largest : ndarray of float32, shape (records,)
-        Largest of all parts of a record's samples, in size.
+        Largest real or imaginary part of each record, by magnitude.
 
     Returns
     -------
     ndarray of complex64, same shape
-        Those given where there is no click.
+        The array given where there is no click.
     """
     pulses = iq.shape[-1]
     if pulses < LEAST_PULSES:
         return iq
     energy, safe = energies(iq)
-    with np.errstate(over="ignore", under="ignore"):  # of those that are not safe, which are looked through in any case
+    with np.errstate(over="ignore", under="ignore"):  # in records that are not safe, which are searched in any case
         maybe = (2 * pulses * np.square(largest) > OVER_MEAN * energy) | ~safe
     out = iq
     if not np.count_nonzero(maybe):
@@ -106,7 +109,7 @@ def clicks_filled(iq: NDArray[np.complex64], largest: NDArray[np.float32]) -> ND
     records = scaled(records, scale)
     power = power_of(records)
     loud = power > np.float32(OVER_MEAN) * means(power)[:, None]
-    row, pulse = np.divmod(np.flatnonzero(loud), pulses)  # in a tenth of the time of places along two axes
+    row, pulse = np.divmod(np.flatnonzero(loud), pulses)  # a tenth of the time of `np.nonzero` along two axes
     beside = np.maximum(power[row, pulse - 1], power[row, (pulse + 1) % pulses])
     for index in np.unique(row[power[row, pulse] > CLICK_OVER_BESIDE * beside]):
         if (found := clicks(records[index])).any():
@@ -124,13 +127,13 @@ def _hidden(record: NDArray[np.complex64], found: NDArray[np.bool_]) -> NDArray[
 
 
 def _of_rank(values: NDArray[np.floating], share: float) -> NDArray[np.floating]:
-    """The value that so large a share of others lies below: a quantile of the library takes five times as long."""
+    """The value that a share of the others lies below: NumPy's quantile takes five times as long."""
     rank = round(share * (values.shape[-1] - 1))
     return np.asarray(np.partition(values, rank, axis=-1)[..., rank])
 
 
 def _at_random(places: NDArray[np.intp], pulses: int) -> bool:
-    """True where clicks are few and no distance comes so often among them as a rotor's period would."""
+    """True where clicks are few and no distance between two recurs as often as a rotor's period would."""
     if len(places) > CLICKED_SHARE * pulses:
         return False
     apart = np.bincount(np.abs(places[:, None] - places).ravel(), minlength=3)  # each distance twice

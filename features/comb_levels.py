@@ -1,8 +1,8 @@
-"""Comb levels: how loudly lines that are a chopping frequency apart speak, for every chopping frequency at once.
+"""Comb levels: evidence of lines that are a chopping frequency apart, for every chopping frequency at once.
 
-The cepstrum takes the logarithm of each bin, so that noise without any line weighs most; here a bin counts by what it
-says of a line (`evidence`), and a spacing by its peak and the peaks at multiples of its period together. Rotors are
-told from noise at 2 to 3 dB less than by the cepstral peak alone.
+The cepstrum takes the logarithm of each bin, so that noise without any line weighs most. Here each bin counts by its
+evidence of a line (`evidence`), and each spacing by the sum of the peaks at its period and at multiples of that. Rotors
+are told from noise at 2 to 3 dB less than by the cepstral peak alone.
 """
 
 from dataclasses import dataclass
@@ -25,25 +25,26 @@ from .window import BROAD_HANN, NEIGHBOUR_SHARE
 #: Lines are looked for up to this speed [m/s]: beyond it lie the ends of few rotors' bands, and noise.
 REACH_MPS = 80.0
 
-#: Power over the floor from which on more says nothing more: the evidence is capped long before.
+#: Power over the floor is clipped at this: the evidence of a line reaches its cap at less.
 MOST_POWER = 20.0
 
-#: SNR of the weak lines that are looked for, a bin.
+#: SNR in its bin of a weak line, as is looked for.
 WEAK_SNR = 0.7
 
-#: Peaks at so many multiples of the period are summed; a sum ends after one of these, whichever speaks loudest.
+#: Peaks at the first 1, 2, 4 or 6 multiples of the period are summed; the sum that is highest over its noise counts.
 ENDS = (1, 2, 4, 6)
 
-#: What is alike over this much of the spectrum is no comb [Hz], nor over so few bins.
+#: The evidence's mean over each block of the spectrum is taken out, as it tells of no comb. A block is at least
+#: BLOCK_HZ wide [Hz], and at least BLOCK_BINS.
 BLOCK_HZ, BLOCK_BINS = 800.0, 64
 
-_HANN_BINS = (-0.25, 0.5, -0.25)  # what Hann's window holds of a line
+_HANN_BINS = (-0.25, 0.5, -0.25)  # amplitudes of a line in its bin and both beside it, through Hann's window
 _BROAD_BINS = np.convolve(_HANN_BINS, (NEIGHBOUR_SHARE, 1.0, NEIGHBOUR_SHARE))
 
-#: Noise power of a bin that both beside it are added to, over its own through Hann's window.
+#: Noise power of a bin through `BROAD_HANN`, made by adding both bins beside it, over that through Hann's window.
 NOISE_GAIN = np.float32(np.sum(_BROAD_BINS**2) / np.sum(np.square(_HANN_BINS)))
 
-#: Laguerre coefficients of the evidence that tell how alike it is in neighbouring bins.
+#: Number of Laguerre coefficients of the evidence that its covariance between neighbouring bins is computed from.
 _TERMS = 24
 
 #: Mean and standard deviation of a Rayleigh magnitude of unit mean square.
@@ -57,23 +58,23 @@ class CombPlan:
     Parameters
     ----------
     band : slice
-        Bins that are looked at.
+        Bins used.
     blocks : int
-        Blocks that these fall into.
+        Number of blocks of these bins.
     length : int
-        Length of the transform of these.
+        Length of the transform of the bins' evidence.
     per_noise : ndarray of float32, shape (length // 2 + 1,)
         One over the root mean square, in white noise, of that transform for a single bin.
     lags : ndarray of int, shape (ENDS[-1], spacings)
-        Where the multiples of each period lie in it, the period rising by halves.
+        Index in the transform of the multiples of each period; periods rise in steps of half an index.
     held : tuple of int
-        Of how many spacings, the first ones, each multiple lies within it.
+        Number of spacings, from the shortest period, of which each multiple lies within the transform.
     per_deviation : ndarray of float32, shape (len(ENDS), spacings)
-        One over the standard deviation of the sums.
+        One over the standard deviation, in noise, of the sums that end at each of `ENDS`.
     spans : tuple of ndarray of int, shape (seen,) each
         First spacing of each bin of the axis and how many it holds, in falling rate.
     seen : slice
-        Bins of the axis, in falling rate, that hold any.
+        Bins of the axis, in falling rate, that hold any spacing.
     """
 
     band: slice
@@ -101,7 +102,8 @@ def line_nats(relative_power: NDArray[np.floating]) -> NDArray[np.floating]:
 def _covariance_series() -> NDArray[np.float64]:
     """Squares of the Laguerre coefficients of `line_nats` under the exponential law, from the first order on.
 
-    Two bins of noise whose amplitudes correlate by r have evidences of covariance sum over k of these times |r|^2k.
+    If the amplitudes of two bins of noise correlate by r, the covariance of their evidences is the sum over k of the
+    k-th of these squares times |r|^2k.
     """
     power = np.linspace(0, 60, 60_001)
     weight = np.exp(-power) * (power[1] - power[0])
@@ -138,7 +140,7 @@ def comb_plan(bins: int, pulses: int, carrier_hz: float, prf_hz: float) -> CombP
     count = blocks * ((most // blocks - 1) // 2 * 2 + 1)
     first = bins // 2 - count // 2
     length = fft.next_fast_len(count, real=True)
-    # a period of so many samples lies at index samples x length / bins
+    # a period of p samples lies at index p x length / bins
     shortest = max(prf_hz / CHOPPING_RANGE_HZ[1] * length / bins, 2.0)
     longest = min(prf_hz / CHOPPING_RANGE_HZ[0] * length / bins, length / MIN_SPACING_BINS, length / 2)
     places = np.arange(np.ceil(2 * shortest), np.floor(2 * longest) + 1) / 2
@@ -157,7 +159,7 @@ def comb_plan(bins: int, pulses: int, carrier_hz: float, prf_hz: float) -> CombP
     low, high = (np.searchsorted(places, part) for part in (edges[:-1][seen], edges[1:][seen]))
     nearest = np.clip(np.rint(2 * (middle[seen] - places[0])), 0, len(places) - 1).astype(np.intp)
     starts = np.where(high > low, low, nearest)
-    high[-1] = len(places)  # the slowest bin holds what is left of half a bin
+    high[-1] = len(places)  # the slowest bin holds all periods left, up to half a bin's
     return CombPlan(
         slice(first, first + count),
         blocks,
@@ -172,7 +174,7 @@ def comb_plan(bins: int, pulses: int, carrier_hz: float, prf_hz: float) -> CombP
 
 
 def comb_levels_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
-    """How loudly the lines of each chopping frequency speak.
+    """Level over noise of the evidence of lines at each chopping frequency.
 
     Parameters
     ----------
@@ -185,7 +187,7 @@ def comb_levels_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     -------
     ndarray of float32, shape (..., 1, COMB_BINS)
         Largest sum of each bin of the axis, rising in rate, over its standard deviation in noise [dB], not below 0;
-        `UNSEEN_DB` at rates that the dwell does not tell, the PRF does not hold, or of which two lines do not fit
+        `UNSEEN_DB` at rates for which the dwell is too short or the PRF too low, or of which two lines do not fit
         within `REACH_MPS`. Multiples of a period are periods as well: a comb shows at the fractions of its chopping
         frequency too.
     """
@@ -193,16 +195,16 @@ def comb_levels_db(spectrum: Spectrum, mask: Mask) -> NDArray[np.float32]:
     plan = comb_plan(spectrum.bins, spectrum.pulses, spectrum.carrier_hz, spectrum.prf_hz)
     if plan is not None:
         heights = comb_heights(broad_power(spectrum, plan.band), weights(mask[..., plan.band]), plan)
-        # which of several below 0 is taken is no matter: none shows
+        # `as_ordered` misorders values below 0, which does not matter: all of them become 0 dB
         loudest = np.maximum.reduceat(as_ordered(_loudest_sums(heights, plan)), plan.spans[0], axis=-1)
         out[..., 0, ::-1][..., plan.seen] = to_db(loudest.view(np.float32), 0.0)
     return out
 
 
 def broad_power(spectrum: Spectrum, band: slice) -> NDArray[np.float32]:
-    """Power over the floor of spectra through Hann's window, as it is through `BROAD_HANN`.
+    """Power over the floor through `BROAD_HANN`, from spectra through Hann's window.
 
-    A window times a cosine of one turn a dwell adds to each bin of the transform the two beside it.
+    To multiply a window by a cosine of one turn a dwell is to add, to each bin of the transform, the two beside it.
 
     Parameters
     ----------
@@ -218,9 +220,9 @@ def broad_power(spectrum: Spectrum, band: slice) -> NDArray[np.float32]:
     lines = np.ascontiguousarray(spectrum.transform)
     if band.start and band.stop < spectrum.bins:
         beside = lines[..., band.start - 1 : band.stop - 1] + lines[..., band.start + 1 : band.stop + 1]
-    else:  # beyond an end lies the other
+    else:  # the spectrum is circular: beyond one end lies the other
         beside = (np.roll(lines, 1, axis=-1) + np.roll(lines, -1, axis=-1))[..., band]
-    parts = beside.view(np.float32)  # part by part, for half the price of a complex product
+    parts = beside.view(np.float32)  # real and imaginary parts one by one: half the time of a complex product
     parts *= np.float32(NEIGHBOUR_SHARE)
     beside += lines[..., band]
     power = power_of(beside)
@@ -229,7 +231,7 @@ def broad_power(spectrum: Spectrum, band: slice) -> NDArray[np.float32]:
 
 
 def comb_heights(power: NDArray[np.floating], kept: NDArray[np.floating], plan: CombPlan) -> NDArray[np.floating]:
-    """What the evidence repeats at: its transform over that of noise, less the mean of that.
+    """Magnitude of the evidence's transform in units of its rms in noise, less the mean of that in noise.
 
     Parameters
     ----------
@@ -243,8 +245,8 @@ def comb_heights(power: NDArray[np.floating], kept: NDArray[np.floating], plan: 
     Returns
     -------
     ndarray, shape (..., plan.length // 2 + 1)
-        Noise has mean 0 and deviation `HEIGHT_DEVIATION`; less at the first four periods, shorter than any on the axis
-        of rates where there are several blocks, whose means take a part of them.
+        Noise has mean 0 and standard deviation `HEIGHT_DEVIATION`. Where there are several blocks, whose means take a
+        part of the noise, both are less at the shortest periods, up to about as many indices as there are blocks.
     """
     counts = kept.reshape(*power.shape[:-1], plan.blocks, power.shape[-1] // plan.blocks)
     nats = line_nats(power).reshape(counts.shape)
@@ -260,7 +262,7 @@ def comb_heights(power: NDArray[np.floating], kept: NDArray[np.floating], plan: 
 
 
 def _loudest_sums(heights: NDArray[np.float32], plan: CombPlan) -> NDArray[np.float32]:
-    """The largest of the sums of each spacing over its deviation in noise, shape (..., spacings)."""
+    """The largest of the sums of each spacing over its standard deviation in noise, shape (..., spacings)."""
     first = plan.lags[1, 0]
     total = heights.take(plan.lags[0], axis=-1, mode="wrap")
     best = total * plan.per_deviation[0]
@@ -269,11 +271,11 @@ def _loudest_sums(heights: NDArray[np.float32], plan: CombPlan) -> NDArray[np.fl
         held = plan.held[number - 1]  # longer periods have no such multiple
         if number % 2:
             total[..., :held] += heights.take(plan.lags[number - 1, :held], axis=-1, mode="wrap")
-        else:  # of half places every second multiple falls on whole ones, evenly
+        else:  # even multiples of periods in half indices lie at whole indices, evenly spaced
             step = number // 2
             total[..., :held] += heights[..., step * first : step * (first + held) : step]
         if number in ENDS:
-            fresh = plan.held[ended]  # what has grown since the last end
+            fresh = plan.held[ended]  # spacings whose sum has grown since the last end
             level = total[..., :fresh] * plan.per_deviation[ENDS.index(number), :fresh]
             np.maximum(best[..., :fresh], level, out=best[..., :fresh])
             ended = number

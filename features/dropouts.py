@@ -1,57 +1,63 @@
-"""Whether pulses were lost: samples that are exactly 0 where hardly any is nearly 0; and what they would have held."""
+"""Lost pulses: samples that are exactly 0 where hardly any is nearly 0, and what they would have held."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .one_thread import one_thread
 
-#: Samples no further from 0 than so many steps of the converter are nearly 0, and zeros are lost pulses where they are
-#: more than this share of these. Samples without steps differ by next to nothing, and next to none is nearly 0.
+#: NEAR_STEPS: samples other than 0, no further from it than this many steps of the converter, are nearly 0. NEAR_SHARE:
+#: zeros, unless regular, are lost pulses only if there are more of them than this share of the samples nearly 0.
+#: (Samples without steps differ by next to nothing, so that next to none is nearly 0.)
 NEAR_STEPS, NEAR_SHARE = 2.1, 0.5
 
-#: They are so many, and not chance, likelier than this: of two channels 25 places lie so near, each about as likely as
-#: 0, of one channel 5, so that it takes six of one. Samples that are hardly ever alike, of so many and more, have no
-#: such places: one 0 among them is a lost pulse, but for one at an end, where a window or a beginning may be 0.
+#: Zeros are lost pulses only if there are at least LEAST_LOST, and if the probability of as many by chance is less than
+#: CHANCE. Samples of two channels have PLACES values this near to 0, itself included, all about as likely; those of one
+#: channel have PLACES_OF_ONE, which takes six zeros. If less than the share ALIKE of samples have the size of another,
+#: there are no steps and zeros are no chance: among ENOUGH such samples and more a single zero is a lost pulse, but for
+#: one at an end, where a window or a beginning may be 0.
 LEAST_LOST, CHANCE, PLACES, PLACES_OF_ONE, ALIKE, ENOUGH = 3, 1e-4, 25, 5, 0.01, 100
 
-#: More zeros in a row are silence, too long to be filled in: it would break every line.
+#: More zeros in a row than this are silence, too long to be filled in: it breaks every line.
 MOST_IN_A_ROW = 32
 
-#: A pulse is told from so many before and after it at most, by laws fitted to so many at a time and those beside them,
-#: each to as many stretches without a lost one as this for every pulse it tells from. With a law of fewer than two
-#: nothing is filled in.
+#: A lost pulse is told from at most MOST_ORDERS pulses before and after it, by an autoregressive law. Each law is
+#: fitted to a block of at least BLOCK pulses (or all there are) and some beside it. The law's order is halved until
+#: there are STRETCHES times as many stretches without a lost pulse; at an order below two nothing is filled in.
 MOST_ORDERS, BLOCK, STRETCHES = 32, 8192, 6
 
-#: Share of the mean power that holds a law's coefficients back: next to nothing beside any noise.
+#: Ridge on the diagonals of the equations for a law and for the lost pulses, as a share of these diagonals: next to
+#: nothing beside any noise.
 RIDGE = 1e-10
 
-#: What is whole of a record that lost so many pulses that no law tells of them, and why nothing is told of it.
+#: NOTHING: stretch that is whole of a record that lost too many pulses to be filled in. BEYOND_FILLING_IN: the reason
+#: why nothing is measured of such a record.
 NOTHING = slice(0, 0)
 BEYOND_FILLING_IN = "lost pulses: so many are exactly 0 that they cannot be filled in"
 
-#: Of what is unexplained in pulses that are filled in, the same for all records of so many pulses.
+#: Seed of the noise in pulses that are filled in, which is the same for all records with the same number of pulses.
 _SEED = 22
 
-#: Two truths beside each other, as one number.
+#: Two values True beside each other, as one number.
 _TWO_TRUE = np.array([True, True]).view(np.uint16)
 
-#: Fewer sizes that differ are a converter's that hardly steps at all: it may give 0 most of the time.
+#: If samples have fewer different sizes than this, the converter hardly steps at all: it may give 0 most of the time.
 LEAST_DISTINCT = 8
 
-#: Of so few samples that are not 0 nothing is told whose zeros the others are: a silence, rather than a converter's.
+#: Fewer samples other than 0 than this do not tell whether a converter gave the zeros: long runs of them are silence.
 LEAST_HELD = 64
 
-#: A converter's steps that were turned in phase, or whose channels were set right, show about 0 alone: several of the
-#: smallest samples have one size, to so much of it, and that is no more than so many times their distance from any
-#: other, or the next size is larger by so much. As many places as about steps not turned lie within so many of it.
+#: If samples were turned in phase, or their channels corrected, the converter's steps show only near 0. They show if
+#: two or more samples have the smallest size, to the share SAME_SIZE of it, and that size is no more than AS_NEAR times
+#: the distance to any other sample, or the next size is larger by the factor NEXT_SIZE. That size is then the step.
+#: Within NEAR_TURNED steps lie as many values as lie near 0 if steps were not turned.
 SAME_SIZE, AS_NEAR, NEXT_SIZE, NEAR_TURNED = 1e-6, 1.5, 1.2, 2.9
 
 
 def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     """Find the pulses that hold nothing at all, not even noise.
 
-    Each spoils every line of the spectrum as an impulse would; a few of them, of whatever spacing, look like a rotor's
-    flashes.
+    Each lost pulse spoils every line of the spectrum as an impulse would. A few of them, at whatever spacing, look like
+    a rotor's flashes.
 
     Parameters
     ----------
@@ -61,8 +67,8 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
     Returns
     -------
     ndarray of bool, same shape
-        False everywhere where nothing speaks of lost ones: no zeros, no more than a converter of coarse steps gives of
-        noise, or nothing else. Zeros of longer silences are no lost pulses.
+        False everywhere if there are no zeros, no more than a converter of coarse steps gives of noise, or nothing but
+        zeros. Zeros of silences, longer than `MOST_IN_A_ROW`, are no lost pulses.
     """
     zero = _zeros(iq)
     if not zero.any():
@@ -72,9 +78,9 @@ def lost_pulses(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
 
 
 def _regular(zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Zeros as far apart as most are, from end to end: no chance, among those of a converter of coarse steps too.
+    """Zeros at their most frequent distance from end to end: no chance, even for a converter of coarse steps.
 
-    A rotor's flashes come so, and what is lost so passes for them.
+    A rotor's flashes are as regular, and pulses lost in this way pass for them.
     """
     places, none = np.flatnonzero(zero), np.zeros(len(zero), bool)
     period = int(np.bincount(np.diff(places), minlength=2).argmax())
@@ -91,7 +97,7 @@ def _regular(zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _among_steps(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Zeros that are more than the steps of a converter give."""
+    """Zeros that are lost pulses because there are more than the steps of a converter give; else none."""
     none = np.zeros(len(iq), bool)
     size = _sizes(iq)
     held, steps = _sorted_steps(size[~zero])
@@ -99,7 +105,7 @@ def _among_steps(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> NDArray[
         return none
     nearly = np.float32(NEAR_STEPS) * np.median(steps)
     near = int(np.searchsorted(held, nearly, side="right"))
-    if np.count_nonzero(zero) <= NEAR_SHARE * near:  # what most converters of coarse steps give ends here
+    if np.count_nonzero(zero) <= NEAR_SHARE * near:  # most records of converters of coarse steps end here
         return none
     step = _turned_step(iq, zero)
     if step:
@@ -109,7 +115,7 @@ def _among_steps(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> NDArray[
     zeros = int(lost.sum())
     if zeros <= NEAR_SHARE * near:
         return none
-    # a lost pulse stands among others; zeros of what hardly reaches the converter's first step stand among such
+    # a lost pulse stands among larger samples; zeros of what hardly reaches the first step stand among small ones
     beside = ~zero & (np.convolve(lost, [1, 0, 1], "same") > 0)
     if np.median(size[beside]) <= nearly:
         return none
@@ -123,16 +129,16 @@ def _among_steps(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> NDArray[
 
 
 def _sorted_steps(size: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Sizes of samples that are not 0, rising, and what lies between those that differ."""
+    """Sizes of samples that are not 0, rising, and the differences between neighbours that differ."""
     held = np.sort(size)
     steps = np.diff(held)
     return held, steps[steps > 0]
 
 
 def _hardly_steps(held: NDArray[np.float32], steps: NDArray[np.float32]) -> bool:
-    """Whether samples that are not 0 have hardly another size, and 0 is as near to them as they are to one another.
+    """Whether samples that are not 0 have only a few sizes, and 0 is as near to them as they are to one another.
 
-    A converter's noise about another value than 0 has few sizes as well, but is never 0.
+    A converter's noise about another value than 0 has few sizes as well, but 0 is far from these.
 
     Parameters
     ----------
@@ -146,7 +152,7 @@ def _hardly_steps(held: NDArray[np.float32], steps: NDArray[np.float32]) -> bool
 
 
 def _turned_step(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> float:
-    """A converter's step where it shows about 0 alone, whichever way its steps were turned; 0 where it does not."""
+    """A converter's step where steps show only near 0, however they were turned in phase; 0 where none shows."""
     held = iq[~zero]
     sizes = np.abs(held)
     smallest = sizes.min()
@@ -161,7 +167,7 @@ def _turned_step(iq: NDArray[np.complex64], zero: NDArray[np.bool_]) -> float:
 
 
 def mended(iq: NDArray[np.complex64]) -> tuple[NDArray[np.complex64], dict[tuple[int, ...], slice]]:
-    """Records with the pulses that each has lost filled in, and of those that a silence still breaks what is whole.
+    """Records with lost pulses filled in, and the longest whole stretch of those that a silence still breaks.
 
     Parameters
     ----------
@@ -171,9 +177,10 @@ def mended(iq: NDArray[np.complex64]) -> tuple[NDArray[np.complex64], dict[tuple
     Returns
     -------
     records : ndarray of complex64, same shape
-        Those that are there are returned as they are.
+        Pulses that were not lost are returned as they are.
     stretches : dict of tuple of int to slice
-        Of each broken record, by its index, the longest stretch that is not (see `unbroken`), or `NOTHING`.
+        Of each broken record, by its index, the longest whole stretch (see `unbroken`), or `NOTHING` where lost pulses
+        could not be filled in.
     """
     zeros, out = _zeros(iq), iq
     stretches: dict[tuple[int, ...], slice] = {}
@@ -191,31 +198,31 @@ def mended(iq: NDArray[np.complex64]) -> tuple[NDArray[np.complex64], dict[tuple
 
 
 def _chance(zeros: int, near: int, share: float) -> float:
-    """How likely so many zeros are, and more, among those and those nearly 0, if each is one by this chance."""
-    from scipy.special import bdtrc  # here, because dwells are judged without
+    """Probability of `zeros` or more zeros among `zeros + near` samples, each 0 with probability `share`."""
+    from scipy.special import bdtrc  # here, because most dwells are judged without it
 
     return float(bdtrc(zeros - 1, zeros + near, share))
 
 
 def _sizes(iq: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """The larger part of each sample, in whose steps a converter counts."""
+    """The larger of |I| and |Q| of each sample, which rises in steps of the converter."""
     return np.asarray(np.maximum(np.abs(iq.real), np.abs(iq.imag)))
 
 
 def _zeros(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
-    """Where samples are exactly 0: of both parts at once, in a sixth of the time of a complex comparison."""
+    """True where samples are exactly 0: I and Q at once, in a sixth of the time of a complex comparison."""
     both = np.ascontiguousarray(iq).view(np.float32) == 0
     return np.asarray(both.view(np.uint16) == _TWO_TRUE, np.bool_)
 
 
 def _runs(zero: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Where each run of zeros begins, and its pulses, of a record's."""
+    """Start and length of each run of zeros in a record [pulses]."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], zero, [False]])))
     return edges[::2], np.diff(edges)[::2]
 
 
 def _in_short_runs(zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Zeros that are not so many in a row as silence is, of a record's."""
+    """True at the zeros of a record that are too few in a row to be silence."""
     _, lengths = _runs(zero)
     out = zero.copy()
     out[zero] = np.repeat(lengths, lengths) <= MOST_IN_A_ROW
@@ -223,14 +230,14 @@ def _in_short_runs(zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _silences(iq: NDArray[np.complex64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Where each run of zeros begins that is too long to be filled in, and its pulses; none of what is 0 throughout."""
+    """Start and length of each run of zeros too long to be filled in [pulses]; none if the record is 0 throughout."""
     zero = _zeros(iq)
     starts, lengths = _runs(zero)
     long = lengths > MOST_IN_A_ROW
     if lengths.max(initial=0) == len(iq):
         long[:] = False
     elif long.any() and len(iq) - lengths.sum() >= LEAST_HELD and _hardly_steps(*_sorted_steps(_sizes(iq)[~zero])):
-        # what hardly steps is often 0: so long in a row by chance, by how often it is elsewhere?
+        # a converter that hardly steps is often 0: does the share of zeros elsewhere give so long a run by chance?
         others = len(iq) - int(lengths[long].sum())
         share = int(lengths[~long].sum()) / others
         if others < LEAST_DISTINCT or others * share**MOST_IN_A_ROW > CHANCE:
@@ -239,7 +246,7 @@ def _silences(iq: NDArray[np.complex64]) -> tuple[NDArray[np.intp], NDArray[np.i
 
 
 def silent(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
-    """Where samples of one record are of a run of zeros that is too long to be filled in, shape (pulses,)."""
+    """True where samples of one record lie in a run of zeros too long to be filled in, shape (pulses,)."""
     out = np.zeros(len(iq), bool)
     starts, lengths = _silences(iq)
     for start, length in zip(starts, lengths, strict=True):
@@ -248,7 +255,7 @@ def silent(iq: NDArray[np.complex64]) -> NDArray[np.bool_]:
 
 
 def longest_silence(iq: NDArray[np.complex64]) -> tuple[int, int]:
-    """Where the longest run of zeros begins that is too long to be filled in, and its pulses; 0 where there is none."""
+    """Start and length of the longest run of zeros too long to be filled in [pulses]; 0 and 0 where there is none."""
     starts, lengths = _silences(iq)
     if not len(lengths):
         return 0, 0
@@ -257,9 +264,9 @@ def longest_silence(iq: NDArray[np.complex64]) -> tuple[int, int]:
 
 
 def unbroken(iq: NDArray[np.complex64]) -> slice:
-    """The longest stretch of a record that no silence breaks which is too long to be filled in.
+    """The longest stretch of a record without a silence too long to be filled in.
 
-    What begins or ends within a record widens all of its lines, and regular silences draw a comb beside each.
+    A signal that begins or ends within a record widens all of its lines, and regular silences draw a comb beside each.
 
     Parameters
     ----------
@@ -269,7 +276,7 @@ def unbroken(iq: NDArray[np.complex64]) -> slice:
     Returns
     -------
     slice
-        All of it where there is no such silence, or nothing else.
+        The whole record where there is no such silence, or nothing but silence.
     """
     starts, lengths = _silences(iq)
     begin, end = np.append(0, starts + lengths), np.append(starts, len(iq))
@@ -280,10 +287,10 @@ def unbroken(iq: NDArray[np.complex64]) -> slice:
 def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.complex64]:
     """Fill in lost pulses from those before and after them.
 
-    By the law by which each pulse of a block follows from those beside it (an autoregressive one, fitted forwards and
-    backwards), those that are missing are what leaves the least of it unexplained, exact for a few lines, and beside
-    that as much of it as is unexplained elsewhere: without it noise would come and go as pulses are lost. Nor is I or Q
-    beyond what it is elsewhere (`keep_within`): a converter that clipped does so there too, and a channel that is the
+    To each block an autoregressive law is fitted, forwards and backwards: each pulse follows from those beside it. The
+    lost pulses are those that leave the least residual of this law, which is exact for a few lines. Noise is added, as
+    strong as the residual elsewhere tells: without it noise would come and go as pulses are lost. I and Q are held
+    within their range elsewhere (`keep_within`): a converter that clipped does so there too, and a channel that is the
     same in every pulse stays so.
 
     Parameters
@@ -296,7 +303,7 @@ def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.com
     Returns
     -------
     ndarray of complex64, same shape
-        Where too many are lost for any law, as they were.
+        Where too many pulses are lost for any law, they stay as they were.
 
     References
     ----------
@@ -316,14 +323,14 @@ def filled(iq: NDArray[np.complex64], lost: NDArray[np.bool_]) -> NDArray[np.com
 
 
 def keep_within(iq: NDArray[np.complex64], filled_in: NDArray[np.bool_]) -> None:
-    """Hold what was filled in, in place, to what I and Q are elsewhere; one channel stays that, to the bit.
+    """Hold samples that were filled in, in place, to the range of I and Q elsewhere; one channel stays one, to the bit.
 
     Parameters
     ----------
     iq
         Samples of one record, shape (pulses,), finite.
     filled_in
-        Which of them, same shape; not all.
+        True where a sample was filled in, same shape; not everywhere.
     """
     for part in (iq.real, iq.imag):
         given = part[~filled_in]
@@ -336,8 +343,8 @@ def keep_within(iq: NDArray[np.complex64], filled_in: NDArray[np.bool_]) -> None
 def _filled_block(
     iq: NDArray[np.complex128], lost: NDArray[np.bool_], noise: np.random.Generator
 ) -> NDArray[np.complex128]:
-    """`filled` of a block that one law holds for."""
-    from scipy.linalg import solveh_banded  # here, because whole recordings need no such import
+    """`filled` of a block, with one law."""
+    from scipy.linalg import solveh_banded  # here, because recordings without lost pulses need no such import
 
     orders = min(MOST_ORDERS, len(iq) // 2)
     while orders > 1:
@@ -348,13 +355,13 @@ def _filled_block(
     else:
         return iq
     stretches = np.lib.stride_tricks.sliding_window_view(iq, orders + 1)[clear]
-    # the last pulse of each from those before it, and the first, conjugated, from those after it
+    # the law tells the last pulse of a stretch from those before it, and the first, conjugated, from those after it
     both = np.concatenate([stretches[:, ::-1], stretches.conj()])
     products = both.conj().T @ both
     products.flat[:: orders + 2] += RIDGE * products.trace().real / (orders + 1)
     law = np.concatenate([[1.0], -np.linalg.solve(products[1:, 1:], products[1:, 0])])
-    # what the law leaves unexplained of all pulses that have as many before them, or after them, squared and summed: of
-    # pulses so far apart their products, but for the ends, where one of both counts
+    # the residuals of all pulses that have `orders` pulses before or after them, squared and summed: `apart` holds the
+    # weights of products of pulses by their distance; at the ends of the block only one of both directions counts
     apart = np.correlate(law, law, "full")[orders:]
     places, steps = np.flatnonzero(lost), np.arange(orders)
     known = np.where(lost, 0, iq)
@@ -367,7 +374,7 @@ def _filled_block(
     ends = [(0, first), (len(iq) - orders, last)]
     for start, excess in ends:
         pull[start + steps] -= excess @ known[start + steps]
-    # of pulses further apart than the law reaches none, and the lower triangle by its diagonals
+    # the lower triangle of the equations, by its diagonals; pulses further apart than the law reaches have no products
     inner = np.zeros((min(orders + 1, len(places)), len(places)), np.complex128)
     for below, diagonal in enumerate(inner):
         step = places[below:] - places[: len(places) - below]
@@ -379,10 +386,10 @@ def _filled_block(
             both_there = np.flatnonzero((other >= start) & (one < start + orders))
             bands[below, both_there] -= excess[one[both_there] - start, other[both_there] - start]
     for each in (inner, bands):
-        each[0] *= 1 + RIDGE  # or rounding might undo what holds them
+        each[0] *= 1 + RIDGE  # or with rounding the equations might not be positive definite
     out = iq.copy()
     out[places] = -solveh_banded(bands, pull[places], lower=True)
-    # what is unexplained of those that are missing, given all others; at the ends as if there were others beyond
+    # noise of the lost pulses by the law's residual, given all other pulses; at the ends as if there were others beyond
     white = noise.standard_normal((2, len(places)))
     white = white[0] + 1j * white[1] if iq.real.any() and iq.imag.any() else np.sqrt(2) * white[0]
     out[places] += np.sqrt(np.mean(np.abs(both @ law) ** 2) / 2) * _of_precision(inner, white)
@@ -390,8 +397,8 @@ def _filled_block(
 
 
 def _of_precision(bands: NDArray[np.complex128], white: NDArray[np.inexact]) -> NDArray[np.complex128]:
-    """White noise made noise whose covariance is the inverse of a matrix, given by its lower diagonals."""
-    from scipy.linalg import cholesky_banded, solve_banded  # here, as above
+    """White noise made noise whose covariance is the inverse of a matrix, which is given by its lower diagonals."""
+    from scipy.linalg import cholesky_banded, solve_banded  # here, for the same reason as above
 
     root = cholesky_banded(bands, lower=True)
     upper = np.zeros_like(root)  # its conjugate transpose, by its diagonals from the uppermost down

@@ -1,7 +1,7 @@
-"""An empty side of the spectrum, filled with noise: one channel made analytic tells nothing of it.
+"""An empty side of the spectrum, filled with noise: one channel made analytic holds nothing there.
 
-No radar of two channels ever sees such a side, and models know their records far better. With noise there the record is
-one of theirs, whose lines lie on one side (what that brings: docs/ablation.md).
+No radar of two channels ever sees an empty side, and models know the records of such radars far better. With noise
+there, the record is like one of two channels whose lines lie on one side (what that brings: docs/ablation.md).
 """
 
 from functools import lru_cache
@@ -13,10 +13,10 @@ from scipy import fft
 from .fast import LOWEST_DB
 from .spectrum import Spectrum
 
-#: A side whose floor lies so far below the other's has no level that is followed.
+#: A side whose floor is below this share of the other's is empty: levels are not followed below `LOWEST_DB`.
 EMPTY_SHARE = np.float32(10 ** (LOWEST_DB / 10))
 
-#: Of the noise, which is the same for all records of so many pulses.
+#: Seed of the noise, which is the same for all records with the same number of pulses.
 _SEED = 20
 
 _NONE = np.empty(0, np.intp)
@@ -24,7 +24,7 @@ _NONE = np.empty(0, np.intp)
 
 @lru_cache(maxsize=32)
 def noise_transform(pulses: int, seed: int) -> NDArray[np.complex128]:
-    """The transform of white noise of unit power a sample, the same for all records of so many pulses, read-only."""
+    """The transform of white noise of unit power a sample, the same for all records of `pulses`, read-only."""
     out = np.random.default_rng((seed, pulses)).standard_normal((pulses, 2)).view(np.complex128)[:, 0]
     out *= np.sqrt(pulses / 2)
     out.flags.writeable = False
@@ -35,7 +35,7 @@ def noise_transform(pulses: int, seed: int) -> NDArray[np.complex128]:
 def side_noise(pulses: int) -> NDArray[np.complex64]:
     """Noise on the lower and on the upper side of the spectrum, mirror images, shape (2, pulses).
 
-    As dense there as white noise of unit power a sample.
+    Its power density there is that of white noise of unit power a sample.
     """
     transform = np.where(fft.fftfreq(pulses) > 0, noise_transform(pulses, _SEED), 0)
     upper = fft.ifft(transform).astype(np.complex64)
@@ -51,9 +51,9 @@ def empty_sides(spectrum: Spectrum) -> NDArray[np.bool_]:
 
 
 def filled_sides(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray[np.intp], NDArray[np.complex64]]:
-    """Records with an empty side, and these with noise there as strong as the other side's.
+    """Records with an empty side, filled there with noise as strong as the other side's.
 
-    Where both sides hold nothing but lines without any noise, as only a calculation gives them, none is empty.
+    Where the spectrum holds nothing but lines without any noise, as only a calculation gives, no side counts as empty.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def filled_sides(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray
     rows : ndarray of int, shape (filled,)
         Which of the records.
     samples : ndarray of complex64, shape (filled, pulses)
-        Theirs.
+        The samples of these with the noise.
     """
     empty = empty_sides(spectrum)
     if not np.count_nonzero(empty):  # as most are
@@ -79,6 +79,6 @@ def filled_sides(iq: NDArray[np.complex64], spectrum: Spectrum) -> tuple[NDArray
     # float64, because the square of a sample may leave float32
     amplitude = np.sqrt(spectrum.floor[rows])[:, None]
     most = np.finfo(np.float32).max
-    # of noise one side is empty at most: no product of matrices, for which a busy machine's threads wait
+    # at most one side is empty where there is noise: no matrix product is needed, whose threads wait on a busy machine
     filled = iq[rows] + amplitude * side_noise(spectrum.pulses)[empty[rows, 1].astype(np.intp)]
     return rows, filled.view(np.float64).clip(-most, most).astype(np.float32).view(np.complex64)

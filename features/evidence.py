@@ -1,4 +1,4 @@
-"""What speaks for a line in each bin of a periodogram."""
+"""Evidence of a line in each bin of a periodogram."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,24 +8,25 @@ from numpy.typing import NDArray
 
 from .fast import at_most
 
-#: Line powers over noise that a comb may have, and the share of its lines that may be missing.
+#: LINE_SNRS: SNRs that a comb's lines may have. MISSING_SHARE: share of its lines that may be missing.
 LINE_SNRS = (1.2, 6.0, 40.0)
 MISSING_SHARE = 0.15
 
-#: No single line speaks for more than this [nats]: a lone line is no comb.
+#: Largest evidence of a single line [nats]: a lone line is no comb.
 LINE_CAP = 5.0
 
-#: A line weaker than its neighbourhood by this factor in power is a leak or an imbalance, not a line of the comb.
+#: A line below this share of the strongest power in its neighbourhood is a leak or comes of an imbalance of the blades:
+#: it is not a line of the comb.
 NEIGHBOUR_SHARE = 0.03
 
 
-#: Line SNRs that are looked up side by side, at most: they are taken from the table as one complex number.
+#: Most line SNRs that can be looked up together: they are taken from the table as one complex number.
 MOST_SNRS = 4
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What speaks for a line in every bin.
+    """Evidence of a line in every bin.
 
     Parameters
     ----------
@@ -46,8 +47,8 @@ class Evidence:
 def line_evidence(power: NDArray[np.floating], block: int) -> NDArray[np.float32]:
     """Log likelihood ratio of a line against noise in every bin [nats], shape (len(LINE_SNRS), bins).
 
-    Line and noise are complex Gaussian of the variances 1 + snr and 1, or the line is missing. Lines far below the
-    strongest of their neighbourhood are leaks or an imbalance of the blades and count less.
+    A bin is complex Gaussian, of variance 1 + snr with a line and 1 without; a line may be missing. Lines far below the
+    strongest of their neighbourhood are leaks or come of an imbalance of the blades, and count less.
 
     Parameters
     ----------
@@ -66,12 +67,12 @@ def line_evidence(power: NDArray[np.floating], block: int) -> NDArray[np.float32
 
 
 def line_log_ratio(power: NDArray[np.floating], snr: float | NDArray[np.floating]) -> NDArray[np.floating]:
-    """Log likelihood ratio of a line of an SNR, which may be missing, against noise, at most `LINE_CAP` [nats].
+    """Log likelihood ratio of a line, which may be missing, against noise alone, at most `LINE_CAP` [nats].
 
     Parameters
     ----------
     power : ndarray
-        Power over noise, of a size whose exponential its type holds.
+        Power over noise, small enough that its exponential does not overflow its type.
     snr : float or ndarray
         SNR of the line in a bin, broadcast against `power`.
     """

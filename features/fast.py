@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 #: Levels are not followed below this [dB re noise floor]: an empty side of the spectrum has no level.
 LOWEST_DB = -20.0
 
-# Arrays without axes: to NumPy a number is one more thing to convert at every call.
+# Arrays without axes: a plain number would be converted by NumPy at every call.
 _DB_A_NEPER = np.array(10 / math.log(10), np.float32)  # of power
 _NO_LIMIT = np.array(np.inf, np.float32)
 
@@ -19,7 +19,7 @@ def to_db(
 ) -> NDArray[np.float32]:
     """10 log10 of a power ratio [dB], held at `lowest_db` from below."""
     out = at_least(relative_power, 10 ** (lowest_db / 10), out=out)
-    np.log(out, out=out)  # a decadic one takes 3.7 times as long in float32 where there is no AVX-512
+    np.log(out, out=out)  # log10 takes 3.7 times as long in float32 where there is no AVX-512
     return np.multiply(out, _DB_A_NEPER, out=out)
 
 
@@ -35,7 +35,7 @@ def at_most(values: NDArray[np.floating], high: float, out: NDArray[np.floating]
 
 @lru_cache(maxsize=64)
 def ones(count: int) -> NDArray[np.float32]:
-    """So many ones, not to be written to."""
+    """An array of `count` ones, not to be written to."""
     out = np.ones(count, np.float32)
     out.flags.writeable = False
     return out
@@ -52,12 +52,12 @@ def means(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def as_ordered(values: NDArray[np.float32]) -> NDArray[np.int32]:
-    """The same memory as whole numbers, in which what is not negative has the same order: maxima take half the time."""
+    """The same memory viewed as integers, which order values >= 0 in the same way: maxima take half the time."""
     return values.view(np.int32)
 
 
 def windows(values: NDArray, shape: tuple[int, ...], steps: tuple[int, ...], first: int = 0) -> NDArray:
-    """The last axis from an element on seen as axes of so many elements and steps, shape (..., *shape), to be read."""
+    """View of the last axis, from element `first` on, as axes of this shape and these steps; not to be written to."""
     values = np.ascontiguousarray(values)
     if not values.size:  # no element to begin at
         return np.empty((*values.shape[:-1], *shape), values.dtype)

@@ -17,24 +17,27 @@ from .samples import finite_complex, require_radar, scaled, unit_scale
 from .spectrum import SPEED_OF_LIGHT_MPS, doppler_spectrum
 from .window import KAISER
 
-#: Dwells by which the body is followed [s], each over the next two: of dwells side by side a heave of their rate would
-#: make one slow slope.
+#: BODY_DWELL_S: dwells by which the body is followed [s]. OVERLAP: dwells that hold each moment. (In dwells side by
+#: side a heave at their rate would be aliased to a slow slope.)
 BODY_DWELL_S, OVERLAP = 0.1, 3
 
-#: Fewest pulses of such a dwell: a radar slower than that sees no body.
+#: Least number of pulses of such a dwell: at a PRF with fewer no body is seen.
 LEAST_PULSES = 16
 
-#: The course is a line through so many dwells at most, spread over all: slopes between all pairs are that many squared.
+#: The course's slope is told from at most this many dwells, spread over all: the number of slopes between all pairs
+#: grows with the square of theirs.
 MOST_DWELLS = 400
 
-#: What is left of dwells counts up to so many spreads. And the medians of slopes are off by so many times what a line
-#: of least squares is in white noise, whose errors in dwells that overlap take one another away.
+#: CLIPPED: residuals of dwells are clipped at this many standard deviations. ROBUST_LOSS: standard deviation of the
+#: median of slopes over that of a least-squares line in white noise, in which errors of overlapping dwells cancel.
 CLIPPED, ROBUST_LOSS = 3.0, 2.0
 
-#: What stands at rest in this sense is taken for the background [m/s, m/s^2], and taken out so far about velocity zero.
+#: A line slower than REST_MPS [m/s], with an acceleration below REST_MPS2 [m/s^2], is taken for the background: all
+#: slower than REST_NOTCH_MPS is then taken out [m/s].
 REST_MPS, REST_MPS2, REST_NOTCH_MPS = 0.4, 0.15, 0.5
 
-#: Velocity in the middle [m/s], acceleration and its deviation [m/s^2]; NaN where no line stands out.
+#: Velocity in the middle of the recording [m/s], acceleration and its standard deviation [m/s^2]; NaN where no line
+#: stands out.
 Course = tuple[float, float, float]
 
 
@@ -44,9 +47,9 @@ def by_recording(
     carrier_hz: float,
     prf_hz: float,
 ) -> list[NDArray]:
-    """What is found in each recording of a batch (..., pulses), one after the other, on one thread: an array a field.
+    """Results of `one` for each recording of a batch (..., pulses), in turn, on one thread: an array a field.
 
-    Pulses that were lost are filled in; one that lost too many for that is taken for silence.
+    Lost pulses are filled in; a recording that lost too many for that is taken for silence.
 
     Raises
     ------
@@ -64,7 +67,7 @@ def by_recording(
 
 
 def normed(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
-    """Samples, not all zero, over the size of the largest: at the ends of float32 that size itself is none."""
+    """Samples, not all zero, over the size of the largest; scaled before, as float32 may not hold that size."""
     unit = scaled(iq, unit_scale(iq))
     return np.asarray(unit / np.abs(unit).max(), np.complex64)
 
@@ -82,7 +85,8 @@ def followed(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> tup
     Returns
     -------
     samples : ndarray of complex64, shape (pulses,)
-        As given, or with what is slower than `REST_NOTCH_MPS` taken out, where that was the strongest line.
+        As given; or, where the strongest line was a background's and another is left without it, with all that is
+        slower than `REST_NOTCH_MPS` taken out.
     course : Course
     """
     body = _track(iq, carrier_hz, prf_hz)
@@ -104,7 +108,7 @@ def standing(iq: NDArray[np.complex64], course: Course, carrier_hz: float, prf_h
 
 
 def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> Course:
-    """Velocity in the middle, acceleration and its deviation, from a line through the velocities of the dwells."""
+    """Course of the body: a line through the velocities of the dwells."""
     length = round(BODY_DWELL_S * prf_hz)
     if length < LEAST_PULSES:
         return np.nan, np.nan, np.nan
@@ -120,7 +124,7 @@ def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> Cours
     velocity = np.unwrap(velocity, period=ambiguous)
     count = len(starts)
     when = (starts + (length - len(iq)) / 2) / prf_hz
-    # a dwell whose strongest line is a wing's must not turn the line: medians of slopes (Theil and Sen)
+    # a dwell whose strongest line is a wing's must not tilt the course: medians of slopes (Theil and Sen)
     some = np.unique(np.linspace(0, count - 1, min(count, MOST_DWELLS)).astype(np.intp))
     first, second = some[np.stack(np.triu_indices(len(some), 1))]
     slope = float(np.median((velocity[second] - velocity[first]) / (when[second] - when[first])))
@@ -130,22 +134,22 @@ def _track(iq: NDArray[np.complex64], carrier_hz: float, prf_hz: float) -> Cours
 
 
 def _slope_std(rest: NDArray[np.floating], when: NDArray[np.floating], length: int, hop: int) -> float:
-    """Deviation of the slope of a line through the velocities of dwells that overlap.
+    """Standard deviation of the slope of a line through the velocities of dwells that overlap.
 
     Parameters
     ----------
     rest : ndarray, shape (dwells,)
-        What the line leaves of each velocity [m/s].
+        Residual of each velocity about the line [m/s].
     when : ndarray, shape (dwells,)
-        Their middles [s].
+        Middles of the dwells [s].
     length, hop : int
-        Of a dwell, and from one to the next [pulses].
+        Length of a dwell, and hop from one to the next [pulses].
 
     Returns
     -------
     float
-        From how what is left goes together over a quarter of the recording (Newey and West 1987), and no less than
-        white noise of that spread would leave of the medians of slopes [m/s^2].
+        From the autocovariance of the residuals over lags of up to a quarter of the recording (Newey and West 1987),
+        and no less than that of the median of slopes in white noise of the same spread [m/s^2].
     """
     count = len(rest)
     spread = 1.4826 * float(np.median(np.abs(rest)))
@@ -156,7 +160,8 @@ def _slope_std(rest: NDArray[np.floating], when: NDArray[np.floating], length: i
     lag = np.arange(most + 1)
     twice = np.where(lag > 0, 2.0, 1.0)
     found = float((twice * (1 - lag / (most + 1)) * weight[lag] * seen[lag]).sum())
-    # a line's frequency is a mean of the noise by the window times the time from the middle: neighbours' are opposite
+    # the error of a line's frequency is the noise weighted by window times time from the middle: where two dwells
+    # overlap, these weights have opposite signs
     score = KAISER.shape(length) * (np.arange(length) - (length - 1) / 2)
     alike = _together(score)[::hop][: min(OVERLAP, count)]
     white = spread**2 * float((twice[: len(alike)] * weight[: len(alike)] * alike).sum() / alike[0])
@@ -164,6 +169,6 @@ def _slope_std(rest: NDArray[np.floating], when: NDArray[np.floating], length: i
 
 
 def _together(values: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Sums of the products of values so many places apart, 0 to all but one."""
+    """Sums of the products of values that are 0 to len(values) - 1 places apart: their autocorrelation."""
     size = fft.next_fast_len(2 * len(values), real=True)
     return np.asarray(fft.irfft(np.abs(fft.rfft(values, size)) ** 2, size)[: len(values)], np.float64)

@@ -7,10 +7,10 @@ import numpy as np
 from .one_channel import half_empty
 from .spectrum import EMPTY_RATIO, LEAST_FLOOR, Spectrum, quartile_rank, side_sums
 
-#: A side that is far below the other holds the noise where the other comes down to this many times it in so small a
-#: share of its blocks: its lines do not fill it to the end. Or where that is this share of what most blocks there hold,
-#: which noise is not in blocks of so many bins. Or where so many of its own blocks reach this share of what most of the
-#: other side has: a filter that took a side away left no lines there.
+#: A side far below the other holds the noise, and was not taken away by a filter, in three cases. First: FREE_BLOCKS of
+#: the other side's blocks are below NOISE_TIMES that noise, as lines do not fill the other side to its end. Second:
+#: they are below UNEVEN_SHARE of what most blocks there exceed, as noise in blocks of UNEVEN_BINS or more never is.
+#: Third: LINE_BLOCKS of its own blocks exceed LINES_SHARE of that, where a filter would have left no lines.
 FREE_BLOCKS, NOISE_TIMES, UNEVEN_SHARE, UNEVEN_BINS = 0.05, 3.0, 0.25, 8
 LINE_BLOCKS, LINES_SHARE = 0.1, 0.25
 
@@ -18,8 +18,8 @@ LINE_BLOCKS, LINES_SHARE = 0.1, 0.25
 def with_free_side(spectrum: Spectrum) -> Spectrum:
     """One record's spectrum, in units of the noise of one side where lines fill the other.
 
-    `noise_floor` takes a side that is far below the other for empty, as a single channel made analytic has it. Lines of
-    a body that moves lie on one side for the most part, and may fill it: their level passed for the noise.
+    `noise_floor` takes a side far below the other for empty, as in a single channel made analytic. But the lines of a
+    moving body lie mostly on one side and may fill it: their level would then pass for the noise.
 
     Parameters
     ----------

@@ -1,22 +1,22 @@
-"""The rotors of one record: combs of lines sought, fitted, told apart, and where they end. `find_family` does it all.
+"""The rotors of one record: search, fit and separation of combs of lines, and their edge. `find_family` runs it all.
 
 Modules, in the order in which a record passes through them
 -----------------------------------------------------------
 periodogram, strong_lines, slow_lines
-    What is strong and slow is taken out, the noise made even; what then speaks for a line in each bin.
+    Strong slow lines are taken out and the noise is whitened; then the evidence of a line in each bin.
 comb_scores, comb_search, flashes, octaves, folding, common_fraction, flash_rate, wide_line, one_sided, comb_centre,
 unlike_blades, comb
-    Where a comb may be, which of its multiples and fractions it is, which line is the body's, how wide that is, whether
-    all lines lie on one side of it; or why there is no comb.
+    Search for a comb: which of the multiples and fractions of its spacing is right, which line is the body's, how wide
+    that line is, whether all lines lie on one side of it; or why there is no comb.
 comb_fit, weak_lines, turning, turning_lines, drift, changing, changing_fit
-    Combs fitted below the bin: steady ones, of blades not quite alike, of rates that change within the dwell.
+    Fits of combs to a fraction of a bin: at steady rates, of blades not quite alike, at rates that change in the dwell.
 gain, rotors, meeting, unresolved, points, left_flashes, like_lines, flash_count, helicopter
-    A gain that all lines share; single rotors told apart, whether these are all, or blades are rows of a few points,
-    whether one's comb is that of a turn; a main and a tail rotor.
+    A gain that all lines share; separation of single rotors; whether all rotors were found, whether blades are rows of
+    a few points, whether the comb of a lone rotor is that of its rotation rate; a main and a tail rotor.
 line_shapes, line_likelihood, rotor_band, family_edge, past_edge
     Where the lines end: the tip; and whether blades still flash past that.
 family
-    All of these in their order.
+    All of the above in that order.
 refusals, even_pulses, sidebands
-    What passes for a rotor in all of these and is another radar's or a supply's.
+    Lines that pass for a rotor in all of the above, but are those of another radar or of a supply.
 """
