@@ -185,11 +185,11 @@ CORRELATION = {correlation:.2f}
 """Between the evidence of two dwells of one target: n of them count as n / (1 + (n - 1) CORRELATION)."""
 
 LOOKS = {{{looks}}}
-"""Weight of the mean of the looks at so many dwells in a row, as one; of dwells of 80 ms."""
+"""Weight of the mean log-probability of all looks of a length, by the dwells of 80 ms that one look spans."""
 
 ODDS = {{{table}}}
-"""What the whole track shows: whose odds it multiplies, and by what. A comb that stays, a wingbeat, a body that heaves
-as wings lift it, one that sways as a walker's does."""
+"""What the whole track shows: the class whose odds it multiplies, and the factor. "comb": a comb that stays; "wings": a
+wingbeat; "heaves": a body that heaves as wings lift it; "steps": a body that sways as a walker's does."""
 '''
 
 
