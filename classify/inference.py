@@ -61,7 +61,8 @@ class Prediction:
     probabilities
         Shape (..., 3), float32, order ("uav", "bird", "clutter"); 1/3 each where a record could not be judged.
     reasons
-        Shape (...): why a label is "unknown" (rule and cure), "" for the others.
+        Shape (...): why a label is "unknown" (rule and cure), "" for the others. Read-only outside the envelope, where
+        all records share one text.
     noise
         Shape (...), float32: probability that a record holds noise alone, not even a background. It is a part of the
         probability of "clutter"; NaN where a record could not be judged, and from models without kinds. To detect UAVs
@@ -301,7 +302,7 @@ class Classifier:
         records = samples.reshape(-1, pulses)
         if outside := self.envelope.reason(carrier_hz, prf_hz, pulses):  # before any work on the records
             told, labels = _untold(len(records))
-            reasons = np.full(len(records), outside)
+            reasons = np.broadcast_to(np.array(outside), len(records))
         else:
             records, stretches = mended(records)
             if stretches:
