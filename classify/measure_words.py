@@ -150,8 +150,8 @@ def _wheel(found: "Measured") -> str:
     v = found.values
     held = np.isfinite(v.chopping_hz)
     edge_mps = v.bandwidth_hz[held] * SPEED_OF_LIGHT_MPS / found.recording.carrier_hz / 4
-    as_wheels = edge_mps <= OVER_BODY * np.abs(v.body_velocity_mps[held])
-    return "; perhaps a wheel: the lines reach no further than the body moves" if as_wheels.mean() > 0.5 else ""
+    is_wheel = edge_mps <= OVER_BODY * np.abs(v.body_velocity_mps[held])
+    return "; perhaps a wheel: the lines reach no further than the body moves" if is_wheel.mean() > 0.5 else ""
 
 
 def _gear(found: "Measured") -> str:

@@ -99,7 +99,7 @@ def _trained(
 ) -> tuple["EvidenceNet", "TrainingResult"]:
     from bladewing.models.augment import VelocityMirror
     from bladewing.models.cnn import ImageNet, SpectrumNet
-    from bladewing.models.training import Course, Lessons, train_network
+    from bladewing.models.training import TrainingData, TrainingOptions, train_network
     from bladewing.models.training_state import ForeignSnapshot
 
     rung, seed = LADDER[name], settings.seed
@@ -111,16 +111,18 @@ def _trained(
         if image
         else SpectrumNet(shapes, seed=seed, widen=rung.widen, kinds=CLASS_OF_KIND)
     )
-    course = settings.model_dump(include={field.name for field in fields(Course)})
+    options = settings.model_dump(include={field.name for field in fields(TrainingOptions)})
     if taught:
-        course["epochs"] *= PUPIL_EPOCHS
+        options["epochs"] *= PUPIL_EPOCHS
     epochs_part = epochs_of(name)
     try:
         result = train_network(
             net,
-            Lessons(_inputs(name, sets.train), sets.train.labels, kinds_of(sets.train), taught() if taught else None),
+            TrainingData(
+                _inputs(name, sets.train), sets.train.labels, kinds_of(sets.train), taught() if taught else None
+            ),
             (_inputs(name, sets.validate), sets.validate.labels),
-            Course(**course),
+            TrainingOptions(**options),
             seed=seed,
             # no other input depends on the sign of the velocity, so only the signal is mirrored
             augment=VelocityMirror(signal, -2 if image else -1),

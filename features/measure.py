@@ -78,7 +78,7 @@ def measure(
         raise ValueError(f"beta_rad is {beta_rad!r}: it must be at least 0 and below pi/2 [rad]{cure}")
     blades = None if blades is None else int(blades)
     given, stretches = mended(finite_complex(iq, least=2))
-    samples = _heard(given)
+    samples = _cleaned(given)
     shape = samples.shape[:-1]
     some = samples if samples.size else np.zeros((1, *samples.shape[-1:]), np.complex64)  # an empty batch needs a dummy
     spectrum = doppler_spectrum(some, carrier_hz=carrier_hz, prf_hz=prf_hz)
@@ -89,7 +89,7 @@ def measure(
             record, own = some[index], spectrum.rows(index)
             stretch = stretches.get(index)
             if stretch not in (None, NOTHING):
-                record = _heard(given[index][stretch])
+                record = _cleaned(given[index][stretch])
                 own = doppler_spectrum(record, carrier_hz=carrier_hz, prf_hz=prf_hz)
             told = stretch != NOTHING
             rows.append(measure_record(record, own, blades, beta_rad) if told else unmeasured(BEYOND_FILLING_IN))
@@ -104,7 +104,7 @@ def measure(
     return Measurements(**columns, length_is_lower_bound=beta_rad is None)
 
 
-def _heard(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
+def _cleaned(iq: NDArray[np.complex64]) -> NDArray[np.complex64]:
     """Records (..., pulses) without clicks, which lift the floor under all lines; one-channel ones made analytic."""
     flat = iq.reshape(-1, iq.shape[-1])
     return made_analytic(clicks_filled(flat, largest_part(flat)).reshape(iq.shape))

@@ -16,12 +16,12 @@ from .measurements import BODY, EACH_ROTOR, Measurements
 from .notch import Body, body_line, notch_mask, notch_residual_db, residual
 from .reasons import NO_DIGITS, NO_SIGNAL
 from .rotor.even_pulses import even_pulses
-from .rotor.family import Family, by_turns, find_family, told_from_multiples
+from .rotor.family import Family, by_turns, find_family, unresolved_if_multiple
 from .rotor.family_edge import SPAN, edge_around, edge_of_lines, span_of, surer_edge
 from .rotor.folding import FASTEST_TIP_MPS, fastest_tip
 from .rotor.past_edge import PastEdge, past_edge_of
 from .rotor.periodogram import Periodogram, prepared
-from .rotor.refusals import as_wheels, slower_than_rotors, too_few_flashes
+from .rotor.refusals import short_dwell_reason, slow_rotor_reason, wheel_reason
 from .rotor.rotors import MAX_ROTORS, hidden_shift
 from .rotor.sidebands import sideband_spacing
 from .samples import LEAST_PART, largest_part
@@ -96,7 +96,11 @@ def measure_record(
     if family is not None:
         family = by_turns(family, blades)
         edge = _edge(family, blades)
-        why = slower_than_rotors(family.data, family.comb.fit, *edge) or too_few_flashes(family) or _of_supply(family)
+        why = (
+            slow_rotor_reason(family.data, family.comb.fit, *edge)
+            or short_dwell_reason(family)
+            or _supply_reason(family)
+        )
     if family is None or why:
         return out | {"reason": why} | _named(BODY, body_velocity(data, spectrum, None))
     if data.one_channel:  # if both sides of the body overlap, no comb has a true centre: the body's line is used
@@ -107,13 +111,13 @@ def measure_record(
         if family.meeting_std is not None:
             steady, middle = True, replace(middle, centre_std=max(middle.centre_std, family.meeting_std))
         # lines of unresolved rotors lie all over the span: any of them may be the middle
-        if not (family.is_told_apart or family.comb.body_has_line) and (family.fills_span or middle.is_folded):
+        if not (family.is_resolved or family.comb.body_has_line) and (family.fills_span or middle.is_folded):
             open_std = np.inf
         velocity = body_velocity(family.data, spectrum, middle, steady=steady, open_std=open_std)
-    out |= {"reason": as_wheels(family.data, edge[0], velocity[0])} | _named(BODY, velocity)
+    out |= {"reason": wheel_reason(family.data, edge[0], velocity[0])} | _named(BODY, velocity)
     if out["reason"]:
         return out
-    family = told_from_multiples(family)
+    family = unresolved_if_multiple(family)
     out |= _turning(family) | _geared(family)
     out |= _band(family, edge, beta_rad, _past(family, iq, edge))
     out |= _blade(family, out, blades)
@@ -147,7 +151,7 @@ def _found(
     return iq, data, spectrum, family, why
 
 
-def _of_supply(family: Family) -> str:
+def _supply_reason(family: Family) -> str:
     """Why a family is a supply's; empty where it may be a rotor's."""
     spacing = sideband_spacing(family.data, family.comb)
     if spacing is None:
@@ -247,9 +251,9 @@ def _band(family: Family, edge: tuple[float, float], beta_rad: float | None, pas
     data, (away, std), span = family.data, edge, span_of(family.data, family.rotors.fits)
     mps = data.span_mps
     furthest, why = FURTHEST_EDGE * span / SPAN, ""
-    not_told = family.comb.fit.is_folded and not family.is_told_apart
+    not_told = family.comb.fit.is_folded and not family.is_resolved
     # folded lines of unresolved rotors may pass for the whole family: what lies past the edge must be seen
-    no_end = past.flashes or not (past.seen or family.is_told_apart)
+    no_end = past.flashes or not (past.seen or family.is_resolved)
     if data.one_channel:
         why = ONE_CHANNEL
     elif family.fills_span or not_told or no_end or not away + EDGE_DEVIATIONS * std < furthest:
@@ -285,7 +289,7 @@ def _blade(family: Family, found: dict[str, Any], blades: int | None) -> dict[st
     """Rotation rate and blade length, where the number of blades is given or seen."""
     comb, rates = family.comb, family.rotors.rates
     # unequal blades show their number; between lines of several rotors, weak ones may be something else
-    told = comb.blades_sure and len(rates) == 1 and family.is_told_apart
+    told = comb.blades_sure and len(rates) == 1 and family.is_resolved
     known = comb.blades if blades is None and told else blades
     if known is None or (known > 1 and family.may_be_turn):
         return {}

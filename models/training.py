@@ -51,7 +51,7 @@ _AT_ONCE = 1024  # records that a network is asked about in one call
 
 
 @dataclass(frozen=True)
-class Lessons:
+class TrainingData:
     """What a network is trained on.
 
     Parameters
@@ -76,7 +76,7 @@ class Lessons:
     teacher: NDArray[np.floating] | None = None
 
     def require(self, net: EvidenceNet) -> int:
-        """Check that a network can be trained on these lessons, and return the number of records."""
+        """Check that a network can be trained on these data, and return the number of records."""
         count = net.require(self.inputs)
         require_labels(self.labels, count, "labels")
         require_every_class(self.labels, "labels")
@@ -88,7 +88,7 @@ class Lessons:
 
 
 @dataclass(frozen=True)
-class Course:
+class TrainingOptions:
     """How long a network is trained, and how fast.
 
     Parameters
@@ -182,9 +182,9 @@ def _few_threads(
 @_few_threads
 def train_network(
     net: EvidenceNet,
-    lessons: Lessons,
+    data: TrainingData,
     validation: tuple[Inputs, NDArray[np.integer]],
-    course: Course,
+    options: TrainingOptions,
     *,
     seed: int,
     augment: Augment | None = None,
@@ -202,11 +202,11 @@ def train_network(
     ----------
     net
         The network; its present weights are where it starts.
-    lessons
+    data
         What it is trained on.
     validation
         Inputs and labels of other records, which choose the best epoch.
-    course
+    options
         How long, and how fast.
     seed
         Draws the order of the records and the augmentation.
@@ -233,24 +233,24 @@ def train_network(
     FloatingPointError
         Where no epoch gave a finite validation loss.
     """
-    count = lessons.require(net)
+    count = data.require(net)
     require_labels(validation[1], net.require(validation[0]), "validation labels")
     started = time.perf_counter()
     place = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    epochs, batch = course.epochs, min(course.batch, count)
+    epochs, batch = options.epochs, min(options.batch, count)
     steps = count // batch
-    net.standardise_by(lessons.inputs)
+    net.standardise_by(data.inputs)
     # the stubs do not know this argument; channels last, a step takes a fifth less time on a CPU
     net.to(place, memory_format=torch.channels_last)  # type: ignore[call-overload]
-    tensors = {name: _tensor(lessons.inputs[name]).to(place) for name in net.input_shapes}
-    loss_of = _Loss(net, lessons, place)
-    optimisers, schedules = _scheduled(net, max(3, epochs * steps), course)
+    tensors = {name: _tensor(data.inputs[name]).to(place) for name in net.input_shapes}
+    loss_of = _Loss(net, data, place)
+    optimisers, schedules = _scheduled(net, max(3, epochs * steps), options)
     rng = torch.Generator().manual_seed(seed)
     work = Work(net, optimisers, schedules, rng)
     if snapshot is not None:
         work.restore(snapshot, epochs=epochs, steps=steps)
         started -= work.history[-1]["seconds"]
-    while len(work.history) < epochs and not 0 < course.patience <= len(work.history) - work.best_epoch:
+    while len(work.history) < epochs and not 0 < options.patience <= len(work.history) - work.best_epoch:
         net.train()
         total = torch.zeros((), device=place)
         order = torch.randperm(count, generator=rng)[: steps * batch].to(place)
@@ -258,7 +258,7 @@ def train_network(
             part: Mapping[str, Tensor] = {name: values[rows].float() for name, values in tensors.items()}
             if augment:
                 part = augment(part, rng)
-            with torch.autocast(place.type, torch.bfloat16, enabled=course.bfloat16):
+            with torch.autocast(place.type, torch.bfloat16, enabled=options.bfloat16):
                 kind_scores = net.kind_scores(*(part[name] for name in net.input_shapes))
             loss = loss_of(kind_scores.float(), rows)
             net.zero_grad(set_to_none=True)
@@ -281,7 +281,7 @@ def train_network(
             on_epoch(len(work.history), epochs, metrics)
     if not work.best:
         raise FloatingPointError(
-            f"no epoch gave a finite validation loss; learning_rate {course.learning_rate} is too high"
+            f"no epoch gave a finite validation loss; learning_rate {options.learning_rate} is too high"
         )
     net.to("cpu", memory_format=torch.contiguous_format).load_state_dict(work.best)  # type: ignore[call-overload]
     net.eval()
@@ -324,14 +324,14 @@ def network_scores(net: EvidenceNet, inputs: Inputs) -> NDArray[np.float32]:
 class _Loss:
     """Loss of a network on training records: that of their classes and, where kinds are given, that of their kinds."""
 
-    def __init__(self, net: EvidenceNet, lessons: Lessons, place: torch.device) -> None:
+    def __init__(self, net: EvidenceNet, data: TrainingData, place: torch.device) -> None:
         self._net, self._criterion = net, nn.CrossEntropyLoss(label_smoothing=SMOOTHING)
         said, classes_said = None, None
-        if lessons.teacher is not None:
-            said = torch.as_tensor(lessons.teacher, dtype=torch.float32)
+        if data.teacher is not None:
+            said = torch.as_tensor(data.teacher, dtype=torch.float32)
             classes_said = said @ nn.functional.one_hot(torch.tensor(net.kinds)).float()
-        self._classes = _target(lessons.labels, classes_said, place)
-        self._kinds = None if lessons.kinds is None else _target(lessons.kinds, said, place)
+        self._classes = _target(data.labels, classes_said, place)
+        self._kinds = None if data.kinds is None else _target(data.kinds, said, place)
 
     def __call__(self, kind_scores: Tensor, rows: Tensor) -> Tensor:
         loss = self._criterion(self._net.class_scores(kind_scores), self._classes[rows])
@@ -347,14 +347,14 @@ def _target(labels: NDArray[np.integer], said: Tensor | None, place: torch.devic
 
 
 def _scheduled(
-    net: EvidenceNet, planned: int, course: Course
+    net: EvidenceNet, planned: int, options: TrainingOptions
 ) -> tuple[tuple[torch.optim.Optimizer, ...], tuple[OneCycleLR, ...]]:
     """Muon for matrices and kernels, Adam for all else, and their learning-rate schedules over `planned` steps."""
     matrices = [weights for weights in net.parameters() if weights.ndim > 1]
     others = [weights for weights in net.parameters() if weights.ndim <= 1]
     optimisers = (
-        Muon(matrices, lr=course.learning_rate, weight_decay=course.weight_decay),
-        torch.optim.Adam(others, lr=ADAM * course.learning_rate),
+        Muon(matrices, lr=options.learning_rate, weight_decay=options.weight_decay),
+        torch.optim.Adam(others, lr=ADAM * options.learning_rate),
     )
     rise = max(RISE, 2 / planned)  # two steps or more: a rise of one step has no length
     schedules = tuple(

@@ -186,7 +186,7 @@ def train_picture(
     """
     from bladewing.models.augment import VelocityMirror
     from bladewing.models.calibration import Calibration
-    from bladewing.models.training import Course, Lessons, network_scores, train_network
+    from bladewing.models.training import TrainingData, TrainingOptions, network_scores, train_network
 
     picture = pictures_of([name])[name]
     net = network_for(picture, seed=config.seed)
@@ -197,9 +197,9 @@ def train_picture(
 
     result = train_network(
         net,
-        Lessons(inputs("train"), sets["train"].labels),
+        TrainingData(inputs("train"), sets["train"].labels),
         (inputs("validate"), sets["validate"].labels),
-        Course(config.front_epochs, batch=_BATCH),
+        TrainingOptions(config.front_epochs, batch=_BATCH),
         seed=config.seed,
         augment=VelocityMirror(signal, 2) if picture.has_velocity else None,
         on_epoch=lambda epoch, epochs, _: on_done(epoch / epochs),

@@ -27,7 +27,7 @@ from .comb_search import (
 from .common_fraction import of_one_rotor
 from .flash_rate import of_flashes
 from .folding import may_come_back
-from .past_edge import told_no_further
+from .past_edge import unseen_tip_reason
 from .periodogram import Periodogram
 from .unlike_blades import lines_a_turn, weak_lines_show
 from .wide_line import beside_line
@@ -208,12 +208,12 @@ def _too_short(data: Periodogram) -> str:
     if CHOPPING_RANGE_HZ[0] * SEARCHED_RATIO >= highest * data.prf_hz:
         needed_hz = CHOPPING_RANGE_HZ[0] * SEARCHED_RATIO / highest
         rule = f"chopping frequencies from {CHOPPING_RANGE_HZ[0]:.0f} Hz up do not fit into {data.prf_hz:g} Hz"
-        return span_too_slow(data) or f"{LOW_PRF}: {rule}: raise it to {needed_hz:.0f} Hz at least"
+        return low_prf_reason(data) or f"{LOW_PRF}: {rule}: raise it to {needed_hz:.0f} Hz at least"
     least_s = MIN_SPACING_BINS * SEARCHED_RATIO / highest / data.prf_hz
     return f"{SHORT_DWELL}: no chopping frequency can be told in less than {1e3 * least_s:.1f} ms at this PRF"
 
 
-def span_too_slow(data: Periodogram) -> str:
+def low_prf_reason(data: Periodogram) -> str:
     """Why lines cannot be seen to reach as far as a rotor's: the span is too narrow; empty where they can."""
     unambiguous_mps = data.span_mps / 2
     if unambiguous_mps >= LEAST_REACH_MPS:
@@ -249,7 +249,7 @@ def find_comb(data: Periodogram, blades: int | None = None) -> tuple[Comb | None
         start = with_faster(data, start)
     if start.score < threshold(data):
         reason = f"no comb: evidence {start.score:.1f} nats, {threshold(data):.0f} are needed"
-        return None, span_too_slow(data) or reason
+        return None, low_prf_reason(data) or reason
     start = of_flashes(data, of_one_rotor(data, beside_line(data, start)))
     return _counted(data, *centred(data, start), blades)
 
@@ -269,13 +269,13 @@ def _counted(
     """Fit and judge a comb whose body line is known; returns what `find_comb` does."""
     fitted = fit_combs(data, start.centre, [start.spacing], [(start.low, start.high)])
     if fitted is None or len(fitted[0][0].orders) < LEAST_LINES:
-        return None, span_too_slow(data) or f"no comb: fewer than {LEAST_LINES} lines"
+        return None, low_prf_reason(data) or f"no comb: fewer than {LEAST_LINES} lines"
     fit = fitted[0][0]
     reach = start.last * fit.spacing
     reach_mps = reach * data.span_mps
     if reach_mps < LEAST_REACH_MPS:
         reason = f"no rotor: lines reach {reach_mps:.1f} m/s, rotors {LEAST_REACH_MPS:.0f} m/s and more"
-        return None, span_too_slow(data) or told_no_further(data, fit, reach) or reason
+        return None, low_prf_reason(data) or unseen_tip_reason(data, fit, reach) or reason
     finer = finer_spacing(data, fit)
     if finer is not None:
         least_s = MIN_SPACING_BINS / finer / data.prf_hz

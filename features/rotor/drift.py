@@ -50,7 +50,7 @@ FITTED_STEPS, FURTHER = 8, 2.0
 
 
 @dataclass(frozen=True)
-class Straightened:
+class Resampled:
     """A record resampled as if its rotor had a constant rate.
 
     Parameters
@@ -80,7 +80,7 @@ def _continued(samples: NDArray[np.complex128], fit: ChangingFit) -> NDArray[np.
     return np.concatenate([lines[:margin] * fade[::-1], samples, lines[margin:] * fade])
 
 
-def straightened(data: Periodogram, comb: Comb, edge: float, *, least_gain: float) -> Straightened | None:
+def resampled(data: Periodogram, comb: Comb, edge: float, *, least_gain: float) -> Resampled | None:
     """Resample a record so that its rotor has a constant rate.
 
     The change is fitted by Gauss-Newton steps on the phases of the comb's lines over the dwell: first with each line by
@@ -100,7 +100,7 @@ def straightened(data: Periodogram, comb: Comb, edge: float, *, least_gain: floa
 
     Returns
     -------
-    Straightened or None
+    Resampled or None
         None where no change is sure, or it exceeds `MOST_CHANGE`.
     """
     pulses, rate, centre = data.pulses, comb.chopping, comb.fit.centre
@@ -120,7 +120,7 @@ def straightened(data: Periodogram, comb: Comb, edge: float, *, least_gain: floa
     if not is_sure(fit.ahead, fit.ahead_std) or not change_of(fit.ahead, pulses) < MOST_CHANGE:
         return None
     late = late_by(fit.ahead, pulses)
-    return Straightened(Resampling(_continued(data.samples, fit), fit.centre).read(late), data, fit)
+    return Resampled(Resampling(_continued(data.samples, fit), fit.centre).read(late), data, fit)
 
 
 def _each_by_itself(data: Periodogram, rate: float, centre: float, reach: int) -> tuple[NDArray[np.float64], float]:

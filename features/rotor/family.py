@@ -12,19 +12,19 @@ from .changing import ChangingSeparation, as_steady, may_be_sought
 from .changing_fit import ChangingFit, Start, fit_changing
 from .comb import Comb, counted_from, find_comb
 from .comb_fit import CombFit
-from .drift import Straightened, ahead_left, straightened
+from .drift import Resampled, ahead_left, resampled
 from .family_edge import edge_around, edge_of_lines, span_of
 from .flash_count import flashes_in_period
 from .flash_rate import may_be_fraction
-from .gain import Evened
+from .gain import GainCorrected
 from .helicopter import Gear, find_gear
 from .meeting import meeting_of, with_body
 from .periodogram import Level, Periodogram, prepared_again
-from .refusals import slower_than_rotors
+from .refusals import slow_rotor_reason
 from .rotors import LEAST_POWER_SHARE, Rotors, powers_of, separate_rotors
 from .turning import DEGREES, bend, is_sure
 from .unlike_blades import blade_numbers
-from .unresolved import judged, left_over, not_all, power_about
+from .unresolved import judged, left_over, marked_unresolved, power_about
 from .weak_lines import by_rotation, with_all_lines, without_weak_lines
 
 #: Where several rotors were found, one common rate change is tried if taking it out raises the lines' information on
@@ -108,7 +108,7 @@ class Family:
     meeting_std: float | None = None
 
     @property
-    def is_told_apart(self) -> bool:
+    def is_resolved(self) -> bool:
         """True where the rotors found are all resolved, or a helicopter's two combs are found."""
         return self.gear is not None or self.rotors.resolved
 
@@ -120,14 +120,14 @@ class Family:
         return np.array([[bend(own, self.data.pulses) for own in values] for values in self.ahead])
 
 
-def told_from_multiples(family: Family) -> Family:
+def unresolved_if_multiple(family: Family) -> Family:
     """The family, marked unresolved where a lone rotor's comb may as well be that of a multiple of its rate."""
     comb, rotors = family.comb, family.rotors
     if family.gear is not None or len(rotors.rates) > 1:
         return family
     if not may_be_fraction(family.data, comb.fit.spacing, comb.last):
         return family
-    return replace(family, rotors=not_all(rotors, family.data, UNTOLD_SPREAD * comb.chopping))
+    return replace(family, rotors=marked_unresolved(rotors, family.data, UNTOLD_SPREAD * comb.chopping))
 
 
 def by_turns(family: Family, blades: int | None) -> Family:
@@ -182,19 +182,19 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
     reason : str
         Why not; empty where there is one.
     """
-    even, found = _evened_by_one(Evened.of(data, spectrum), blades)
+    even, found = _gain_corrected_by_comb(GainCorrected.of(data, spectrum), blades)
     first, reason = _as_it_is(even.record, found, blades)
     if first is None:
         return None, reason
-    by_rotors = _evened_by_rotors(even, first, blades)
+    by_rotors = _gain_corrected_by_rotors(even, first, blades)
     if by_rotors is not None:
         family = _turned(by_rotors[0].record, spectrum, by_rotors[1], blades)
-        if family.is_told_apart:
+        if family.is_resolved:
             return family, ""
     return _turned(even.record, spectrum, first, blades), ""
 
 
-def _evened_by_one(even: Evened, blades: int | None) -> tuple[Evened, tuple[Comb | None, str]]:
+def _gain_corrected_by_comb(even: GainCorrected, blades: int | None) -> tuple[GainCorrected, tuple[Comb | None, str]]:
     """A record with its first comb's gain divided out while that explains much of the residual; and the comb."""
     found = find_comb(even.record, blades)
     for _ in range(GAIN_STEPS):
@@ -207,7 +207,9 @@ def _evened_by_one(even: Evened, blades: int | None) -> tuple[Evened, tuple[Comb
     return even, found
 
 
-def _evened_by_rotors(even: Evened, family: Family, blades: int | None) -> tuple[Evened, Family] | None:
+def _gain_corrected_by_rotors(
+    even: GainCorrected, family: Family, blades: int | None
+) -> tuple[GainCorrected, Family] | None:
     """A record with the gain of all rotors divided out, and its family; None where they have no gain."""
     out = None
     for _ in range(GAIN_STEPS):
@@ -226,7 +228,7 @@ def _evened_by_rotors(even: Evened, family: Family, blades: int | None) -> tuple
 def _not_twins(family: Family) -> list[CombFit]:
     """Combs of a family; if unresolved, only the strongest of combs as close together as a gain splits lines."""
     fits = sorted(family.rotors.fits, key=lambda fit: -energy(fit.amplitudes))
-    if family.is_told_apart:
+    if family.is_resolved:
         return fits
     out: list[CombFit] = []
     for fit in fits:
@@ -245,15 +247,15 @@ def _turned(data: Periodogram, spectrum: Spectrum, family: Family, blades: int |
     if family.ahead is not None and not is_sure(*family.ahead):
         return family
     edge = min(family.edge, span_of(data, [family.comb.fit]))
-    several_gain = BELIEVED_GAIN if family.is_told_apart else SEVERAL_GAIN
+    several_gain = BELIEVED_GAIN if family.is_resolved else SEVERAL_GAIN
     least_gain = several_gain if len(family.rotors.rates) > 1 else 0.0
 
-    def evened(comb: Comb) -> tuple[Straightened | None, Family | None]:
-        even = straightened(data, comb, edge, least_gain=least_gain)
+    def evened(comb: Comb) -> tuple[Resampled | None, Family | None]:
+        even = resampled(data, comb, edge, least_gain=least_gain)
         if even is None:
             return None, None
         again = prepared_again(even.samples, spectrum, data.ends_noise)
-        steady, found = _evened_by_one(Evened.of(again, spectrum), blades)
+        steady, found = _gain_corrected_by_comb(GainCorrected.of(again, spectrum), blades)
         return even, _as_it_is(steady.record, found, blades, even)[0]
 
     comb = by_rotation(family.comb)
@@ -271,14 +273,14 @@ def _turned(data: Periodogram, spectrum: Spectrum, family: Family, blades: int |
         return other
     apart = _changing(data, family, edge)
     # several rotors that only share one change are accepted where nothing better is found
-    if family.is_told_apart or apart.is_told_apart or other is None or not other.is_told_apart:
+    if family.is_resolved or apart.is_resolved or other is None or not other.is_resolved:
         return apart
     return other
 
 
 def _is_one(family: Family | None) -> TypeGuard[Family]:
     """True where a family is that of one resolved rotor, or of a helicopter."""
-    return family is not None and family.is_told_apart and len(family.rotors.rates) == 1
+    return family is not None and family.is_resolved and len(family.rotors.rates) == 1
 
 
 def _changing(data: Periodogram, family: Family, edge: float) -> Family:
@@ -302,7 +304,7 @@ def _changing(data: Periodogram, family: Family, edge: float) -> Family:
         is_loud = float(power[seen].mean()) > LOUD_RESIDUAL
         if abs(left_over(about, known.fits, edge).deviations) < CHANGE_LEAVES and not is_loud:
             return family
-    unsure = replace(family, rotors=not_all(known, data)) if known.resolved else family
+    unsure = replace(family, rotors=marked_unresolved(known, data)) if known.resolved else family
     reach = max(round(edge / comb.chopping), 1)
     fills_span = family.fills_span or comb.fit.is_folded
     if fills_span or not may_be_sought(data, comb.chopping, reach) or data.one_channel:
@@ -339,7 +341,7 @@ def _as_it_is(
     data: Periodogram,
     found: tuple[Comb | None, str],
     blades: int | None,
-    even: Straightened | None = None,
+    even: Resampled | None = None,
     *,
     recounts: int = RECOUNTS,
 ) -> tuple[Family | None, str]:
@@ -352,7 +354,7 @@ def _as_it_is(
         return None, why
     comb = with_all_lines(data, comb, blades)
     edge, std = edge_of_lines(data, [comb.fit], comb.rest, comb.per_turn, blades)
-    if slow := slower_than_rotors(data, comb.fit, edge, std):
+    if slow := slow_rotor_reason(data, comb.fit, edge, std):
         return None, slow
     fills_span = bool(np.isinf(edge))
     furthest = min(edge, span_of(data, [comb.fit]))
@@ -389,7 +391,7 @@ def _as_it_is(
     return Family(data, comb, edge, std, fills_span, gear, rotors, reason, ahead), ""
 
 
-def _geared(gear: Gear, even: Straightened, level_about: Level) -> tuple[Gear, ChangingFit]:
+def _geared(gear: Gear, even: Resampled, level_about: Level) -> tuple[Gear, ChangingFit]:
     """Two combs of a resampled record, fitted to the record as it is.
 
     One gear drives both: where their fitted changes differ for sure, each is tried for both, and the best fit is kept.

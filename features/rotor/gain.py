@@ -65,7 +65,7 @@ def gain_left(data: Periodogram, rest: NDArray[np.complex128], chopping: float) 
 
 
 @dataclass(frozen=True)
-class Evened:
+class GainCorrected:
     """A record with the gain of its lines, as far as known, divided out.
 
     Parameters

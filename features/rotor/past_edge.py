@@ -81,7 +81,7 @@ def past_edge_of(
     return past_edge(data, samples, centre, np.append(rates, tried), edge)
 
 
-def told_no_further(data: Periodogram, fit: CombFit, edge: float, edge_std: float = 0.0) -> str:
+def unseen_tip_reason(data: Periodogram, fit: CombFit, edge: float, edge_std: float = 0.0) -> str:
     """Why a comb whose lines seem to end at an edge [cycles a sample] may reach further; empty where they end there."""
     if not past_edge_of(data, data.samples, fit.centre, [fit.spacing], 0.0, (edge, edge_std)).flashes:
         return ""

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING
 
 from ..reasons import SHORT_DWELL
-from .comb import LEAST_REACH_MPS, OVER_BODY, is_short, span_too_slow
+from .comb import LEAST_REACH_MPS, OVER_BODY, is_short, low_prf_reason
 from .comb_fit import CombFit
-from .past_edge import told_no_further
+from .past_edge import unseen_tip_reason
 from .periodogram import Periodogram
 
 if TYPE_CHECKING:
@@ -19,16 +19,16 @@ LEAST_FLASHES, MANY_ORDERS = 5.5, 60
 WHEEL = (0.8, OVER_BODY)
 
 
-def slower_than_rotors(data: Periodogram, fit: CombFit, edge: float, edge_std: float) -> str:
+def slow_rotor_reason(data: Periodogram, fit: CombFit, edge: float, edge_std: float) -> str:
     """Why a comb of this edge [cycles a sample] is too slow for a rotor; empty where it may be a rotor's."""
     edge_mps, edge_std_mps = (value * data.span_mps for value in (edge, edge_std))
     if not edge_mps + edge_std_mps < LEAST_REACH_MPS:
         return ""
     reason = f"no rotor: the band ends at {edge_mps:.1f} m/s, below {LEAST_REACH_MPS:.0f} m/s"
-    return span_too_slow(data) or told_no_further(data, fit, edge, edge_std) or reason
+    return low_prf_reason(data) or unseen_tip_reason(data, fit, edge, edge_std) or reason
 
 
-def as_wheels(data: Periodogram, edge: float, velocity_mps: float) -> str:
+def wheel_reason(data: Periodogram, edge: float, velocity_mps: float) -> str:
     """Why a line family of this edge [cycles a sample] about a body is a wheel's; empty where it may be a rotor's.
 
     Seen from the body a wheel's rim is as fast as the body. A rotor's tips are 2.5 times as fast as it flies and more;
@@ -40,14 +40,14 @@ def as_wheels(data: Periodogram, edge: float, velocity_mps: float) -> str:
     return ""
 
 
-def too_few_flashes(family: "Family") -> str:
+def short_dwell_reason(family: "Family") -> str:
     """Why unresolved rotors give no values in so short a dwell; empty where they do.
 
     Their lines, a few bins apart, run into one another, and what results may be strong at any spacing.
     """
     data, chopping = family.data, family.comb.chopping
     shows = chopping * data.pulses > LEAST_FLASHES or family.comb.last > MANY_ORDERS
-    if family.is_told_apart or shows or not is_short(data):
+    if family.is_resolved or shows or not is_short(data):
         return ""
     return (
         f"{SHORT_DWELL}: lines about {chopping * data.prf_hz:.0f} Hz apart are not one rotor's, "

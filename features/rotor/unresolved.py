@@ -308,15 +308,15 @@ def judged(
     contradicted = not several and rotors.fits[0].is_folded and edge < 0.5
     past = (not several or fitted_to is not None) and _stands_past(about, rotors.fits, fitted_to or edge)
     if fitted_to is None and others_flash(data, rotors.rest, (fit.spacing for fit in rotors.fits), edge):
-        return not_all(rotors, data, any_rate)  # their rates may be any
+        return marked_unresolved(rotors, data, any_rate)  # their rates may be any
     held_to = LEFT_SHARE if several or (few and deviations > FEW_DEVIATIONS) else LEFT_ALONE
     if not (twice or paired or hidden or past or contradicted or share > held_to):
         return rotors
     apart = abs(rotors.next_rate - float(rotors.rates[0])) if hidden and not several else 0.0
-    return not_all(rotors, data, apart)
+    return marked_unresolved(rotors, data, apart)
 
 
-def not_all(rotors: Rotors, data: Periodogram, apart: float = 0.0) -> Rotors:
+def marked_unresolved(rotors: Rotors, data: Periodogram, apart: float = 0.0) -> Rotors:
     """The rotors marked unresolved; their spread is at least what the dwell resolves, and `apart` [cycles a sample]."""
     reach = max(rotors.fits[0].outermost, 1)
     least = RESOLVED_BINS / (reach * data.pulses)

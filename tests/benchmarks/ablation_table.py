@@ -14,7 +14,7 @@ from bladewing.features.schema import FEATURES, LEVEL_CHANNELS
 from bladewing.models.augment import VelocityMirror
 from bladewing.models.calibration import softmax
 from bladewing.models.cnn import SpectrumNet
-from bladewing.models.training import Course, Lessons, network_scores, train_network
+from bladewing.models.training import TrainingData, TrainingOptions, network_scores, train_network
 from numpy.typing import NDArray
 from sklearn.metrics import log_loss
 
@@ -73,9 +73,9 @@ def trial(
     net = SpectrumNet(shapes, seed=seed, **({"kinds": CLASS_OF_KIND} if kinds else {}))
     train_network(
         net,
-        Lessons(train, sets["train"].labels, kinds_of(sets["train"]) if kinds else None),
+        TrainingData(train, sets["train"].labels, kinds_of(sets["train"]) if kinds else None),
         (validate, sets["validate"].labels),
-        Course(epochs),
+        TrainingOptions(epochs),
         seed=seed,
         augment=VelocityMirror(names[0], -1),
     )

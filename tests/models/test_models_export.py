@@ -21,7 +21,7 @@ from bladewing.models.export import (
 )
 from bladewing.models.seal import seal, verify
 from bladewing.models.tabular import tabular_scores, train_boosted, train_linear
-from bladewing.models.training import Course, Lessons, network_scores, train_network
+from bladewing.models.training import TrainingData, TrainingOptions, network_scores, train_network
 from onnx import helper
 
 CALIBRATION = Calibration(0.7, (0.3, -0.5, 0.2))
@@ -44,7 +44,7 @@ def _network(net):
     y = np.arange(130) % 3
     # far from standard, so that a forgotten buffer shows
     inputs = {name: (5 + 20 * rng.random((130, *shape))).astype(np.float32) for name, shape in net.input_shapes.items()}
-    train_network(net, Lessons(inputs, y), (inputs, y), Course(1, batch=64), seed=0)
+    train_network(net, TrainingData(inputs, y), (inputs, y), TrainingOptions(1, batch=64), seed=0)
     onnx_bytes = export_network(net, dict(net.input_shapes), CALIBRATION)
     return onnx_bytes, inputs, network_scores(net, inputs), NETWORK_TOLERANCE
 

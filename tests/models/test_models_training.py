@@ -8,7 +8,7 @@ from bladewing.models.augment import VelocityMirror
 from bladewing.models.calibration import softmax
 from bladewing.models.cnn import ImageNet, SpectrumNet, Standardise, _speed_bands
 from bladewing.models.tabular import tabular_scores, train_boosted, train_linear
-from bladewing.models.training import Course, Lessons, network_scores, train_network
+from bladewing.models.training import TrainingData, TrainingOptions, network_scores, train_network
 from bladewing.models.training_state import ForeignSnapshot
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -44,8 +44,8 @@ def _trained(seed=0, epochs=2, **options):
     inputs, y = _spectra(300, 1)
     net = SpectrumNet(SHAPES, seed=seed)
     course = {name: options.pop(name) for name in ("learning_rate", "patience", "bfloat16") if name in options}
-    course = Course(epochs, batch=64, **course)
-    return net, train_network(net, Lessons(inputs, y), _spectra(100, 2), course, seed=seed, **options)
+    course = TrainingOptions(epochs, batch=64, **course)
+    return net, train_network(net, TrainingData(inputs, y), _spectra(100, 2), course, seed=seed, **options)
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def _trained(seed=0, epochs=2, **options):
 def test_a_net_learns_what_its_signal_tells(draw, make):
     net = make()
     inputs, y = draw(600, 1)
-    train_network(net, Lessons(inputs, y), draw(200, 2), Course(8, batch=64), seed=0)
+    train_network(net, TrainingData(inputs, y), draw(200, 2), TrainingOptions(8, batch=64), seed=0)
     fresh, truth = draw(300, 3)
     accuracy = (network_scores(net, fresh).argmax(axis=1) == truth).mean()
     assert accuracy > 0.9  # chance is 0.33 with a spread of 0.03
@@ -78,7 +78,7 @@ def test_a_net_learns_at_what_rate_something_comes_and_goes():
     }
     parts = [{name: values[rows] for name, values in inputs.items()} for rows in (slice(0, 600), slice(600, 900))]
     net = SpectrumNet({name: values.shape[1:] for name, values in inputs.items()}, seed=0)
-    train_network(net, Lessons(parts[0], y[:600]), (parts[1], y[600:]), Course(8, batch=64), seed=0)
+    train_network(net, TrainingData(parts[0], y[:600]), (parts[1], y[600:]), TrainingOptions(8, batch=64), seed=0)
     assert (network_scores(net, parts[1]).argmax(axis=1) == y[600:]).mean() > 0.9
 
 
@@ -90,7 +90,7 @@ def test_a_net_learns_what_its_measurements_tell():
         "features": (rng.normal(size=(600, FEATURES)) + 4 * np.eye(FEATURES)[y]).astype(np.float32),
     }
     net = SpectrumNet(SHAPES, seed=0)
-    train_network(net, Lessons(inputs, y), (inputs, y), Course(4, batch=64), seed=0)
+    train_network(net, TrainingData(inputs, y), (inputs, y), TrainingOptions(4, batch=64), seed=0)
     assert (network_scores(net, inputs).argmax(axis=1) == y).mean() > 0.9
 
 
@@ -102,7 +102,7 @@ def test_a_net_learns_how_far_from_rest_a_line_is():
     spectrum[np.arange(900), :, (rest + rng.choice([-1, 1], 900) * away).astype(int)] += 12
     parts = [{"spectrum": spectrum[rows].astype(np.float32)} for rows in (slice(0, 600), slice(600, 900))]
     net = SpectrumNet({"spectrum": (2, 2 * rest)}, seed=0)
-    train_network(net, Lessons(parts[0], y[:600]), (parts[1], y[600:]), Course(6, batch=64), seed=0)
+    train_network(net, TrainingData(parts[0], y[:600]), (parts[1], y[600:]), TrainingOptions(6, batch=64), seed=0)
     assert (network_scores(net, parts[1]).argmax(axis=1) == y[600:]).mean() > 0.9
 
 
@@ -149,7 +149,7 @@ def test_a_net_that_is_told_kinds_knows_them_and_their_sums_are_the_classes():
     fresh, told = _rates(300, 1)
     truth = np.array(KINDS)[told]
     net = SpectrumNet({name: values.shape[1:] for name, values in inputs.items()}, seed=0, kinds=KINDS)
-    train_network(net, Lessons(inputs, y, kinds), (fresh, truth), Course(8, batch=64), seed=0)
+    train_network(net, TrainingData(inputs, y, kinds), (fresh, truth), TrainingOptions(8, batch=64), seed=0)
     with torch.inference_mode():
         scores = net.kind_scores(*(torch.from_numpy(fresh[name]) for name in net.input_shapes)).double().numpy()
     assert (scores.argmax(axis=1) == told).mean() > 0.9
@@ -183,7 +183,9 @@ def test_a_teacher_that_knows_what_a_record_leaves_open_makes_up_for_labels_that
     off = []
     for teacher in (None, shares):
         net = SpectrumNet(SHAPES, seed=0)
-        train_network(net, Lessons(inputs, drawn, teacher=teacher), (fresh, labels), Course(8, batch=64), seed=0)
+        train_network(
+            net, TrainingData(inputs, drawn, teacher=teacher), (fresh, labels), TrainingOptions(8, batch=64), seed=0
+        )
         found = softmax(network_scores(net, fresh))
         off.append(np.abs(found[np.arange(300), labels] - 0.5).mean())
     assert off[1] < 0.7 * off[0]
@@ -197,8 +199,8 @@ def test_a_pupil_learns_kinds_that_its_labels_no_longer_tell():
     found = []
     for teacher in (None, np.eye(len(KINDS))[kinds]):
         net = SpectrumNet({name: values.shape[1:] for name, values in inputs.items()}, seed=0, kinds=KINDS)
-        lessons = Lessons(inputs, y, mixed, teacher)
-        train_network(net, lessons, (fresh, np.array(KINDS)[told]), Course(8, batch=64), seed=0)
+        lessons = TrainingData(inputs, y, mixed, teacher)
+        train_network(net, lessons, (fresh, np.array(KINDS)[told]), TrainingOptions(8, batch=64), seed=0)
         with torch.inference_mode():
             scores = net.kind_scores(*map(torch.as_tensor, fresh.values()))
         found.append((scores.numpy().argmax(axis=1) == told).mean())
@@ -316,7 +318,9 @@ def test_the_learning_rate_of_each_epoch_is_that_of_the_schedule():
 def test_the_shortest_trainings_have_a_schedule_too(steps):
     inputs, y = _spectra(12, 1)
     net = SpectrumNet(SHAPES, seed=0)
-    result = train_network(net, Lessons(inputs, y), (inputs, y), Course(steps, batch=12, learning_rate=0.01), seed=0)
+    result = train_network(
+        net, TrainingData(inputs, y), (inputs, y), TrainingOptions(steps, batch=12, learning_rate=0.01), seed=0
+    )
     rates = [epoch["learning_rate"] for epoch in result.epochs]
     assert all(0 < rate <= 0.01 for rate in rates)
     assert steps == 1 or max(rates) > 0.009
@@ -331,7 +335,7 @@ def test_training_stops_where_the_validation_loss_no_longer_falls():
     net = SpectrumNet(SHAPES, seed=0)
     inputs, y = _spectra(300, 1)
     snapshots = []
-    lessons, course = Lessons(inputs, y), Course(9, batch=64, patience=3)
+    lessons, course = TrainingData(inputs, y), TrainingOptions(9, batch=64, patience=3)
     options = {"seed": 0, "on_epoch": worsen, "on_snapshot": snapshots.append}
     result = train_network(net, lessons, _spectra(100, 2), course, **options)
     assert result.stopped_early
@@ -382,7 +386,9 @@ def test_the_best_state_is_kept_when_the_last_epochs_are_ruined():
     net = SpectrumNet(SHAPES, seed=0)
     inputs, y = _spectra(300, 1)
     validation = _spectra(100, 2)
-    result = train_network(net, Lessons(inputs, y), validation, Course(4, batch=64), seed=0, on_epoch=ruin)
+    result = train_network(
+        net, TrainingData(inputs, y), validation, TrainingOptions(4, batch=64), seed=0, on_epoch=ruin
+    )
     assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
     assert result.best_epoch <= 2
     losses = [epoch["validation_loss"] for epoch in result.epochs]
@@ -406,7 +412,13 @@ def test_a_training_that_never_gives_a_number_says_so():
     net = SpectrumNet(SHAPES, seed=0)
     inputs, y = _spectra(64, 1)
     with pytest.raises(FloatingPointError, match="learning_rate inf is too high"):
-        train_network(net, Lessons(inputs, y), _spectra(64, 2), Course(1, batch=32, learning_rate=float("inf")), seed=0)
+        train_network(
+            net,
+            TrainingData(inputs, y),
+            _spectra(64, 2),
+            TrainingOptions(1, batch=32, learning_rate=float("inf")),
+            seed=0,
+        )
 
 
 def test_half_precision_in_memory_gives_what_its_values_give_in_full():
@@ -416,7 +428,7 @@ def test_half_precision_in_memory_gives_what_its_values_give_in_full():
     states = []
     for given_inputs in (half, full):
         net = SpectrumNet(SHAPES, seed=0)
-        train_network(net, Lessons(given_inputs, y), (given_inputs, y), Course(1, batch=32), seed=0)
+        train_network(net, TrainingData(given_inputs, y), (given_inputs, y), TrainingOptions(1, batch=32), seed=0)
         states.append(network_scores(net, given_inputs))
     assert np.array_equal(*states)
 
@@ -504,7 +516,7 @@ def _refuse_network(change):
             validation = value
         else:
             (lessons if name in ("inputs", "labels", "kinds", "teacher") else course)[name] = value
-    train_network(SpectrumNet(SHAPES, seed=0), Lessons(**lessons), validation, Course(**course), seed=0)
+    train_network(SpectrumNet(SHAPES, seed=0), TrainingData(**lessons), validation, TrainingOptions(**course), seed=0)
 
 
 @pytest.mark.parametrize(

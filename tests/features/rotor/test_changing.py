@@ -168,7 +168,7 @@ def test_rotors_told_apart_as_steady_ones_are_fitted_anew_where_they_change():
 
 @pytest.mark.parametrize(("snr_db", "apart"), [(10.0, 0.001), (20.0, 0.0)])
 def test_rotors_that_change_alike_have_true_deviations_as_well(snr_db, apart):
-    """Straightened alike they were several steady ones, off by several deviations where not quite alike."""
+    """Resampled alike they were several steady ones, off by several deviations where not quite alike."""
     off = []
     for seed in range(12):
         rng = np.random.default_rng(seed)

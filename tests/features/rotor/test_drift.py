@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
-from bladewing.features.rotor.drift import ahead_left, straightened
+from bladewing.features.rotor.drift import ahead_left, resampled
 from bladewing.features.rotor.family import find_family
 from bladewing.features.rotor.periodogram import prepared
 from bladewing.features.rotor.slow_lines import remove_bands
@@ -101,7 +101,7 @@ def measured_both_ways(iq: np.ndarray, monkeypatch) -> tuple:
     """What is measured, and what would be without a thought of change."""
     found = measure(iq, **records.RADAR)
     with monkeypatch.context() as without:
-        without.setattr("bladewing.features.rotor.family.straightened", lambda *_, **__: None)
+        without.setattr("bladewing.features.rotor.family.resampled", lambda *_, **__: None)
         return found, measure(iq, **records.RADAR)
 
 
@@ -135,7 +135,7 @@ def test_the_drift_of_several_steady_rotors_is_none_and_of_rotors_not_told_apart
 
 
 def test_a_small_change_that_is_left_comes_with_its_sign_and_size(monkeypatch):
-    monkeypatch.setattr("bladewing.features.rotor.family.straightened", lambda *_, **__: None)
+    monkeypatch.setattr("bladewing.features.rotor.family.resampled", lambda *_, **__: None)
     for change in (-0.0004, 0.0004):
         data, family = family_of(one_rotor(4, change, snr_db=10.0)[0])
         assert family.data is data
@@ -188,7 +188,7 @@ def test_straightened_to_its_ends():
     data = prepared(iq, spectrum)
     found = find_family(data, spectrum)[0]
     noise = np.sqrt(spectrum.floor)
-    even = straightened(data, found.comb, found.edge, least_gain=0.0)
+    even = resampled(data, found.comb, found.edge, least_gain=0.0)
     # an even rotor has turned as far, on the mean over the dwell
     error = even.samples * noise - remove_bands(comb(time + change * records.PULSES / 24), data.strong.bands)
     ends = np.abs(time) > 0.495 * records.PULSES

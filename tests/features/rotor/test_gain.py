@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bladewing.features import measure
 from bladewing.features.rotor.family import GAIN_SHARE, ONE_GAIN_SHARE
-from bladewing.features.rotor.gain import LEAST_GAIN, Evened, gain_left
+from bladewing.features.rotor.gain import LEAST_GAIN, GainCorrected, gain_left
 from bladewing.features.rotor.periodogram import prepared
 from bladewing.features.spectrum import doppler_spectrum
 
@@ -107,10 +107,10 @@ def test_what_was_evened_has_lines_of_one_strength_and_says_how_loud_its_ends_ar
     spectrum = doppler_spectrum(iq, carrier_hz=CARRIER_HZ, prf_hz=PRF_HZ)
     data = prepared(iq, spectrum)
     # the line itself is taken for a body and is gone; put one where it can be seen
-    even = Evened.of(data, spectrum).by(gain).record
+    even = GainCorrected.of(data, spectrum).by(gain).record
     noise = gain**-2.0
     assert even.ends_noise == pytest.approx(float((AWAY**2 * noise).mean() / (AWAY**2).mean() / noise.mean()), rel=1e-3)
-    assert Evened.of(data, spectrum).by(np.full(PULSES, 3.0)).record.ends_noise == pytest.approx(1.0)
+    assert GainCorrected.of(data, spectrum).by(np.full(PULSES, 3.0)).record.ends_noise == pytest.approx(1.0)
     assert np.mean(np.abs(even.samples) ** 2) == pytest.approx(1.0, abs=5 / np.sqrt(PULSES))
 
 
