@@ -10,7 +10,7 @@ unlike_blades, comb
     that line is, whether all lines lie on one side of it; or why there is no comb.
 comb_fit, weak_lines, turning, turning_lines, drift, changing, changing_fit
     Fits of combs to a fraction of a bin: at steady rates, of blades not quite alike, at rates that change in the dwell.
-gain, rotors, meeting, unresolved, points, left_flashes, like_lines, flash_count, helicopter
+gain, candidate_rates, rotors, meeting, unresolved, points, left_flashes, like_lines, flash_count, helicopter
     A gain that all lines share; separation of single rotors; whether all rotors were found, whether blades are rows of
     a few points, whether the comb of a lone rotor is that of its rotation rate; a main and a tail rotor.
 line_shapes, line_likelihood, rotor_band, family_edge, past_edge

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from ..evidence import MOST_SNRS, Evidence, line_evidence
 from ..lines import from_whole, sum_of_lines
+from .candidate_rates import MOST_GEAR
 from .comb import Comb, powers_over_noise
 from .comb_fit import CombFit, fit_combs
 from .comb_scores import heights, running_sums, score
 from .comb_search import FINE_STEPS, Candidate, factors_about, spacing_limits
 from .periodogram import LEAST_LEVEL, Periodogram, local_level
-from .rotors import MOST_GEAR, Rotors, separate_rotors
+from .rotors import Rotors, separate_rotors
 from .slow_lines import remove_bands
 from .unlike_blades import strong_multiple
 from .unresolved import judged

@@ -11,36 +11,19 @@ from numpy.typing import NDArray
 
 from ..bodies import LINE_DB
 from ..lines import energy, squared
+from .candidate_rates import FURTHEST_SPREAD, GEAR_FACTOR, INNER_ORDERS, RATE_SPREAD, is_between, is_twice, lines_apart
 from .comb import Comb
 from .comb_fit import CombFit, fit_combs
 from .comb_scores import even_scores
 from .flashes import LEAST_LINES, flash_nats
 from .periodogram import Level, Periodogram
-from .unlike_blades import MOST_BLADES, UNEQUAL_FACTOR, strong_multiple
+from .unlike_blades import MOST_BLADES, UNEQUAL_FACTOR
 
 #: Most rotors sought.
 MAX_ROTORS = 8
 
-#: RATE_SPREAD: how far the rates of one airframe's rotors lie from those known in hover, relative. FURTHEST_SPREAD: the
-#: same from the first comb's rate in a manoeuvre or for unlike rotors; these rates are sought by their first
-#: INNER_ORDERS orders, which resolve them already.
-RATE_SPREAD, FURTHEST_SPREAD, INNER_ORDERS = 0.05, (-0.25, 0.33), 10
-
-#: A candidate is twice a rotor's rate if its half-integer orders, out to HALF_ORDERS and away from known lines, are
-#: also occupied: their HALF_QUANTILE power exceeds HALF_SHARE of that at its integer orders and HALF_POWER times the
-#: noise.
-HALF_ORDERS, HALF_SHARE, HALF_POWER, HALF_QUANTILE = 6, 0.05, 4.0, 0.3
-
-#: A candidate consists of lines of a known rotor's unlike blades if the other multiples of that rotation rate have
-#: HALF_QUANTILE power above BETWEEN_SHARE of its own lines' and BETWEEN_POWER times the noise. (False rotors had half
-#: and more, real ones a fiftieth.)
-BETWEEN_SHARE, BETWEEN_POWER = 0.25, 1.0
-
 #: A candidate may share every third to fifth line of a rotor whose rate is one of these times the candidate's.
 RATIOS = np.array([2 / 3, 3 / 4, 4 / 5, 5 / 4, 4 / 3])
-
-#: Places within NEAR_BINS of a known line do not count in these tests; LEAST_BETWEEN places must be left.
-NEAR_BINS, LEAST_BETWEEN = 2.0, 4
 
 #: Least reach of a rotor of a far rate, as a share of the furthest reach of the rotors found: a shorter one is residue
 #: of unresolved rotors.
@@ -71,11 +54,6 @@ JOINT_STEPS, LAST_STEPS, FURTHER_STEPS = 2, 1, 4
 
 #: The joint fit is repeated until its residual exceeds FITTED_SHARE of the one before, MOST_FITS times at most.
 FITTED_SHARE, MOST_FITS = 0.9, 8
-
-#: A tail rotor turns at most MOST_GEAR times as fast as its main rotor. A comb at a fraction of its rate, which may lie
-#: among the rates sought, has lines at every so-many-th order only: these have GEAR_FACTOR times the power of the
-#: others (20 times and more where a tail is 8 dB under a main rotor of 5 dB, up to 8 where rotors' lines cross).
-MOST_GEAR, GEAR_FACTOR = 9, 12.0
 
 #: Lines are sought out to this multiple of the family's edge: further out, residue of strong ones may pass for more.
 FURTHEST = 1.5
@@ -120,48 +98,6 @@ class Rotors:
     next_rate: float
     row_edge: tuple[float, float] | None = None
     unseen: float = 0.0
-
-
-def _low_power(rest: Periodogram, places: NDArray[np.float64], fits: Sequence[CombFit]) -> float:
-    """Power exceeded at most places away from known lines (`HALF_QUANTILE`); 0 where few such places are left."""
-    known = np.concatenate([fit.frequencies for fit in fits])
-    near = np.abs(places[:, None] - known).min(axis=1) * rest.pulses
-    places = places[rest.usable(places) & (near > NEAR_BINS)]
-    return float(np.quantile(rest.at(places), HALF_QUANTILE)) if len(places) >= LEAST_BETWEEN else 0.0
-
-
-def _is_twice(rest: Periodogram, centre: float, rate: float, fits: Sequence[CombFit]) -> bool:
-    """True where a comb's half-integer inner orders are occupied too: its rate is then twice a rotor's."""
-    order = np.arange(-HALF_ORDERS, HALF_ORDERS, dtype=float)
-    own, half = (_low_power(rest, centre + rate * tried, fits) for tried in (order, order + 0.5))
-    return half > max(HALF_SHARE * own, HALF_POWER)
-
-
-def _is_between(rest: Periodogram, centre: float, rate: float, fits: Sequence[CombFit], reach: int) -> bool:
-    """True where a comb's lines are some of those that a known rotor's unlike blades have at its rotation rate.
-
-    Unlike blades have lines at every multiple of the rotation rate, a further rotor only at multiples of its own rate.
-    Like rotors not found yet have such lines too, so rates need only agree to within `RATE_SPREAD`.
-    """
-    for known in (fit.spacing for fit in fits):
-        for parts in range(2, MOST_BLADES + 1):
-            times = round(rate / known * parts)
-            if np.gcd(times, parts) > 1 or abs(rate * parts / (times * known) - 1) > RATE_SPREAD:
-                continue
-            last = min(HALF_ORDERS, reach) * parts
-            order = np.arange(-last, last + 1)
-            order = order[order % parts != 0]
-            is_own = order % times == 0
-            own, other = (_low_power(rest, centre + rate / times * order[some], fits) for some in (is_own, ~is_own))
-            if own > 0 and other > max(BETWEEN_SHARE * own, BETWEEN_POWER):
-                return True
-    return False
-
-
-def _lines_apart(fit: CombFit, pulses: int, factor: float) -> int:
-    """Every how many-th line of a comb is occupied; more than 1 means a rotor at that multiple of the rate."""
-    power = 1 + pulses * np.abs(fit.amplitudes) ** 2
-    return strong_multiple(fit.orders, power, range(2, MOST_GEAR + 1), factor)
 
 
 def powers_of(fits: Sequence[CombFit]) -> list[float]:
@@ -328,9 +264,9 @@ class Separation:
 
     def join(self, one: Sought) -> _Verdict:
         """Add a candidate if it is a rotor's."""
-        if one.is_apart and _is_twice(self.rest, self.centre, one.rate, self.fits):
+        if one.is_apart and is_twice(self.rest, self.centre, one.rate, self.fits):
             one = replace(one, rate=one.rate / 2, reach=2 * one.reach)
-        if one.is_apart and _is_between(self.rest, self.centre, one.rate, self.fits, self.reach):
+        if one.is_apart and is_between(self.rest, self.centre, one.rate, self.fits, self.reach):
             return _NO_ROTOR
         rate, reach = one.rate, one.reach
         same = [abs(rate - known) < self.resolution for known in self.rates]
@@ -349,7 +285,7 @@ class Separation:
         if fitted is None:
             return _NO_ROTOR
         together, _ = fitted
-        if self.fits and _lines_apart(together[-1], self.data.pulses, GEAR_FACTOR) > 1:
+        if self.fits and lines_apart(together[-1], self.data.pulses, GEAR_FACTOR) > 1:
             self.seeks_apart &= not one.is_apart
             return _NO_ROTOR
         if nearer_than(together, self.resolution):
@@ -398,7 +334,7 @@ class Separation:
         """
         for known in 2 * self.rates:  # twice: some show only once others are whole
             number = int(np.abs(np.array(self.rates) - known).argmin())
-            times = _lines_apart(self.fits[number], self.data.pulses, UNEQUAL_FACTOR) if len(self.fits) > 1 else 1
+            times = lines_apart(self.fits[number], self.data.pulses, UNEQUAL_FACTOR) if len(self.fits) > 1 else 1
             if times == 1:
                 continue
             whole = times * self.rates[number]

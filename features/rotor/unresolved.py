@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..lines import from_whole, squared
+from .candidate_rates import RATE_SPREAD
 from .comb import Comb
 from .comb_fit import CombFit
 from .flash_count import FLASH_PADDING, FLASH_WIDTH, flashes_in_period
@@ -16,7 +17,7 @@ from .left_flashes import others_flash
 from .like_lines import like_shares
 from .periodogram import Periodogram
 from .points import fit_points
-from .rotors import RATE_SPREAD, RESOLVED_BINS, TWO_POWER, Rotors, may_hold
+from .rotors import RESOLVED_BINS, TWO_POWER, Rotors, may_hold
 from .unlike_blades import blade_numbers
 
 #: A rotor flashes once a period on each side of the body. A second flash of SECOND_FLASH_SHARE of the first one's
