@@ -43,9 +43,6 @@ _TWO_TRUE = np.array([True, True]).view(np.uint16)
 #: If samples have fewer different sizes than this, the converter hardly steps at all: it may give 0 most of the time.
 LEAST_DISTINCT = 8
 
-#: Fewer samples other than 0 than this do not tell whether a converter gave the zeros: long runs of them are silence.
-LEAST_HELD = 64
-
 #: If samples were turned in phase, or their channels corrected, the converter's steps show only near 0. They show if
 #: two or more samples have the smallest size, to the share SAME_SIZE of it, and that size is no more than AS_NEAR times
 #: the distance to any other sample, or the next size is larger by the factor NEXT_SIZE. That size is then the step.
@@ -236,7 +233,7 @@ def _silences(iq: NDArray[np.complex64]) -> tuple[NDArray[np.intp], NDArray[np.i
     long = lengths > MOST_IN_A_ROW
     if lengths.max(initial=0) == len(iq):
         long[:] = False
-    elif long.any() and len(iq) - lengths.sum() >= LEAST_HELD and _hardly_steps(*_sorted_steps(_sizes(iq)[~zero])):
+    elif long.any() and _hardly_steps(*_sorted_steps(_sizes(iq)[~zero])):
         # a converter that hardly steps is often 0: does the share of zeros elsewhere give so long a run by chance?
         others = len(iq) - int(lengths[long].sum())
         share = int(lengths[~long].sum()) / others

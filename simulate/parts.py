@@ -45,7 +45,7 @@ BOUNDS = {
     "high_pass_hz": (1e-6, 1e9),
     "canceller_pulses": (2, 3),
     "adc_bits": (1, 24),
-    "spur_count": (1, SPURS),
+    "spur_count": (0.5, SPURS + 0.5),  # as the law draws it: it is rounded
     "step_count": (1, MAX_STEPS),
 }
 
