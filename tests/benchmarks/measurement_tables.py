@@ -21,6 +21,7 @@ from bladewing.simulate.laws import WIDTH, Draws
 from bladewing.simulate.receiver import FAULT_CHANCE, Receiver
 from scipy.stats import chi2
 
+from ..features.signals import crowded
 from . import records
 
 RECORDINGS = Path(__file__).parents[3] / "shared" / "recordings"
@@ -246,6 +247,19 @@ def _told_apart(measured: Iterable[tuple[np.ndarray, Measurements, float]]) -> s
     )
 
 
+def crowded_rotors(draws: int) -> None:
+    """Four steady rotors whose lines are half as many as the pulses: resolved, rates and deviations."""
+    print(f"four rotors at 24 GHz within 6 %, at least 0.4 % apart, 20 dB, four flashes in 80 ms, {draws} draws")
+    print(_TOLD_APART)
+    rows = []
+    for seed in range(draws):
+        iq, radar, chopping_hz = crowded(seed)
+        start = thread_time()
+        found = measure(iq, **radar)
+        rows.append((chopping_hz / 2, found, 1e3 * (thread_time() - start)))
+    print(_told_apart(rows), flush=True)
+
+
 def near_rotors(draws: int) -> None:
     """Two rotors closer than the dwell resolves: to be reported as unresolved or as one rate, never as too many."""
     print(f"two rotors so far apart, {draws} draws a row: rates given, resolved, median of the spread")
@@ -469,6 +483,7 @@ TABLES = {
     "chopping": chopping,
     "bandwidth": bandwidth,
     "rotors": single_rotors,
+    "crowded-rotors": crowded_rotors,
     "near-rotors": near_rotors,
     "drifting": drifting,
     "changing": changing,

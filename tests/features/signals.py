@@ -7,7 +7,7 @@ from bladewing.features.rotor.periodogram import Periodogram, prepared
 from bladewing.features.spectrum import doppler_spectrum
 from bladewing.simulate import RotorMotion, rotor_echo
 
-from ..benchmarks.records import CARRIER_HZ, PRF_HZ, PULSES, RADAR, TIMES_S, WAVELENGTH_M, moving_at, white
+from ..benchmarks.records import CARRIER_HZ, PRF_HZ, PULSES, RADAR, TIMES_S, WAVELENGTH_M, apart, moving_at, white
 
 __all__ = ["CARRIER_HZ", "PRF_HZ", "PULSES", "RADAR", "TIMES_S", "WAVELENGTH_M", "moving_at", "white"]
 
@@ -42,6 +42,17 @@ def rotors_by_chance(
         one = rotor_echo(angle_rad, wavelength_m=wavelength_m, blade_length_m=length_m, points=points)
         echo += one * np.exp(2j * np.pi * rng.uniform())
     return echo / np.sqrt(np.mean(np.abs(echo) ** 2))
+
+
+def crowded(seed: int) -> tuple[np.ndarray, dict[str, float], np.ndarray]:
+    """Four steady rotors at 24 GHz, whose lines are half as many as the pulses: record, radar, chopping frequencies."""
+    rng, pulses, radar = np.random.default_rng(seed), 800, {"carrier_hz": 24e9, "prf_hz": 10e3}
+    times_s, wavelength_m = np.arange(pulses) / radar["prf_hz"], 299_792_458.0 / radar["carrier_hz"]
+    rates_hz = rng.uniform(23.5, 27) * (1 + apart(rng, 4, 0.004, -0.03, 0.03))
+    echo = 10 * rotors_by_chance(rng, rates_hz, times_s, wavelength_m=wavelength_m, length_m=0.12)
+    body = 32 * np.exp(2j * np.pi * rng.uniform())
+    iq = (echo + body) * moving_at(rng.uniform(-8, 8), times_s, wavelength_m) + white(rng, pulses)
+    return iq.astype(np.complex64), radar, 2 * rates_hz
 
 
 def folded(

@@ -10,7 +10,7 @@ from bladewing.simulate import Scene, rotor_echo
 
 from ...benchmarks import records
 from .. import signals
-from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, moving_at, rotors_by_chance, white
+from ..signals import CARRIER_HZ, PRF_HZ, PULSES, WAVELENGTH_M, crowded, white
 
 
 @pytest.mark.parametrize("snr_db", [0.0, 20.0])
@@ -141,22 +141,11 @@ def test_a_stronger_blade_is_no_second_rotor_where_few_orders_show(blades):
         assert not (found.rotors_resolved and found.rotor_count > 1)
 
 
-def dense(seed: int) -> tuple[np.ndarray, dict[str, float], np.ndarray]:
-    """Four steady rotors at 24 GHz, whose lines are half as many as the pulses: record, radar, rates."""
-    rng, pulses, radar = np.random.default_rng(seed), 800, {"carrier_hz": 24e9, "prf_hz": 10e3}
-    time_s, wavelength_m = np.arange(pulses) / radar["prf_hz"], 299_792_458.0 / radar["carrier_hz"]
-    rates_hz = rng.uniform(23.5, 27) * (1 + records.apart(rng, 4, 0.004, -0.03, 0.03))
-    echo = 10 * rotors_by_chance(rng, rates_hz, time_s, wavelength_m=wavelength_m, length_m=0.12)
-    body = 32 * np.exp(2j * np.pi * rng.uniform())
-    iq = (echo + body) * moving_at(rng.uniform(-8, 8), time_s, wavelength_m) + white(rng, pulses)
-    return iq.astype(np.complex64), radar, 2 * rates_hz
-
-
 def test_steady_rotors_of_many_lines_are_not_told_as_changing_ones() -> None:
     """Fits that had not come to their end passed for rates that change, 5 of 11 sets told off by 5 to 16 deviations."""
     told = wrong = 0
     for seed in range(16):
-        iq, radar, rates_hz = dense(seed)
+        iq, radar, rates_hz = crowded(seed)
         found = measure(iq, **radar)
         if found.rotors_resolved and found.rotor_count == 4:
             told += 1
