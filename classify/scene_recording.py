@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import re
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,7 @@ import numpy as np
 from .errors import BadInput, unwritable
 from .files import read_bounded, settle, write_together
 from .limits import MOST_TEXT_BYTES
+from .sigmf_file import ARCHIVES, DATA, META
 
 if TYPE_CHECKING:
     from bladewing.simulate.render import Rendering
@@ -49,7 +49,7 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
         The folder is missing or cannot be written to, a sample is not finite, or a recording of that name was not made
         by a rendering.
     """
-    name = re.sub(r"\.sigmf(-meta|-data|\.gz|\.xz|\.zip)?$", "", stem.name)
+    name = stem.name.removesuffix(next(filter(stem.name.endswith, (META, DATA, *ARCHIVES)), ""))
     if not name or name == "..":
         raise BadInput(f"{stem}: no name for the recording: give --out NAME")
     if stem.is_dir():
@@ -58,12 +58,12 @@ def write_rendering(stem: Path, rendering: "Rendering", scene: "Scene", seed: in
         raise BadInput(f"{stem}: the scene's samples exceed what complex64 holds: lower its levels")
     with suppress(OSError):  # a folder that is missing or cannot be written to is refused below
         settle(stem.parent)
-    if foreign := _foreign(stem.parent / f"{name}.sigmf-meta", stem.parent / f"{name}.sigmf-data"):
+    if foreign := _foreign(stem.parent / f"{name}{META}", stem.parent / f"{name}{DATA}"):
         raise BadInput(f"{foreign} is there and was not simulated: it is not written over: give another --out NAME")
     data = rendering.iq.astype("<c8").tobytes()
     meta = metadata(rendering, scene, seed, hashlib.sha512(data).hexdigest())
     text = json.dumps(meta, indent=2, allow_nan=False) + "\n"
-    files: dict[str, bytes | str] = {f"{name}.sigmf-data": data, f"{name}.sigmf-meta": text}
+    files: dict[str, bytes | str] = {f"{name}{DATA}": data, f"{name}{META}": text}
     try:
         write_together(stem.parent, files)
     except OSError as error:

@@ -23,7 +23,7 @@ from .samples import positive
 if TYPE_CHECKING:
     from sigmf import SigMFFile
 
-_META, _DATA = ".sigmf-meta", ".sigmf-data"
+META, DATA = ".sigmf-meta", ".sigmf-data"
 
 #: Field of a capture: index of its first sample in all that the receiver gave.
 _INDEX = "core:global_index"
@@ -78,13 +78,13 @@ def find_sigmf(path: Path) -> Path | None:
         return path if path.is_file() else None
     with suppress(OSError):
         settle(path.parent)  # finishes a pair of files that was left half written
-    if path.name.endswith((_META, _DATA)):
+    if path.name.endswith((META, DATA)):
         stem, missing = path.with_suffix(""), f"{path}: no such file"
     elif path.is_file() or not path.name:
         return None
     else:
         stem, missing = path, ""
-    meta, data = (stem.with_name(stem.name + suffix) for suffix in (_META, _DATA))
+    meta, data = (stem.with_name(stem.name + suffix) for suffix in (META, DATA))
     if meta.is_file():
         return meta
     if data.is_file():
@@ -114,7 +114,7 @@ def read_sigmf(path: Path) -> SigmfSamples:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # what matters of the library's warnings is an error below
         try:
-            return _read_pair(path) if path.name.endswith(_META) else _read_archive(path)
+            return _read_pair(path) if path.name.endswith(META) else _read_archive(path)
         except OSError as error:
             raise unreadable(path, error) from None
 
@@ -146,7 +146,7 @@ def _read_pair(path: Path) -> SigmfSamples:
         what = "a number in it has thousands of digits" if "digits" in str(error) else str(error)
         raise BadInput(f"{path}: cannot be read: {what}: write the metadata again") from None
     _check_structure(metadata, path)
-    data = path.with_suffix(_DATA)
+    data = path.with_suffix(DATA)
     if metadata["global"].get("core:dataset"):
         raise BadInput(
             f"{path}: core:dataset names a file that is not SigMF ({metadata['global']['core:dataset']!r}): "
@@ -204,11 +204,11 @@ def _bounded_archive(path: Path) -> dict[str, Any]:
 
 def _require_one(names: list[str], path: Path) -> None:
     """Refuse an archive of anything but one recording's two files: which of several is meant, nobody can tell."""
-    metas, datas = ([name for name in names if name.endswith(suffix)] for suffix in (_META, _DATA))
+    metas, datas = ([name for name in names if name.endswith(suffix)] for suffix in (META, DATA))
     if len(metas) != 1 or len(datas) != 1:
-        held = f"{len(metas)} files {_META} and {len(datas)} files {_DATA}"
+        held = f"{len(metas)} files {META} and {len(datas)} files {DATA}"
         raise BadInput(f"{path}: the archive holds {held}: pack each recording, one of each, in an archive of its own")
-    if metas[0].removesuffix(_META) != datas[0].removesuffix(_DATA):
+    if metas[0].removesuffix(META) != datas[0].removesuffix(DATA):
         raise BadInput(f"{path}: {metas[0]} and {datas[0]} are not one recording: give them one name")
 
 

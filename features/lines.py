@@ -162,14 +162,14 @@ def line_products(
     for begin in range(0, count, rows := max(1, PRODUCTS_AT_ONCE // max(count, 1))):
         some = slice(begin, begin + rows)
         low_sine, low_cosine = low_rows[some] @ low_sines, low_rows[some] @ low_cosines
-        near = np.abs(low_sine) < 1e-5 / pulses
+        near = np.nonzero(np.abs(low_sine) < 1e-5 / pulses)  # hardly more than each line and itself
         low_sine[near] = 1.0
         over = np.divide(1, low_sine, out=low_sine)
         ratio = np.multiply(low_cosine, over, out=low_cosine)
         own = np.matmul(top_rows[some], top_sines, out=plain[some])
         own *= over
         # lines whole PRFs apart are one, but for a sign: -1 at odd PRFs where time counts from between two pulses
-        turns = np.rint(np.subtract.outer(frequency[some], frequency)[near])
+        turns = np.rint(frequency[some][near[0]] - frequency[near[1]])
         sign = 1.0 - 2.0 * (np.abs(turns) % 2) * (pulses % 2 == 0)
         own[near] = sign
         timed = np.matmul(top_rows[some], top_cosines, out=first[some])

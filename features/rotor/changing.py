@@ -15,7 +15,7 @@ from .changing_fit import ChangingFit, Start, fit_changing, most_lines
 from .comb import Comb
 from .comb_fit import CombFit, fit_combs
 from .periodogram import Periodogram
-from .rotors import RESOLVED_BINS, Rotors, Separation, Sought, nearer_than
+from .rotors import Rotors, Separation, Sought, nearer_than, resolution
 from .slow_lines import remove_bands
 from .turning import DEGREES, FIRST_DEGREES, Resampling, even_change, late_by, margin_of
 from .unresolved import LEFT_WANDERING, left_over, power_about
@@ -64,12 +64,10 @@ def as_steady(data: Periodogram, apart: Rotors) -> Rotors | None:
     numbers = len(fits) * len(DEGREES)
     if steady is None or energy(steady[1]) - energy(apart.rest) > STEADY_FALL * numbers:
         return None
-    known, rest = sorted(steady[0], key=lambda fit: fit.spacing), steady[1]
-    reach = max(max(map(abs, fit.reach)) for fit in known)
-    if nearer_than(known, RESOLVED_BINS / (reach * data.pulses)):
+    reach = max(max(map(abs, fit.reach)) for fit in steady[0])
+    if nearer_than(steady[0], resolution(data.pulses, reach)):
         return None
-    rates, stds = np.array([fit.spacing for fit in known]), np.array([fit.spacing_std for fit in known])
-    return replace(apart, rates=rates, stds=stds, spread=float(np.ptp(rates)), fits=known, rest=rest)
+    return Rotors.of(*steady, resolved=apart.resolved, next_rate=apart.next_rate)
 
 
 class ChangingSeparation(Separation):

@@ -5,6 +5,7 @@ Rotors of nearly equal rates are resolved at the high orders, where their lines 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,11 @@ FURTHEST = 1.5
 RESOLVED_BINS = 0.9
 
 
+def resolution(pulses: int, reach: int) -> float:
+    """Least difference of two rates that is resolved by lines out to an order [cycles a sample]."""
+    return RESOLVED_BINS / (reach * pulses)
+
+
 @dataclass(frozen=True)
 class Rotors:
     """Single rotors of one record.
@@ -98,6 +104,21 @@ class Rotors:
     next_rate: float
     row_edge: tuple[float, float] | None = None
     unseen: float = 0.0
+
+    @classmethod
+    def of(
+        cls,
+        fits: Sequence[CombFit],
+        rest: NDArray[np.complex128],
+        *,
+        resolved: bool,
+        next_rate: float,
+        least_spread: float = 0.0,
+    ) -> Self:
+        """Those of some combs, one each."""
+        rising = sorted(fits, key=lambda fit: fit.spacing)
+        rates, stds = np.array([(fit.spacing, fit.spacing_std) for fit in rising]).T.copy()
+        return cls(rates, stds, resolved, max(float(np.ptp(rates)), least_spread), rising, rest, next_rate)
 
 
 def powers_of(fits: Sequence[CombFit]) -> list[float]:
@@ -180,7 +201,7 @@ class Separation:
         self.data, self.comb, self.centre = data, comb, centre
         self.nominal = comb.chopping
         self.reach = reach
-        self.resolution = RESOLVED_BINS / (reach * data.pulses)
+        self.resolution = resolution(data.pulses, reach)
         self.furthest = min(FURTHEST * self.nominal * reach, 0.5)
         self.fits: Sequence[CombFit] = []
         self.reaches: list[int] = []
@@ -231,7 +252,7 @@ class Separation:
         If such rates were not sought, their lines would pass for combs of rates in between that have only every third
         or fourth line. Where unresolved lines fill all places, no far rate gains evidence.
         """
-        step = max(RESOLVED_BINS / (4 * INNER_ORDERS * self.data.pulses), self.resolution / 4)
+        step = max(resolution(self.data.pulses, INNER_ORDERS), self.resolution) / 4
         low, high = FURTHEST_SPREAD
         rates = np.arange(self.nominal * (1 + low), self.nominal * (1 + high), step)
         rates = rates[np.abs(rates / self.nominal - 1) > RATE_SPREAD]
@@ -441,10 +462,6 @@ def separate_rotors(data: Periodogram, comb: Comb, edge: float, how: type[Separa
         return left_open if last.unresolved else alone
     found.fit_out(LAST_STEPS)
     found.make_whole()
-    fits = sorted(found.fits, key=lambda fit: fit.spacing)
-    rates = np.array([fit.spacing for fit in fits])
-    spread = float(np.ptp(rates))
-    if last.unresolved:
-        spread = max(last.spread, spread, found.resolution)
-    stds = np.array([fit.spacing_std for fit in fits])
-    return Rotors(rates, stds, not last.unresolved, spread, fits, found.rest.samples, rate)
+    least = max(last.spread, found.resolution) if last.unresolved else 0.0
+    resolved = not last.unresolved
+    return Rotors.of(found.fits, found.rest.samples, resolved=resolved, next_rate=rate, least_spread=least)

@@ -17,7 +17,7 @@ from .left_flashes import others_flash
 from .like_lines import like_shares
 from .periodogram import Periodogram
 from .points import fit_points
-from .rotors import RESOLVED_BINS, TWO_POWER, Rotors, may_hold
+from .rotors import TWO_POWER, Rotors, may_hold, resolution
 from .unlike_blades import blade_numbers
 
 #: A rotor flashes once a period on each side of the body. A second flash of SECOND_FLASH_SHARE of the first one's
@@ -320,5 +320,5 @@ def judged(
 def marked_unresolved(rotors: Rotors, data: Periodogram, apart: float = 0.0) -> Rotors:
     """The rotors marked unresolved; their spread is at least what the dwell resolves, and `apart` [cycles a sample]."""
     reach = max(rotors.fits[0].outermost, 1)
-    least = RESOLVED_BINS / (reach * data.pulses)
+    least = resolution(data.pulses, reach)
     return replace(rotors, resolved=False, spread=max(rotors.spread, least, apart))

@@ -45,8 +45,7 @@ class Case:
             blades = sum(np.exp(-0.5j * reach) * np.sinc(reach / 2 / np.pi) for reach in reach_rad)
             blades *= 10 ** (ROTOR_DB / 20) / np.sqrt(np.mean(np.abs(blades) ** 2))
             iq += blades * np.exp(-1j * moved_rad - 1j * rng.uniform(0, 6))
-        iq += (rng.standard_normal(self.pulses) + 1j * rng.standard_normal(self.pulses)) / np.sqrt(2)
-        return iq.astype(np.complex64)
+        return (iq + records.white(rng, self.pulses)).astype(np.complex64)
 
 
 NO_GROUND_DB = -99.0
