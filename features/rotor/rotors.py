@@ -115,7 +115,7 @@ class Rotors:
         next_rate: float,
         least_spread: float = 0.0,
     ) -> Self:
-        """Those of some combs, one each."""
+        """Rotors of these combs, one rotor per comb, their rates rising."""
         rising = sorted(fits, key=lambda fit: fit.spacing)
         rates, stds = np.array([(fit.spacing, fit.spacing_std) for fit in rising]).T.copy()
         return cls(rates, stds, resolved, max(float(np.ptp(rates)), least_spread), rising, rest, next_rate)
