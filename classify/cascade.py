@@ -11,6 +11,7 @@ from .errors import BadInput
 from .inference import Classifier
 from .ladder import CASCADE, STAGES_KEY, shipped_account
 from .model_file import read_model
+from .rules import counted_pulses
 
 SURE = (0.95, 0.85, 0.85)
 """Least probability of each class (uav, bird, clutter) at which the fast model's answer stands. On records of the whole
@@ -84,7 +85,7 @@ class Cascade(Classifier):
         return cls(read_model(first), read_model(second), threads=threads, max_false_alarm=max_false_alarm)
 
     def sure(
-        self, probabilities: NDArray[np.float32], pulses: int | NDArray[np.integer] | None = None
+        self, probabilities: NDArray[np.float32], pulses: float | NDArray[np.number] | None = None
     ) -> NDArray[np.bool_]:
         """Where the first model's answer stands: a class reaches `SURE` and the acceptance thresholds of both models.
 
@@ -110,7 +111,7 @@ class Cascade(Classifier):
         out = []
         for dwells in dwells_of(records, carrier_hz=carrier_hz, prf_hz=prf_hz, names=self.inputs):
             told = self.first._answer(dwells.inputs(self.first.inputs))
-            rows = np.flatnonzero(~self.sure(told[:, :-1], records.shape[-1]))
+            rows = np.flatnonzero(~self.sure(told[:, :-1], counted_pulses(records.shape[-1], carrier_hz, prf_hz)))
             if len(rows):
                 asked = dwells if len(rows) == len(told) else dwells.rows(rows)
                 told[rows] = super()._answer(asked.inputs(self._reads))

@@ -14,6 +14,7 @@ from bladewing.simulate.dataset import RADAR_GROUP, Records
 from numpy.typing import NDArray
 
 from .parts import Parts
+from .rules import counted_pulses
 from .workers import in_order
 
 #: Records of one task: whole radar groups, so that no record is drawn twice.
@@ -56,6 +57,11 @@ class Gathered:
 
     def __len__(self) -> int:
         return len(self.labels)
+
+    @property
+    def pulses_counted(self) -> NDArray[np.float64]:
+        """Pulses of each record that count for the rules by which it is named."""
+        return counted_pulses(self.truth["pulses"], self.truth["carrier_hz"], self.truth["prf_hz"])
 
     def arrays(self) -> dict[str, NDArray]:
         """All of it as plain arrays by name."""

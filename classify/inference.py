@@ -37,7 +37,7 @@ from .model_file import (
     read_model,
     rules_by_pulses,
 )
-from .rules import Limits, Rule, Rules
+from .rules import Limits, Rule, Rules, counted_pulses
 from .samples import complex_samples, positive
 
 # One step of the work: bounded in records and in samples, so that memory stays flat however large the batch is.
@@ -236,7 +236,7 @@ class Classifier:
         return point
 
     def decide(
-        self, probabilities: NDArray[np.floating], pulses: int | NDArray[np.integer] | None = None
+        self, probabilities: NDArray[np.floating], pulses: float | NDArray[np.number] | None = None
     ) -> tuple[NDArray[np.str_], list[str]]:
         """Name a class or say "unknown", and why, by the rule that this classifier was loaded with.
 
@@ -245,11 +245,12 @@ class Classifier:
         probabilities
             Shape (records, 3), as `predict` gives them.
         pulses
-            Number of pulses of all records, or of each, shape (records,); None where there is none, as of a track.
+            Number of pulses of all records, or of each, shape (records,), that count (`rules.counted_pulses`); None
+            where there is none, as of a track.
         """
         limits: Limits | NDArray[np.float64]
-        if pulses is None or isinstance(pulses, int | np.integer):
-            rule = self._of_all if pulses is None else self.rules.of(int(pulses))
+        if pulses is None or np.ndim(pulses) == 0:
+            rule = self._of_all if pulses is None else self.rules.of(float(pulses))
             limits = rule.accept if self.coverage is None else rule.sets[self.coverage]
         else:
             limits = self.rules.accept(pulses) if self.coverage is None else self.rules.sets(pulses, self.coverage)
@@ -325,14 +326,16 @@ class Classifier:
         live = largest >= LEAST_PART
         if np.count_nonzero(live) == live.size:
             told = self._told(records, None, carrier_hz, prf_hz)
-            labels, why = self.decide(told[:, :-1], records.shape[-1])
+            labels, why = self.decide(told[:, :-1], counted_pulses(records.shape[-1], carrier_hz, prf_hz))
             return told, labels, np.array(why, dtype=np.str_)
         told, labels = _untold(len(records))
         reasons = np.full(len(records), "no signal: every sample is 0", dtype=object)
         reasons[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
         rows = np.flatnonzero(live)
         told[rows] = self._told(records, rows, carrier_hz, prf_hz)
-        labels[rows], reasons[rows] = self.decide(told[rows, :-1], records.shape[-1])
+        labels[rows], reasons[rows] = self.decide(
+            told[rows, :-1], counted_pulses(records.shape[-1], carrier_hz, prf_hz)
+        )
         return told, labels, reasons.astype(np.str_)
 
     def _of_stretches(

@@ -18,6 +18,7 @@ from .fusion import LOOKS, ODDS
 from .labels import CLASSES, UNKNOWN
 from .limits import DWELL_S
 from .recording import Recording
+from .rules import counted_pulses
 from .terminal import counted, print_table, print_words
 from .track import Track, carry_evidence, fuse
 
@@ -30,9 +31,9 @@ if TYPE_CHECKING:
 LONG_S = 5.0
 """Length of the start of a recording that `long_look` is given [s]."""
 
-# A track of fewer pulses is named by the thresholds of records of as many pulses. On tracks of 2 to 12 dwells of 64 to
-# 255 pulses, 85 to 93 in 100 named birds are right with these, 82 to 89 with the thresholds of all records. On tracks
-# of more pulses the thresholds of all records are the better ones.
+# A track of which fewer pulses count is named by the thresholds of records of as many. On tracks of 2 to 12 dwells of
+# 64 to 255 pulses, 85 to 93 in 100 named birds are right with these, 82 to 89 with the thresholds of all records. On
+# tracks of more pulses the thresholds of all records are the better ones.
 FEW_PULSES = 1024
 
 _SHOWN = {
@@ -226,7 +227,8 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
         looks = classifier.predict(joined, carrier_hz=recording.carrier_hz, prf_hz=recording.prf_hz)
         longer[length] = looks.probabilities, looks.labels
     seen = int(np.count_nonzero(carry_evidence(dwells.probabilities, dwells.labels)))
-    few = seen == 1 or seen * wanted < FEW_PULSES
+    pulses = float(counted_pulses(seen * wanted, recording.carrier_hz, recording.prf_hz))
+    few = seen == 1 or pulses < FEW_PULSES
     shown: dict[str, float] = {}
     if seen:
         shown = long_look(recording.iq[: round(LONG_S * recording.prf_hz)], recording.carrier_hz, recording.prf_hz)
@@ -237,7 +239,7 @@ def answer(recording: Recording, classifier: "Classifier", *, dwell_s: float = D
         dwells.labels,
         longer=longer,
         shown=shown,
-        rule=partial(classifier.decide, pulses=seen * wanted) if few else classifier.decide,
+        rule=partial(classifier.decide, pulses=pulses) if few else classifier.decide,
         dwell_s=min(wanted / recording.prf_hz, Envelope.dwell_max_s),  # in whole pulses it may be a trifle longer
     )
     stop_s = start_s + wanted / recording.prf_hz

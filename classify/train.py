@@ -234,14 +234,13 @@ def train_one(
     known = calibrated, sets.calibrate.labels
     precision, false_alarm = settings.precision, settings.false_alarm
     of_all = Rule.fitted(*known, precision=precision, false_alarm=false_alarm, coverages=COVERAGES)
-    of_pulses = sets.calibrate.truth["pulses"]
-    rules = Rules.fitted(*known, of_pulses, of_all, precision=precision, false_alarm=false_alarm)
+    rules = Rules.fitted(*known, sets.calibrate.pulses_counted, of_all, precision=precision, false_alarm=false_alarm)
     curve = operating_curve(*known)
     onnx_bytes = export(calibration)
     probabilities = calibration.probabilities(scores_of(sets.test))
     tolerance = NETWORK_TOLERANCE if network else TABULAR_TOLERANCE
     difference = check_export(onnx_bytes, probabilities, sets.test.inputs, tolerance)
-    labels, pulses = sets.test.labels, sets.test.truth["pulses"]
+    labels, pulses = sets.test.labels, sets.test.pulses_counted
     limits = np.array([rules.sets(pulses, coverage) for coverage in COVERAGES])
     account = {
         "inputs": list(LADDER[name].inputs),

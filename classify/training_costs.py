@@ -55,7 +55,7 @@ def add_costs(
         return None
     chosen_by = {}
     for name, classifier in classifiers.items():
-        said, accept = classifier.from_inputs(calibrate.inputs), classifier.rules.accept(calibrate.truth["pulses"])
+        said, accept = classifier.from_inputs(calibrate.inputs), classifier.rules.accept(calibrate.pulses_counted)
         chosen_by[name] = models[name] | {"test": figures(said, calibrate.labels, accept, false_alarm)}
     stages = [by_place(place, chosen_by) for place in ("fast", "best")]
     if stages[0] == stages[1]:
@@ -63,12 +63,12 @@ def add_costs(
     first, second = ((files[f"{name}.onnx"], name) for name in stages)
     cascade = Cascade(first, second)
     cheap, dear = (classifiers[name].from_inputs(test.inputs) for name in stages)
-    sure = cascade.sure(cheap, test.truth["pulses"])
+    sure = cascade.sure(cheap, test.pulses_counted)
     probabilities = np.where(sure[:, None], cheap, dear)
     return {
         STAGES_KEY: stages,
         "asked": round(float(np.mean(~sure)), 4),
-        "test": figures(probabilities, test.labels, cascade.rules.accept(test.truth["pulses"]), false_alarm)
+        "test": figures(probabilities, test.labels, cascade.rules.accept(test.pulses_counted), false_alarm)
         | {"expected_calibration_error": round(expected_calibration_error(probabilities, test.labels), 4)},
         COST_KEY: round(costs_ffts({CASCADE: cascade})[CASCADE], 1),
         "accept": list(cascade.accept),

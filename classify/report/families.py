@@ -109,7 +109,7 @@ def _trained(model: str, settings: TrainingConfig, sets: Mapping[str, Gathered])
 
     def answer(test: Gathered) -> tuple[NDArray[np.floating], NDArray[np.str_]]:
         probabilities = classifier.from_inputs(test.inputs)
-        return probabilities, classifier.decide(probabilities, test.truth["pulses"])[0]
+        return probabilities, classifier.decide(probabilities, test.pulses_counted)[0]
 
     return answer
 

@@ -19,7 +19,7 @@ from bladewing.classify.ladder import COST_KEY, by_place, shipped_account
 from bladewing.classify.model_file import COVERAGES
 from bladewing.classify.predict import answer
 from bladewing.classify.recording import Recording, load_recording
-from bladewing.classify.rules import Rule, Rules
+from bladewing.classify.rules import Rule, Rules, counted_pulses
 from bladewing.classify.training_account import figures
 from bladewing.features.wingbeat import wingbeat
 from bladewing.simulate import Radar, draw_records
@@ -59,7 +59,8 @@ def scored(
     for radar, (iq, truth) in zip(radars, drawn(radars, count, kind, purpose), strict=True):
         given = classifier.predict(iq, carrier_hz=radar.carrier_hz, prf_hz=radar.prf_hz)
         own = {"p": given.probabilities, "over_noise": over(given), "answer": given.labels}
-        parts.append({**own, "pulses": np.full(len(iq), radar.pulses), **truth})
+        pulses = np.full(len(iq), counted_pulses(radar.pulses, radar.carrier_hz, radar.prf_hz))
+        parts.append({**own, "pulses": pulses, **truth})
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 

@@ -14,6 +14,7 @@ from bladewing.classify.cli import main
 from bladewing.classify.export import EXPORTED, TOLERANCE, export_raw_iq
 from bladewing.classify.model_file import read_model
 from bladewing.classify.predict import terms
+from bladewing.classify.rules import counted_pulses
 from bladewing.features.dropouts import longest_silence
 from bladewing.features.graph.inputs import IN_GRAPH, IQ, input_graph
 from bladewing.features.graph.operators import Graph
@@ -131,7 +132,7 @@ def test_the_shipped_model_answers_the_same_from_raw_iq(radar, tmp_path):
     assert len(silent) == 1
     expected.probabilities[silent], expected.labels[silent] = probabilities[silent], "unknown"
     np.testing.assert_allclose(probabilities, expected.probabilities, atol=TOLERANCE)
-    limits = np.asarray(classifier.rules.of(radar["pulses"]).accept)[expected.probabilities.argmax(axis=-1)]
+    limits = np.asarray(classifier.rules.of(counted_pulses(**radar)).accept)[expected.probabilities.argmax(axis=-1)]
     clear = np.abs(expected.probabilities.max(axis=-1) - limits) > TOLERANCE
     np.testing.assert_array_equal(LABELS[label][clear], expected.labels[clear])
     assert clear.sum() > 90
@@ -158,7 +159,7 @@ def test_labels_keep_to_a_false_alarm_rate(small, tmp_path, capsys):
     np.testing.assert_array_equal(label[clear] == 0, expected.labels[clear] == "uav")
     assert 0 < (label == 0).sum() < (run(session, iq)[1] == 0).sum()
     said = {entry.key: entry.value for entry in onnx.load_model_from_string(out.read_bytes()).metadata_props}
-    assert json.loads(said["accept"]) == list(strict.rules.of(radar["pulses"]).accept)
+    assert json.loads(said["accept"]) == list(strict.rules.of(counted_pulses(**radar)).accept)
     assert (
         main(["export", str(out), *(f"--{name.replace('_', '-')}={value}" for name, value in (radar | rule).items())])
         == 0

@@ -8,7 +8,8 @@ from bladewing.classify import BadInput, Classifier
 from bladewing.classify.export import export_raw_iq
 from bladewing.classify.labels import CLASSES
 from bladewing.classify.model_file import COVERAGES, model_names
-from bladewing.classify.rules import LEAST_RECORDS, LIKELIER, PULSES_FROM, Rule, Rules
+from bladewing.classify.rules import COUNTED_MPS, LEAST_RECORDS, LIKELIER, PULSES_FROM, Rule, Rules, counted_pulses
+from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS
 from hypothesis import given
 from hypothesis import strategies as st
 from onnxruntime import InferenceSession
@@ -16,6 +17,8 @@ from onnxruntime import InferenceSession
 from .conftest import noise
 
 PRECISION, FALSE_ALARM = 0.9, 0.01
+NARROW = {"carrier_hz": 24e9, "prf_hz": 15e3}  # unambiguous to 47 m/s: all pulses count
+WIDE = {"carrier_hz": 10e9, "prf_hz": 60e3}  # to 450 m/s
 BY_PULSES = json.dumps(
     [
         {"pulses": 64, "accept": [0.9, 0.9, 0.9], "sets": [[0.8, 0.1, 0.1, 0.1]]},
@@ -94,9 +97,22 @@ def test_a_number_of_pulses_has_the_rule_of_its_range_alone_and_in_an_array(puls
     np.testing.assert_array_equal(rules.accept(np.array([[pulses]])), [[rules.of(pulses).accept]])
 
 
+@given(st.integers(64, 65_536), st.floats(2e9, 100e9), st.floats(1e3, 100e3))
+def test_pulses_count_that_make_the_bins_of_what_birds_and_clutter_do(pulses, carrier_hz, prf_hz):
+    radar = {"carrier_hz": carrier_hz, "prf_hz": prf_hz}
+    velocity_mps = np.fft.fftfreq(pulses, 1 / prf_hz) * SPEED_OF_LIGHT_MPS / carrier_hz / 2
+    number = counted_pulses(pulses, **radar)
+    assert abs(number - np.count_nonzero(abs(velocity_mps) <= COUNTED_MPS)) <= 1.001
+    assert number <= pulses
+    if velocity_mps.max() >= COUNTED_MPS:  # as many of a dwell, however fast they follow one another
+        faster = counted_pulses(2 * pulses, carrier_hz, 2 * prf_hz)
+        assert faster == pytest.approx(number, rel=1e-9)
+
+
 def test_records_go_by_their_pulses_and_tracks_by_all(make_model):
     clf = Classifier(make_model(bias=np.log([0.8, 0.15, 0.05]), **ONE))  # whose own threshold is 0.6
-    short, long = (clf.predict(noise(pulses), carrier_hz=10e9, prf_hz=20e3) for pulses in (255, 256))
+    short, long = (clf.predict(noise(pulses), **NARROW) for pulses in (255, 256))
+    assert str(clf.predict(noise(1024), **WIDE).labels) == "unknown"  # of which 114 count
     assert [str(one.labels) for one in (short, long)] == ["unknown", "uav"]
     assert str(short.reasons) == "not sure: best uav 0.80 < 0.90"
     p = np.stack([short.probabilities, long.probabilities])
@@ -104,7 +120,7 @@ def test_records_go_by_their_pulses_and_tracks_by_all(make_model):
     assert clf.decide(p, np.array([255, 256]))[0].tolist() == ["unknown", "uav"]
     assert clf.decide(p, np.int64(256))[0].tolist() == ["uav", "uav"]
     sets = Classifier(make_model(bias=np.log([0.8, 0.15, 0.05]), **ONE), coverage=0.8)
-    labels = [str(sets.predict(noise(n), carrier_hz=10e9, prf_hz=20e3).labels) for n in (255, 256)]
+    labels = [str(sets.predict(noise(n), **NARROW).labels) for n in (255, 256)]
     assert labels == ["unknown", "uav"]
     assert sets.decide(p)[0].tolist() == ["uav", "uav"]
     assert sets.decide(p, np.array([255, 256]))[0].tolist() == ["unknown", "uav"]
@@ -130,9 +146,9 @@ def test_each_shipped_model_has_rules_that_grow_looser_with_the_pulses():
 def test_an_exported_graph_goes_by_the_rule_of_its_pulses(make_model, tmp_path):
     model = tmp_path / "model.onnx"
     model.write_bytes(make_model(bias=np.log([0.8, 0.15, 0.05]), **ONE))
-    for pulses, wanted in ((255, 3), (256, 0)):
+    for pulses, radar, wanted in ((255, NARROW, 3), (256, NARROW, 0), (1024, WIDE, 3)):
         out = tmp_path / f"{pulses}.onnx"
-        export_raw_iq(out, carrier_hz=10e9, prf_hz=20e3, pulses=pulses, model=model)
+        export_raw_iq(out, **radar, pulses=pulses, model=model)
         iq = noise(pulses, (2,)).astype(np.complex64).view(np.float32).reshape(2, pulses, 2)
         (label,) = InferenceSession(out).run(["label"], {"iq": iq})
         assert label.tolist() == [wanted, wanted]

@@ -142,6 +142,7 @@ def _few_sets(*_):
             inputs[name] = (values + 0.3 * labels.reshape(-1, *[1] * (values.ndim - 1))).astype(np.float32)
         kinds = np.array([next(kind for kind, of in KIND_CLASS.items() if of == CLASSES[label]) for label in labels])
         truth = {"kind": kinds, "background_db": np.full(count, np.nan), "pulses": np.full(count, 500)}
+        truth |= {"carrier_hz": np.full(count, 10e9), "prf_hz": np.full(count, 10e3)}
         return Gathered(inputs, labels, truth)
 
     return TrainingSets(gathered(192), gathered(96), gathered(300), gathered(300))
