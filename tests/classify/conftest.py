@@ -3,11 +3,13 @@
 import json
 import os
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 import pytest
+from bladewing.classify import workers
 from bladewing.classify.envelope import Envelope
 from bladewing.classify.files import only_writer
 from bladewing.features.schema import INPUT_SHAPES, schema_hash
@@ -157,8 +159,10 @@ def linear_bytes(net: Any) -> bytes:
 
 
 def few_choices(patch: pytest.MonkeyPatch) -> None:
-    """Let a report compare little: two pictures, dwells, numbers of bins and families; no process of its own."""
-    from bladewing.classify.report import choices, families, front, pictures, run
+    """Let a report compare little: two pictures, dwells, bins, families; one table of the paper; no own process."""
+    from bladewing.classify import tables
+    from bladewing.classify.report import choices, examples, families, front, pictures, run
+    from bladewing.models import tabular
 
     few = {name: pictures.PICTURES[name] for name in ("spectrum", "stft-80-90")}
     dwells_s, bins = (0.005, 0.02, 0.08), (64, 1024)
@@ -169,6 +173,12 @@ def few_choices(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(families, "FAMILIES", {name: families.FAMILIES[name] for name in ("sea", "band 18-40 GHz")})
     patch.setattr(choices, "network_bytes", linear_bytes)
     patch.setattr(front, "peak_bytes", lambda *_: 1_000_000)
+    # the trees of the front and of the families: none is asked how good it is
+    patch.setattr(tabular, "train_boosted", partial(tabular.train_boosted, iterations=2))
+    patch.setattr(run, "TrainingConfig", partial(run.TrainingConfig, iterations=2))
+    patch.setattr(tables, "TABLES", {title: tables.TABLES[title] for title in ("The paper's bird",)})
+    patch.setattr(examples, "EXAMPLES_DRAWN", 30)
+    patch.setattr(workers, "workers_at_hand", lambda: 1)
     # there is no train.json that could tell of a cascade
     of_account, told = run._cascade, {"cascade": {"stages": ["spectrum-cnn-wide", "always-uav"]}}
     patch.setattr(run, "_cascade", lambda given, _: of_account(given, told))

@@ -293,10 +293,8 @@ def test_choices_of_a_page_of_the_shipped_models_have_colours_of_their_own_whate
         assert all(look.number == drawn[key].number for key, look in choice_looks(rows).items())
 
 
-def test_the_page_says_what_the_model_in_eight_bits_is(report: dict[str, Any]) -> None:
-    from bladewing.classify.report.page import draw_page
-
-    page = draw_page(report)
+def test_the_page_says_what_the_model_in_eight_bits_is(report_folder: Path) -> None:
+    page = (report_folder / "report.html").read_text(encoding="utf-8")
     assert "“spectrum-cnn-wide-int8-trial” is the default model with its products in eight bits" in page
 
 

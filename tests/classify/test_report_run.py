@@ -80,15 +80,15 @@ def test_page_is_drawn_from_the_stored_json_alone_to_the_same_bytes(report_folde
         "import json, sys; from bladewing.classify.report.page import draw_page; "
         "sys.stdout.buffer.write(draw_page(json.load(open(sys.argv[1], encoding='utf-8'))).encode())"
     )
-    for hash_seed in ("1", "2"):
-        environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
-        drawn = subprocess.run(
-            [sys.executable, "-c", redraw, str(report_folder / "report.json")],
-            env=environment,
-            capture_output=True,
-            check=True,
-        )
-        assert drawn.stdout == (report_folder / "report.html").read_bytes()
+    # the stored page was drawn by a process of another hash seed: a random one, or that of the test run
+    hash_seed = "2" if os.environ.get("PYTHONHASHSEED") == "1" else "1"
+    drawn = subprocess.run(
+        [sys.executable, "-c", redraw, str(report_folder / "report.json")],
+        env={**os.environ, "PYTHONHASHSEED": hash_seed},
+        capture_output=True,
+        check=True,
+    )
+    assert drawn.stdout == (report_folder / "report.html").read_bytes()
 
 
 class Reader(HTMLParser):
@@ -303,10 +303,11 @@ def test_a_foreign_model_is_refused_before_anything_is_measured(tmp_path: Path) 
         run.run_report(tmp_path / "out", models=tmp_path, quick=True, progress=False)
 
 
-def test_page_shows_a_stability_table_that_lies_beside_it(report: dict[str, Any]) -> None:
+def test_page_shows_a_stability_table_that_lies_beside_it(report: dict[str, Any], report_folder: Path) -> None:
     cell = Cell("comb", "SNR", "200 dB", 0.05, "error [Hz]", 0.1, "the <guard>")
     row = {**cell.as_dict(), "shown": "0.05", "cells": 3, "held": 3}
     page = draw_page({**report, "stability": [row]})
     assert "the &lt;guard&gt;" in page
     assert "3 of 3 cells hold" in page
-    assert "At the extremes" not in draw_page(report)
+    assert "At the extremes" in page
+    assert "At the extremes" not in (report_folder / "report.html").read_text(encoding="utf-8")
