@@ -265,18 +265,21 @@ def test_steady_and_manoeuvring_bodies_are_as_frequent_in_every_class():
 
 def test_even_spokes_show_only_lines_of_their_own_rate():
     radar = Radar(3e9, 4e3, 4000)
-    target = draw_discrete(draws(2000, 7), radar, "vehicle")
-    turn, speed = target.truth["rotation_hz"], abs(target.truth["velocity_mps"])
+    uniforms = np.random.default_rng(7).random((2000, WIDTH))
+    truth = draw_discrete(Draws(uniforms), replace(radar, pulses=64), "vehicle").truth
+    turn, speed = truth["rotation_hz"], abs(truth["velocity_mps"])
     unfolded = 2 * speed < 0.9 * radar.unambiguous_mps
-    steady = abs(target.truth["acceleration_mps2"]) < 0.2
+    steady = abs(truth["acceleration_mps2"]) < 0.2
     chosen = np.flatnonzero((turn > 12) & steady & unfolded & (speed > 8))
+    target = draw_discrete(Draws(uniforms[chosen]), radar, "vehicle")
+    np.testing.assert_array_equal(target.truth["rotation_hz"], turn[chosen])
     power = abs(np.fft.fft(target.micro * np.kaiser(radar.pulses, 12.5), axis=-1)) ** 2
     frequency_hz = np.fft.fftfreq(radar.pulses, 1 / radar.prf_hz)
     shares = []
-    for row in chosen:
-        turns = (frequency_hz + 2 * target.truth["velocity_mps"][row] / radar.wavelength_m) / turn[row]
-        combs = [abs(turns - n * np.rint(turns / n)) * turn[row] < 7 for n in range(2, 11)]
-        shares.append(max(power[row, comb].sum() for comb in combs) / power[row].sum())
+    for own, velocity_mps, turn_hz in zip(power, target.truth["velocity_mps"], turn[chosen], strict=True):
+        turns = (frequency_hz + 2 * velocity_mps / radar.wavelength_m) / turn_hz
+        combs = [abs(turns - n * np.rint(turns / n)) * turn_hz < 7 for n in range(2, 11)]
+        shares.append(max(own[comb].sum() for comb in combs) / own.sum())
     assert len(chosen) > 20, "too few to tell"
     # a third of those that have two spokes or more, of which half echo alike
     assert 0.05 < np.mean(np.array(shares) > 0.98) < 0.4
