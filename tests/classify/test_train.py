@@ -32,7 +32,7 @@ from .conftest import interrupt
 def trained(tmp_path_factory):
     out = tmp_path_factory.mktemp("trained")
     config = out / "tiny.toml"
-    config.write_text("records = 3200\nepochs = 5\nbatch = 64\niterations = 20\n")
+    config.write_text("records = 3200\nepochs = 2\nbatch = 64\niterations = 20\n")
     return out, run_training(out, config=config, progress=False)
 
 
@@ -107,10 +107,11 @@ def test_trained_models_answer_through_the_classifier(trained, name):
     assert answer.probabilities[:, 0].mean() > other.probabilities[:, 0].mean() + 0.1
 
 
-def test_an_interrupted_training_leaves_the_old_files_and_says_how_it_goes_on(trained, tmp_path, monkeypatch, capsys):
+def test_an_interrupted_training_leaves_the_old_files_and_says_how_it_goes_on(tmp_path, monkeypatch, capsys):
     for name in ("features-linear.onnx", "train.json"):
         (tmp_path / name).write_bytes(b"old")
 
+    monkeypatch.setattr(train, "_gather", _few_sets)
     monkeypatch.setattr(tabular, "train_boosted", interrupt)
     config = tmp_path / "tiny.toml"
     config.write_text('records = 600\nmodels = ["features-linear", "features-boosted"]\n')
@@ -160,6 +161,7 @@ def _run(out, *, after=None, then=None, **changed):
         patch.setattr(train, "add_costs", lambda *_: None)
         patch.setattr(train, "training_config", lambda *_, **__: SETTINGS.model_copy(update=changed))
         patch.setattr(training, "train_network", train_network)
+        patch.setattr(training, "WIDE", 10**9)  # two threads of the teacher's wait for each other on a busy machine
         return run_training(out, progress=False)
 
 
@@ -418,9 +420,18 @@ def test_a_folder_that_holds_models_of_another_training_is_refused(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["image-cnn.onnx", "one.toml"]
 
 
-def test_a_run_that_another_one_overtook_writes_nothing_and_keeps_what_it_did(tmp_path, monkeypatch):
-    config, costs = tmp_path / "one.toml", train.add_costs
+@pytest.fixture
+def line_alone(tmp_path, monkeypatch):
+    """Settings of a training that costs next to nothing: a line on few sets, whose price is not measured."""
+    monkeypatch.setattr(train, "_gather", _few_sets)
+    monkeypatch.setattr(train, "add_costs", lambda _, models, *__: models["features-linear"].update(cost_ffts=1.0))
+    config = tmp_path / "one.toml"
     config.write_text('records = 600\nmodels = ["features-linear"]\n')
+    return config
+
+
+def test_a_run_that_another_one_overtook_writes_nothing_and_keeps_what_it_did(tmp_path, line_alone, monkeypatch):
+    costs = train.add_costs
 
     def overtaken(*arguments):
         (tmp_path / "image-cnn.onnx").write_bytes(b"of another run")
@@ -428,18 +439,16 @@ def test_a_run_that_another_one_overtook_writes_nothing_and_keeps_what_it_did(tm
 
     monkeypatch.setattr(train, "add_costs", overtaken)
     with pytest.raises(BadInput, match=r"holds image-cnn\.onnx of another training"):
-        run_training(tmp_path, config=config, progress=False)
+        run_training(tmp_path, config=line_alone, progress=False)
     assert not list(tmp_path.glob("features-linear*"))
     assert list((tmp_path / TRAIN_PARTS).iterdir())
 
 
-def test_a_training_says_what_another_left_unfinished_beside_it(tmp_path, capsys):
-    config = tmp_path / "one.toml"
-    config.write_text('records = 600\nmodels = ["features-linear"]\n')
+def test_a_training_says_what_another_left_unfinished_beside_it(tmp_path, line_alone, capsys):
     left = tmp_path / TRAIN_PARTS / "of-another-run"
     left.mkdir(parents=True)
     (left / "some.npz").write_bytes(bytes(2_500_000))
-    run_training(tmp_path, config=config, progress=True)
+    run_training(tmp_path, config=line_alone, progress=True)
     said = capsys.readouterr().err
     assert f"{tmp_path / TRAIN_PARTS} holds an unfinished run" in said
     assert "2.5 MB" in said
