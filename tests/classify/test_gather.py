@@ -77,9 +77,19 @@ class StoppedError(Exception):
     pass
 
 
+# Nine tasks of 48, the last one shorter.
+COUNT = 430
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """That run without an interruption, and in tasks of another size."""
+    return gather(3, "train", COUNT, names=("features", "levels"), workers=1)
+
+
 @pytest.fixture
 def interrupted(tmp_path, monkeypatch):
-    """What a run of 700 records left that was stopped after seven of its tasks of 48, kept three at a time."""
+    """What a run of `COUNT` records left that was stopped after seven of its tasks of 48, kept three at a time."""
     monkeypatch.setattr(gather_module, "TASK_RECORDS", 48)
     monkeypatch.setattr(gather_module, "KEPT_TASKS", 3)
     parts = Parts(tmp_path / "parts", {"seed": 3})
@@ -91,23 +101,22 @@ def interrupted(tmp_path, monkeypatch):
             raise StoppedError
 
     with pytest.raises(StoppedError):
-        gather(3, "train", 700, names=("features", "levels"), workers=1, on_records=stop, parts=parts)
+        gather(3, "train", COUNT, names=("features", "levels"), workers=1, on_records=stop, parts=parts)
     return parts
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_an_interrupted_drawing_goes_on_to_the_same_bits(interrupted, monkeypatch, workers):
+def test_an_interrupted_drawing_goes_on_to_the_same_bits(interrupted, whole, monkeypatch, workers):
     drawn, seen = [], []
     if workers == 1:  # another process would not see the patch
         real = gather_module.stream
         monkeypatch.setattr(gather_module, "stream", lambda *a, start: drawn.append(start) or real(*a, start=start))
     resumed = gather(
-        3, "train", 700, names=("features", "levels"), workers=workers, on_records=seen.append, parts=interrupted
+        3, "train", COUNT, names=("features", "levels"), workers=workers, on_records=seen.append, parts=interrupted
     )
-    whole = gather(3, "train", 700, names=("features", "levels"), workers=1)
     if workers == 1:
-        assert min(drawn[:9]) == 6 * 48  # six tasks were kept, the seventh not
-    assert sum(seen) == 700
+        assert sorted(drawn) == [6 * 48, 7 * 48, 8 * 48]  # six tasks were kept, the seventh not
+    assert sum(seen) == COUNT
     assert resumed.arrays().keys() == whole.arrays().keys()
     for name, array in whole.arrays().items():
         np.testing.assert_array_equal(resumed.arrays()[name], array)
@@ -116,7 +125,7 @@ def test_an_interrupted_drawing_goes_on_to_the_same_bits(interrupted, monkeypatc
 
 def test_drawn_records_of_other_inputs_are_refused(interrupted):
     with pytest.raises(BadInput, match=r"drawn-train-00000\.npz: not what this run kept"):
-        gather(3, "train", 700, names=("features", "cadence"), workers=1, parts=interrupted)
+        gather(3, "train", COUNT, names=("features", "cadence"), workers=1, parts=interrupted)
 
 
 ORPHAN = """

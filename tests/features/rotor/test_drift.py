@@ -63,17 +63,17 @@ def test_one_rotor_whose_rate_changes_is_one_rotor(change):
 
 @pytest.mark.parametrize(("snr_db", "change"), [(0.0, 0.0), (0.0, 0.002), (0.0, 0.01), (20.0, 0.002), (20.0, 0.01)])
 def test_deviations_of_the_change_are_true(snr_db, change):
-    """Of 40 draws the mean square of normalised errors is 1 +- 0.22, within 2 lie 0.95 +- 0.04; at 20 dB one or two are
+    """Of 27 draws the mean square of normalised errors is 1 +- 0.27, within 2 lie 0.95 +- 0.04; at 20 dB one or two are
     further off, whose lines lie about a notch."""
     drifts, rates = [], []
-    for seed in range(40):
+    for seed in range(27):
         iq, chopping_hz = one_rotor(100 + seed, change, snr_db=snr_db)
         found = measure(iq, **records.RADAR)
         if found.rotors_resolved and found.rotor_count == 1:
             away = found.chopping_drift_hz_per_s - chopping_hz * change / DWELL_S
             drifts.append(away / found.chopping_drift_hz_per_s_std)
             rates.append((found.chopping_hz - chopping_hz) / found.chopping_hz_std)
-    assert len(drifts) >= 32
+    assert len(drifts) >= 22
     for errors in (drifts, rates):
         assert np.mean(np.abs(errors) < 2) > 0.8
         assert 0.4 < np.mean(np.square(errors)) < (2.2 if snr_db < 10 else 4.0)
@@ -99,9 +99,18 @@ def test_turned_round_in_time_a_rate_that_rises_falls():
 
 def measured_both_ways(iq: np.ndarray, monkeypatch) -> tuple:
     """What is measured, and what would be without a thought of change."""
-    found = measure(iq, **records.RADAR)
-    with monkeypatch.context() as without:
-        without.setattr("bladewing.features.rotor.family.resampled", lambda *_, **__: None)
+    evened = []
+
+    def watched(*given, **options):
+        evened.append(resampled(*given, **options))
+        return evened[-1]
+
+    with monkeypatch.context() as patch:
+        patch.setattr("bladewing.features.rotor.family.resampled", watched)
+        found = measure(iq, **records.RADAR)
+        if all(even is None for even in evened):  # it was thought of to no effect: the same again
+            return found, found
+        patch.setattr("bladewing.features.rotor.family.resampled", lambda *_, **__: None)
         return found, measure(iq, **records.RADAR)
 
 
