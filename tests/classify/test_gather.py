@@ -184,9 +184,17 @@ def test_an_interrupt_is_the_parent_s_alone(tmp_path):
     assert (done.stdout, done.stderr, done.returncode) == ("stopped\n", "", 0)
 
 
+TOLD = """
+import runpy
+from bladewing.classify import progress
+progress._LINE_EVERY_S = 0.0  # else its first line is waited for for half a minute, with two workers under way
+runpy.run_module("bladewing.classify", run_name="__main__")
+"""
+
+
 def test_a_program_told_to_end_does_so_as_after_ctrl_c(tmp_path):
     """In one line, and without a word of those of its workers, where `timeout` or a service ends it."""
-    command = [sys.executable, "-m", "bladewing.classify", "train", "--records", "3000", "--out", tmp_path / "out"]
+    command = [sys.executable, "-c", TOLD, "train", "--records", "3000", "--out", tmp_path / "out"]
     told = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
     assert told.stderr is not None
     assert told.stderr.readline().startswith("draw 4800 records: ")  # the workers are under way
