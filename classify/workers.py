@@ -70,9 +70,11 @@ def _by_workers(work: Callable[[Task], Done], tasks: Sequence[Task], workers: in
             while waiting:
                 yield _result(waiting.pop(0))
         except BaseException:
+            answers = getattr(pool, "_result_queue", None)
             pool.shutdown(wait=False, cancel_futures=True)
             for worker in set(active_children()) - others:  # else the tasks that they have begun are waited for
                 worker.terminate()
+            _written_no_more(answers)
             raise
 
 
@@ -83,6 +85,16 @@ def _told_apart() -> Iterator[None]:
         yield
     except (OSError, RuntimeError, AssertionError) as error:  # AssertionError: from a daemonic process
         raise _NoWorkersError from error
+
+
+def _written_no_more(answers: Any) -> None:
+    """Close this process's end for writing of the queue by which workers answer.
+
+    One that was ended as it wrote leaves half an answer. The pool's own thread waits for the rest, and this process for
+    that thread, as long as anybody could write it.
+    """
+    with suppress(AttributeError, OSError):  # a pool that is built in another way has no such queue
+        answers._writer.close()
 
 
 def _result(asked: Future[Done]) -> Done:

@@ -2,6 +2,7 @@ import operator
 import os
 import subprocess
 import sys
+import threading
 import time
 from functools import partial
 from multiprocessing import get_context, parent_process
@@ -32,6 +33,44 @@ def test_a_worker_of_the_caller_s_own_outlives_tasks_that_are_given_up():
     finally:
         own.terminate()
         own.join()
+
+
+class Large:
+    """An answer that takes some tenths of a second to be written; tells when it begins."""
+
+    def __init__(self, place: Path) -> None:
+        self.place = place
+
+    def __reduce__(self) -> tuple:
+        content = bytes(1 << 28)
+        self.place.touch()
+        return bytes, (content,)
+
+
+def _large(place: Path | None) -> Large | None:
+    return Large(place) if place else None
+
+
+def _read_bytes() -> int:
+    """How much this process has read so far."""
+    return int(Path("/proc/self/io").read_text().split()[1])  # "rchar: N"
+
+
+@pytest.mark.skipif(not Path("/proc/self/io").exists(), reason="no system that tells what a process has read")
+def test_workers_that_are_ended_as_they_answer_leave_nothing_that_waits(tmp_path):
+    before, place = set(threading.enumerate()), tmp_path / "worker"
+    answers = in_order(_large, [None, place, None], workers=2)
+    next(answers)
+    while not place.exists():
+        time.sleep(0.001)
+    begun, ends = _read_bytes(), time.monotonic() + 60
+    while _read_bytes() < begun + (1 << 22) and time.monotonic() < ends:
+        time.sleep(0.0005)
+    answers.close()
+    assert _read_bytes() < begun + (1 << 28), "the answer was there already"
+    for thread in set(threading.enumerate()) - before:
+        thread.join(timeout=30)
+        assert not thread.is_alive(), thread.name
 
 
 UNGUARDED = """
