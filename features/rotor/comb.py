@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..chopping import CHOPPING_RANGE_HZ
 from ..lines import squared
 from ..reasons import LOW_PRF, SHORT_DWELL
-from .comb_centre import centred
+from .comb_centre import TELLS, centred
 from .comb_fit import CombFit, fit_combs
 from .comb_scores import even_scores, heights
 from .comb_search import (
@@ -89,8 +89,8 @@ class Comb:
         Strong lines are this many spacings apart: 1 for equal blades (or a lone one), else the number of blades.
     body_std : float
         Standard deviation of the body's frequency where several lines may be the body's, else 0 [cycles a sample].
-    body_has_line : bool
-        Whether the body is told by a line that stands out.
+    line_nats : float
+        Evidence that the line counted from is the body's, by how far it stands out; 0 where it does not [nats].
     blades : int
         Number of blades by lines of unequal power; 1 where they are equal.
     blades_sure : bool
@@ -102,9 +102,14 @@ class Comb:
     last: int
     per_turn: int
     body_std: float
-    body_has_line: bool
+    line_nats: float
     blades: int
     blades_sure: bool
+
+    @property
+    def body_has_line(self) -> bool:
+        """Whether the body is told by a line that stands out."""
+        return self.line_nats >= TELLS
 
     @property
     def chopping(self) -> float:
@@ -260,11 +265,11 @@ def counted_from(data: Periodogram, comb: Comb, place: float, blades: int | None
     scores, reaches = even_scores(data.contrast, steps, np.full(len(steps), place))
     best = int(scores.argmax())
     reach = int(reaches[best])
-    return _counted(data, Candidate(float(steps[best]), place, -reach, reach, float(scores[best])), 0.0, False, blades)
+    return _counted(data, Candidate(float(steps[best]), place, -reach, reach, float(scores[best])), 0.0, 0.0, blades)
 
 
 def _counted(
-    data: Periodogram, start: Candidate, open_orders: float, has_line: bool, blades: int | None
+    data: Periodogram, start: Candidate, open_orders: float, line_nats: float, blades: int | None
 ) -> tuple[Comb | None, str]:
     """Fit and judge a comb whose body line is known; returns what `find_comb` does."""
     fitted = fit_combs(data, start.centre, [start.spacing], [(start.low, start.high)])
@@ -301,4 +306,4 @@ def _counted(
     few = fit.spacing * per_turn * data.prf_hz > CHOPPING_RANGE_HZ[1]
     unlike = per_turn > 1 and weak_lines_show(orders, power, per_turn)
     is_sure = unlike and not few and not may_come_back(start.last, fit.spacing)
-    return Comb(fit, fitted[1], start.last, per_turn, open_orders * fit.spacing, has_line, per_turn, is_sure), ""
+    return Comb(fit, fitted[1], start.last, per_turn, open_orders * fit.spacing, line_nats, per_turn, is_sure), ""

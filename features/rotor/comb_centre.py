@@ -11,6 +11,7 @@ from ..notch import parabola_offset
 from .comb_scores import even_scores
 from .comb_search import Candidate, fine_factors
 from .folding import outermost_orders
+from .half_comb import Extent
 from .one_sided import Sides
 from .periodogram import Periodogram
 from .wide_line import is_beside
@@ -75,7 +76,7 @@ OUT_OF_SKIRT = 12.0
 OPEN_NATS, NEAR_ORDERS = 3.0, 3
 
 
-def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, bool]:
+def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, float]:
     """Count a comb from the line that is most likely the body's.
 
     A rotor's lines reach equally far to both sides of the body and are as strong on both, and the body's own line is
@@ -94,8 +95,8 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, bool
         The same comb, counted from that line.
     open_orders : float
         Standard deviation of the body's order about the chosen one, over all that may be the body's; else 0.
-    has_line : bool
-        Whether the body is told by a line that stands out.
+    line_nats : float
+        Bonus of the line at its centre, by how far that stands out as a body's does; `TELLS` or more tells the body.
     """
     evidence = data.contrast
     best, most = found, -np.inf
@@ -114,14 +115,17 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, bool
         if total > most:
             most = total
             best = found if centre == found.centre else _counted_from(found, float(steps[index]), centre, shift, within)
-    # if the comb is one-sided about a strong line, that line inherits the score of the best order
-    for shift, nats in _one_sided(data, found, best, bonuses).items():
+    # a strong line that has the whole comb on one side, or of whose two sides only one was found, inherits that score
+    halves = _half_found(data, found, best, bonuses)
+    for shift, nats in (_one_sided(data, found, best, bonuses) | halves).items():
         totals[shift] = max(totals.get(shift, -np.inf), most + nats)
     shift = max(totals, key=totals.__getitem__)
     if totals[shift] > most:
         most = totals[shift]
         best = _counted_from(found, best.spacing, found.centre + found.spacing * shift, shift, within)
-    has_line = _line_nats(bonuses, best) >= TELLS
+        if shift in halves:
+            best = replace(best, low=-best.last, high=best.last)
+    line_nats = _line_nats(bonuses, best)
     chosen = round((best.centre - found.centre) / found.spacing)
     near = chosen + np.arange(-NEAR_ORDERS, NEAR_ORDERS + 1)
     others = np.setdiff1d(np.append(near, list(even)).astype(np.intp), list(totals))
@@ -136,7 +140,7 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, bool
         best = replace(best, centre=best.centre - round(best.centre), low=-int(reach), high=int(reach))
         if not best.is_folded:  # it seemed folded only because it was counted from its end
             return centred(data, best)
-    return best, float(np.sqrt((likely * away**2).sum() / likely.sum())), has_line
+    return best, float(np.sqrt((likely * away**2).sum() / likely.sum())), line_nats
 
 
 def _counted_from(found: Candidate, spacing: float, centre: float, order: int, within: int) -> Candidate:
@@ -177,6 +181,21 @@ def _one_sided(data: Periodogram, found: Candidate, best: Candidate, bonuses: di
         nats = bonuses[place] + max(sides.even_nats() - FLAT, 0.0) - even
         out[round((place - found.centre) / found.spacing)] = nats
     return out
+
+
+def _half_found(data: Periodogram, found: Candidate, best: Candidate, bonuses: dict[float, float]) -> dict[int, float]:
+    """Lead over the best order of moving lines that tell the body, of whose two sides the comb met one, by order [nats].
+
+    The family ends as far to both sides of such a line, and surely not about the best order.
+    """
+    own = _line_nats(bonuses, best)
+    lines = {place: nats for place, nats in bonuses.items() if nats > max(own, TELLS) and _moves(data, place)}
+    extent = None if found.is_folded or data.one_channel or not lines else Extent.of(data, found)
+    if extent is None:
+        return {}
+    orders = {round((place - found.centre) / found.spacing): nats - own for place, nats in lines.items()}
+    chosen = round((best.centre - found.centre) / found.spacing)
+    return {order: nats for order, nats in orders.items() if extent.tells(order, chosen)}
 
 
 def _furthest(data: Periodogram, found: Candidate) -> tuple[int, float]:

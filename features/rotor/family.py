@@ -361,7 +361,9 @@ def _as_it_is(
     gear, rotors, reason = find_gear(data, comb, furthest, blades)
     meeting = None
     if len(rotors.fits) > 1 and not data.one_channel:
-        meeting = meeting_of(data, rotors.fits, data.level_of(rotors.rest), resolved=rotors.resolved)
+        meeting = meeting_of(
+            data, rotors.fits, data.level_of(rotors.rest), resolved=rotors.resolved, line_nats=comb.line_nats
+        )
         if meeting is not None and meeting.order != 0 and meeting.is_near and recounts > 0:
             counted = counted_from(data, comb, meeting.place, blades)
             anew = _as_it_is(data, counted, blades, even, recounts=recounts - 1)

@@ -23,7 +23,7 @@ MEETING_STEPS = 3
 #: The body is tried at up to this many orders to each side of the common centre.
 MOST_ORDERS = 100
 
-#: COUNTED: prior in favour of the order that the combs were counted from; OPEN_NATS: orders less likely than the best
+#: COUNTED: prior in favour of the order that the combs were counted from, more if a line tells it; OPEN_NATS: orders less likely than the best
 #: one by more than this are dropped [nats].
 COUNTED, OPEN_NATS = 3.0, 3.0
 
@@ -69,7 +69,9 @@ class Meeting:
     is_near: bool
 
 
-def meeting_of(data: Periodogram, fits: Sequence[CombFit], level_about: Level, *, resolved: bool) -> Meeting | None:
+def meeting_of(
+    data: Periodogram, fits: Sequence[CombFit], level_about: Level, *, resolved: bool, line_nats: float = 0.0
+) -> Meeting | None:
     """Where the combs of several rotors meet.
 
     Parameters
@@ -82,6 +84,8 @@ def meeting_of(data: Periodogram, fits: Sequence[CombFit], level_about: Level, *
         Local level of the residual of these combs.
     resolved : bool
         Whether each comb is a single rotor's.
+    line_nats : float
+        Evidence of a line that stands out as the body's, at the order that the combs were counted from [nats].
 
     Returns
     -------
@@ -98,7 +102,7 @@ def meeting_of(data: Periodogram, fits: Sequence[CombFit], level_about: Level, *
     unlike, place, std = _by_order(apart[0], most, merged / data.pulses)
     # if the combs meet at no order within their deviations, all evidence is reduced in proportion
     nats = -unlike / 2 / max(float(unlike.min()) / (len(fits) - 1), 1.0)
-    nats[most] += COUNTED
+    nats[most] += max(COUNTED, line_nats)
     best = int(nats.argmax())
     likely = np.exp(nats - nats[best])
     is_sure = bool(np.delete(likely, best).max(initial=0.0) < np.exp(-SURE))
