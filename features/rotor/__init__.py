@@ -4,8 +4,8 @@ Modules, in the order in which a record passes through them
 -----------------------------------------------------------
 periodogram, strong_lines, slow_lines
     Strong slow lines are taken out and the noise is whitened; then the evidence of a line in each bin.
-comb_scores, comb_search, flashes, octaves, folding, common_fraction, flash_rate, wide_line, one_sided, comb_centre,
-unlike_blades, comb
+comb_scores, comb_search, flashes, octaves, folding, common_fraction, flash_rate, wide_line, one_sided, half_comb,
+comb_centre, unlike_blades, comb
     Search for a comb: which of the multiples and fractions of its spacing is right, which line is the body's, how wide
     that line is, whether all lines lie on one side of it; or why there is no comb.
 comb_fit, weak_lines, turning, turning_lines, drift, changing, changing_fit

@@ -184,7 +184,7 @@ def _one_sided(data: Periodogram, found: Candidate, best: Candidate, bonuses: di
 
 
 def _half_found(data: Periodogram, found: Candidate, best: Candidate, bonuses: dict[float, float]) -> dict[int, float]:
-    """Lead over the best order of moving lines that tell the body, of whose two sides the comb met one, by order [nats].
+    """Lead over the best order of lines that tell a moving body, of whose two sides the comb met one, by order [nats].
 
     The family ends as far to both sides of such a line, and surely not about the best order.
     """

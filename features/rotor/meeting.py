@@ -23,8 +23,8 @@ MEETING_STEPS = 3
 #: The body is tried at up to this many orders to each side of the common centre.
 MOST_ORDERS = 100
 
-#: COUNTED: prior in favour of the order that the combs were counted from, more if a line tells it; OPEN_NATS: orders less likely than the best
-#: one by more than this are dropped [nats].
+#: COUNTED: prior in favour of the order that the combs were counted from, more if a line tells it; OPEN_NATS: orders
+#: less likely than the best one by more than this are dropped [nats].
 COUNTED, OPEN_NATS = 3.0, 3.0
 
 #: The best order is sure if every other one is less likely by more than this [nats].

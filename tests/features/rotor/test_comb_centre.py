@@ -3,6 +3,10 @@
 import numpy as np
 import pytest
 from bladewing.features import measure
+from bladewing.features.rotor.comb_search import Candidate
+from bladewing.features.rotor.half_comb import Extent
+from bladewing.features.rotor.periodogram import prepare
+from bladewing.features.spectrum import SPEED_OF_LIGHT_MPS as C
 from bladewing.simulate import Scene
 from bladewing.simulate.catalogue import AIRFRAMES
 
@@ -13,6 +17,7 @@ from .. import signals
 RADAR = {"carrier_hz": 9.85e9, "prf_hz": 18582.0}
 VELOCITY_MPS = 5.0
 SEEDS = 12
+WIDE = {"carrier_hz": 77e9, "prf_hz": 80e3}
 
 
 def turned(airframe: str, seed: int, radar: dict, velocity_mps: float, **given: float) -> Scene:
@@ -279,3 +284,49 @@ def test_lines_that_no_body_stands_among_are_counted_from_their_middle(seed):
     error_mps = abs(told.body_velocity_mps - velocity_mps)
     assert error_mps < max(0.2, 5 * told.body_velocity_mps_std)
     assert told.tip_speed_mps == pytest.approx(tip_mps, rel=0.01)
+
+
+def turning(seed: int) -> np.ndarray:
+    """A quadcopter at 77 GHz whose rotors' lines crowd, and whose body of five points turns: its line is wide."""
+    rng, per_m = np.random.default_rng(seed), 4 * np.pi * WIDE["carrier_hz"] / C
+    time_s = np.arange(8192) / WIDE["prf_hz"]
+    echoes = np.array([2.5, 1, 1, 1, 1]) * rng.rayleigh(1, 5)
+    places = zip(echoes, rng.uniform(0.03, 0.15, 5), rng.uniform(0, 6.3, 5), strict=True)
+    body = sum(echo * np.exp(-1j * per_m * off * np.cos(0.3 * time_s + place)) for echo, off, place in places)
+    blades = np.zeros(len(time_s), complex)
+    for _ in range(4):
+        rate_hz, sway_hz = 60 * (1 + rng.uniform(-0.025, 0.025)), rng.uniform(1, 5)
+        turned = rate_hz * time_s + 0.03 * np.cos(2 * np.pi * sway_hz * time_s + rng.uniform(0, 6))
+        turned = 2 * np.pi * turned + rng.uniform(0, 6)
+        for angle in (turned, turned + np.pi):
+            towards = per_m * np.cos(angle)
+            blades += np.exp(-0.07j * towards) * np.sinc(0.05 * towards / np.pi) * (1 + 0.4 * np.sin(angle))
+        blades *= np.exp(1j * rng.uniform(0, 6))
+    parts = (body, 30.0), (blades, 15.0)
+    iq = sum(10 ** (db / 20) * part / np.sqrt(np.mean(np.abs(part) ** 2)) for part, db in parts)
+    iq *= np.exp(-1j * per_m * 7.0 * time_s)
+    return (iq + rng.standard_normal((8192, 2)) @ [1, 1j] / np.sqrt(2)).astype(np.complex64)
+
+
+@pytest.mark.parametrize("seed", [2, 4])
+def test_a_wide_line_far_out_of_all_others_is_the_body_though_rotors_seem_to_meet_elsewhere(seed):
+    found = measure(turning(seed), **WIDE)
+    assert abs(found.body_velocity_mps - 7.0) < 0.1  # it was an order off, 7.23 +- 0.00
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_half_of_a_family_is_told_by_where_its_power_ends(sign):
+    # lines to both sides of the body at 0.1, found on one side alone: its middle is 20 orders off
+    noise = np.random.default_rng(0).standard_normal((4096, 2)) @ [1, 1j] / np.sqrt(2)
+    order = np.setdiff1d(np.arange(-40, 41), [0])
+    phases = np.random.default_rng(1).uniform(0, 2 * np.pi, len(order))
+    lines = np.exp(2j * np.pi * np.outer(0.1 + 0.005 * order, np.arange(4096)) + 1j * phases[:, None]).sum(axis=0)
+    data = prepare((noise + 0.3 * lines).astype(np.complex64), carrier_hz=10e9, prf_hz=20e3)
+    half = Candidate(0.005, 0.1, min(40 * sign, 0), max(40 * sign, 0), 100.0)
+    extent = Extent.of(data, half)
+    assert extent.tells(0, 20 * sign)
+    assert not extent.tells(20 * sign, 0)
+    # one-sided blades: the power ends where the comb does
+    one = np.exp(2j * np.pi * np.outer(0.1 + 0.005 * order[order * sign > 0], np.arange(4096))).sum(axis=0)
+    data = prepare((noise + 0.3 * one).astype(np.complex64), carrier_hz=10e9, prf_hz=20e3)
+    assert not Extent.of(data, half).tells(0, 20 * sign)
