@@ -189,7 +189,7 @@ def _half_found(data: Periodogram, found: Candidate, best: Candidate, bonuses: d
     The family ends as far to both sides of such a line, and surely not about the best order.
     """
     own = _line_nats(bonuses, best)
-    lines = {place: nats for place, nats in bonuses.items() if nats > max(own, TELLS) and _moves(data, place)}
+    lines = {place: nats for place, nats in bonuses.items() if nats > max(own, TELLS) and moves(data, place)}
     extent = None if found.is_folded or data.one_channel or not lines else Extent.of(data, found)
     if extent is None:
         return {}
@@ -227,7 +227,7 @@ def _is_own(data: Periodogram, found: Candidate, line: float) -> bool:
     return bool(there > OWN_SHARE * own)
 
 
-def _moves(data: Periodogram, centre: float) -> bool:
+def moves(data: Periodogram, centre: float) -> bool:
     """True where a line is a moving body's; within the background's band only if another line is nearer to rest."""
     nearer = any(abs(line) < abs(centre) for line in data.strong.centres)
     return abs(centre) * data.pulses >= AT_REST_BINS and (nearer or abs(centre) > data.rest_half)
@@ -254,7 +254,7 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
     moving, told = 0.0, []
     centres = data.strong.centres
     # the body is not hidden at rest where any line moves, even one right beside rest
-    hides = abs(centres[0]) * data.pulses < AT_REST_BINS and not any(_moves(data, line) for line in centres)
+    hides = abs(centres[0]) * data.pulses < AT_REST_BINS and not any(moves(data, line) for line in centres)
     for centre, level_db in sorted(data.strong.lines, key=lambda line: -abs(line[0])):
         if not _is_own(data, found, centre):
             continue
@@ -263,7 +263,7 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
         nats = STRONG_LINE * min(over_db / STRONG_OVER_DB, 1.0)
         nats += STRONG_LINE_DB * max(over_db - STRONG_OVER_DB, 0.0)
         # without a background, a line at rest may still be an offset of the receiver
-        if _moves(data, centre):
+        if moves(data, centre):
             moving = nats
         elif hides:
             reach = int(data.rest_half / found.spacing) + 1
@@ -280,7 +280,7 @@ def _bonuses(data: Periodogram, found: Candidate) -> tuple[dict[float, float], d
         off = (orders - round(orders)) * found.spacing * data.pulses / (1 + 0.2 * from_middle)
         if abs(off) < 1.5 and level_db > LINE_DB:
             out.append((place, nats - 16 * off**2))
-            if _moves(data, centre) and out[-1][1] > TELLS:
+            if moves(data, centre) and out[-1][1] > TELLS:
                 told.append(round(orders))
     even: dict[int, float] = {}
     if not found.is_folded:  # a folded comb has lines on both sides of any order

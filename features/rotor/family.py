@@ -11,7 +11,7 @@ from ..spectrum import Spectrum
 from .changing import ChangingSeparation, as_steady, may_be_sought
 from .changing_fit import ChangingFit, Start, fit_changing
 from .comb import Comb, counted_from, find_comb
-from .comb_centre import AT_REST_BINS
+from .comb_centre import moves
 from .comb_fit import CombFit
 from .drift import Resampled, ahead_left, resampled
 from .family_edge import edge_around, edge_of_lines, span_of
@@ -363,8 +363,7 @@ def _as_it_is(
     meeting = None
     if len(rotors.fits) > 1 and not data.one_channel:
         # a line at rest may be a background's or an offset, and where lines fold any may lie on another
-        moves = abs(comb.fit.centre) >= max(data.rest_half, AT_REST_BINS / data.pulses)
-        line_nats = comb.line_nats if moves and not comb.fit.is_folded else 0.0
+        line_nats = comb.line_nats if moves(data, comb.fit.centre) and not comb.fit.is_folded else 0.0
         meeting = meeting_of(
             data, rotors.fits, data.level_of(rotors.rest), resolved=rotors.resolved, line_nats=line_nats
         )
