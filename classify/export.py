@@ -29,7 +29,7 @@ from .labels import CLASSES, UNKNOWN
 from .ladder import CASCADE
 from .limits import MOST_MODEL_BYTES
 from .model_file import EXPORTED, chosen_name, read_model
-from .rules import counted_pulses
+from .rules import Limits, counted_pulses
 from .samples import positive
 
 TOLERANCE = 2e-3
@@ -127,6 +127,11 @@ def _replaceable(out: Path) -> bool:
         return False
 
 
+def _limits(classifier: Classifier, carrier_hz: float, prf_hz: float, pulses: int) -> Limits:
+    """Least probability at which the graph names each class."""
+    return classifier.rules.of(counted_pulses(pulses, carrier_hz, prf_hz)).accept
+
+
 def _whole_graph(
     content: bytes, classifier: Classifier, carrier_hz: float, prf_hz: float, pulses: int
 ) -> onnx.ModelProto:
@@ -144,8 +149,8 @@ def _whole_graph(
     judged = after.where(live.on(after), Value(after, f"{IQ}_model_probabilities", np.float32), 1 / len(CLASSES))
     after.name(judged, "probabilities")
     best = judged.argmax()
-    rule = classifier.rules.of(counted_pulses(pulses, carrier_hz, prf_hz))
-    least = after.constant(rule.accept, np.float64).take_rows(best)
+    limits = _limits(classifier, carrier_hz, prf_hz, pulses)
+    least = after.constant(limits, np.float64).take_rows(best)
     accepted = (judged.max().to(np.float64) >= least) & live.on(after)
     label = after.where(accepted, best, np.array(len(CLASSES)))
     after.name(label.squeeze(), "label")
@@ -181,7 +186,7 @@ def _sealed(
     metadata = {key: value for key, value in classifier.metadata.items() if key not in (SEAL_KEY, "inputs")}
     metadata |= {
         "product": EXPORTED,
-        "accept": json.dumps(classifier.rules.of(counted_pulses(pulses, carrier_hz, prf_hz)).accept),
+        "accept": json.dumps(_limits(classifier, carrier_hz, prf_hz, pulses)),
         "labels": json.dumps([*CLASSES, UNKNOWN]),
         "carrier_hz": repr(carrier_hz),
         "prf_hz": repr(prf_hz),

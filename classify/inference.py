@@ -250,7 +250,7 @@ class Classifier:
         """
         limits: Limits | NDArray[np.float64]
         if pulses is None or np.ndim(pulses) == 0:
-            rule = self._of_all if pulses is None else self.rules.of(float(pulses))
+            rule = self._of_all if pulses is None else self.rules.of(pulses)
             limits = rule.accept if self.coverage is None else rule.sets[self.coverage]
         else:
             limits = self.rules.accept(pulses) if self.coverage is None else self.rules.sets(pulses, self.coverage)
@@ -323,19 +323,17 @@ class Classifier:
         """Answer rows (see `_TOLD`), labels and reasons of (records, pulses) inside the envelope."""
         largest = largest_part(records)
         records = clicks_filled(records, largest)
-        live = largest >= LEAST_PART
+        live, pulses = largest >= LEAST_PART, counted_pulses(records.shape[-1], carrier_hz, prf_hz)
         if np.count_nonzero(live) == live.size:
             told = self._told(records, None, carrier_hz, prf_hz)
-            labels, why = self.decide(told[:, :-1], counted_pulses(records.shape[-1], carrier_hz, prf_hz))
+            labels, why = self.decide(told[:, :-1], pulses)
             return told, labels, np.array(why, dtype=np.str_)
         told, labels = _untold(len(records))
         reasons = np.full(len(records), "no signal: every sample is 0", dtype=object)
         reasons[largest > 0] = "no signal: samples this small have no digits left in float32: raise the gain"
         rows = np.flatnonzero(live)
         told[rows] = self._told(records, rows, carrier_hz, prf_hz)
-        labels[rows], reasons[rows] = self.decide(
-            told[rows, :-1], counted_pulses(records.shape[-1], carrier_hz, prf_hz)
-        )
+        labels[rows], reasons[rows] = self.decide(told[rows, :-1], pulses)
         return told, labels, reasons.astype(np.str_)
 
     def _of_stretches(

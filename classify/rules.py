@@ -160,7 +160,7 @@ class Rules:
             each.append(replace(rule, pulses=fewest))
         return cls(tuple(each))
 
-    def of(self, pulses: float | NDArray[np.floating]) -> Rule:
+    def of(self, pulses: float | NDArray[np.number]) -> Rule:
         """The rule of a record of which this number of pulses count."""
         return self.each[bisect_right(self.each, float(pulses), lo=1, key=lambda rule: rule.pulses) - 1]
 

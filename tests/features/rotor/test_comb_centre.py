@@ -305,19 +305,21 @@ def turning(seed: int) -> np.ndarray:
     parts = (body, 30.0), (blades, 15.0)
     iq = sum(10 ** (db / 20) * part / np.sqrt(np.mean(np.abs(part) ** 2)) for part, db in parts)
     iq *= np.exp(-1j * per_m * 7.0 * time_s)
-    return (iq + rng.standard_normal((8192, 2)) @ [1, 1j] / np.sqrt(2)).astype(np.complex64)
+    return (iq + signals.white(rng, len(time_s))).astype(np.complex64)
 
 
-@pytest.mark.parametrize("seed", [2, 4])
+@pytest.mark.parametrize("seed", [13, 14])
 def test_a_wide_line_far_out_of_all_others_is_the_body_though_rotors_seem_to_meet_elsewhere(seed):
     found = measure(turning(seed), **WIDE)
-    assert abs(found.body_velocity_mps - 7.0) < 0.1  # it was an order off, 7.23 +- 0.00
+    # the one was left open by 2.9 m/s, the other told as -11.6 +- 0.4
+    assert abs(found.body_velocity_mps - 7.0) < 0.1
+    assert found.body_velocity_mps_std < 0.1
 
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_half_of_a_family_is_told_by_where_its_power_ends(sign):
     # lines to both sides of the body at 0.1, found on one side alone: its middle is 20 orders off
-    noise = np.random.default_rng(0).standard_normal((4096, 2)) @ [1, 1j] / np.sqrt(2)
+    noise = signals.white(np.random.default_rng(0), 4096)
     order = np.setdiff1d(np.arange(-40, 41), [0])
     phases = np.random.default_rng(1).uniform(0, 2 * np.pi, len(order))
     lines = np.exp(2j * np.pi * np.outer(0.1 + 0.005 * order, np.arange(4096)) + 1j * phases[:, None]).sum(axis=0)
