@@ -323,7 +323,8 @@ class Classifier:
         """Answer rows (see `_TOLD`), labels and reasons of (records, pulses) inside the envelope."""
         largest = largest_part(records)
         records = clicks_filled(records, largest)
-        live, pulses = largest >= LEAST_PART, counted_pulses(records.shape[-1], carrier_hz, prf_hz)
+        live = largest >= LEAST_PART
+        pulses = counted_pulses(records.shape[-1], carrier_hz, prf_hz)
         if np.count_nonzero(live) == live.size:
             told = self._told(records, None, carrier_hz, prf_hz)
             labels, why = self.decide(told[:, :-1], pulses)
