@@ -16,7 +16,7 @@ from .. import signals
 
 RADAR = {"carrier_hz": 9.85e9, "prf_hz": 18582.0}
 VELOCITY_MPS = 5.0
-SEEDS = 12
+SEEDS = 9
 WIDE = {"carrier_hz": 77e9, "prf_hz": 80e3}
 
 
@@ -56,7 +56,7 @@ def found():
 def test_the_body_is_where_the_rotors_lines_are_even_on_both_sides(found):
     (velocity_mps, std_mps), _, _ = found
     error_mps = np.abs(velocity_mps - VELOCITY_MPS * np.array([[1], [-1]]))
-    # lines are 1.06 m/s apart: before they were weighed by what is even about them, 5 of 12 were off by 1 to 6
+    # lines are 1.06 m/s apart: before they were weighed by what is even about them, 5 of 12 draws were off by 1 to 6
     assert (error_mps < 0.2).sum(axis=1).min() >= SEEDS - 1
     # where two orders are about as likely, the deviation says so
     assert (std_mps > 0.5).any()
