@@ -103,7 +103,7 @@ def over_ground(airframe: str) -> np.ndarray:
     radar = {"carrier_hz": CARRIER_HZ, "prf_hz": 25e3, "pulses": 2000}
     ground = {"name": "ground", "kind": "ground", "level_db": 10.0}
     scene = Scene.build({"radar": radar, "uav": [{"name": "uav", "airframe": airframe}], "clutter": [ground]})
-    return np.stack([scene.render(seed).iq for seed in range(96)])
+    return np.stack([scene.render(seed).iq for seed in range(64)])
 
 
 @pytest.mark.parametrize("airframe", ["quadcopter_12cm", "fixed_wing_15cm", "helicopter_41cm", "hexacopter_30cm"])

@@ -61,7 +61,7 @@ def test_one_rotor_whose_rate_changes_is_one_rotor(change):
     assert np.median(np.abs(tips)) < 0.005
 
 
-@pytest.mark.parametrize(("snr_db", "change"), [(0.0, 0.0), (0.0, 0.002), (0.0, 0.01), (20.0, 0.002), (20.0, 0.01)])
+@pytest.mark.parametrize(("snr_db", "change"), [(0.0, 0.0), (0.0, 0.002), (0.0, 0.01), (20.0, 0.01)])
 def test_deviations_of_the_change_are_true(snr_db, change):
     """Of 27 draws the mean square of normalised errors is 1 +- 0.27, within 2 lie 0.95 +- 0.04; at 20 dB one or two are
     further off, whose lines lie about a notch."""
@@ -120,7 +120,7 @@ def measured_both_ways(iq: np.ndarray, monkeypatch) -> tuple:
 def test_several_steady_rotors_are_not_taken_for_one_that_changes(count, apart_hz, weaker, snr_db, monkeypatch):
     """Be they as strong as one another or not."""
     rng = np.random.default_rng(5)
-    for _ in range(5):
+    for _ in range(4):
         rates_hz = rng.uniform(50, 90) + apart_hz * np.arange(count)
         options = {"snr_db": snr_db, "body_db": 20, "velocity_mps": rng.uniform(-20, 20)}
         iq = records.record(rng, rates_hz, strengths=weaker ** np.arange(count), **options)

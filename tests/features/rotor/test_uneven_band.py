@@ -9,7 +9,7 @@ from scipy.signal import hilbert
 
 from ..signals import PRF_HZ, PULSES, RADAR, WAVELENGTH_M, rotors, white
 
-SEEDS = 8
+SEEDS = 6
 
 
 def bell(fall_db: float) -> np.ndarray:
