@@ -36,9 +36,8 @@ COMING_STEPS, ALL_STEPS = 3, 8
 #: ones by -6 to 0.)
 STEADY_STEPS, STEADY_FALL = 30, 1.0
 
-#: Lines are sought this many times further out than for steady rotors: smeared lines hide their reach. They are fitted
-#: further out too, unless that makes them more than CROWDED of the pulses: so many explain the noise as well.
-FURTHER, CROWDED = 1.5, 0.5
+#: Lines are sought this many times further out than for steady rotors: smeared lines hide their reach.
+FURTHER = 1.5
 
 
 def may_be_sought(data: Periodogram, nominal: float, reach: int) -> bool:
@@ -138,11 +137,11 @@ class ChangingSeparation(Separation):
         return self.reaches  # lines that are smeared end elsewhere for each
 
     def _further(self) -> list[int]:
-        """Outermost orders extended by `FURTHER`, if that makes no crowd: weak lines are shrunk."""
+        """Outermost orders extended by `FURTHER`, if so many may be fitted: weak lines are shrunk."""
         more = [
             min(int(FURTHER * reach), int(0.45 / rate)) for reach, rate in zip(self.reaches, self.rates, strict=True)
         ]
-        return more if self._may_fit(more) and 2 * sum(more) <= CROWDED * self.data.pulses else self.reaches
+        return more if self._may_fit(more) else self.reaches
 
     def _fitted(
         self, further: Sought | None, steps: int
