@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bladewing.classify import Classifier, train, training_costs
+from bladewing.classify import Classifier, train, training_costs, workers
 from bladewing.classify.cli import main
 from bladewing.classify.errors import BadInput
 from bladewing.classify.gather import Gathered, TrainingSets, gather
@@ -33,7 +33,10 @@ def trained(tmp_path_factory):
     out = tmp_path_factory.mktemp("trained")
     config = out / "tiny.toml"
     config.write_text("records = 3200\nepochs = 2\nbatch = 64\niterations = 20\n")
-    return out, run_training(out, config=config, progress=False)
+    with pytest.MonkeyPatch.context() as patch:
+        # to start several for each set takes longer than to draw it
+        patch.setattr(workers, "workers_at_hand", lambda: 1)
+        return out, run_training(out, config=config, progress=False)
 
 
 def test_training_writes_every_model_and_its_account(trained):
@@ -63,7 +66,7 @@ def test_the_cascade_goes_from_the_cheapest_model_to_the_best(trained):
     models, cascade = account["models"], account["cascade"]
     first, second = (models[name] for name in cascade["stages"])
     assert first["cost_ffts"] == min(model["cost_ffts"] for model in models.values())
-    chosen_on = gather(account["settings"]["seed"], "calibrate", account["records"]["calibrate"])
+    chosen_on = gather(account["settings"]["seed"], "calibrate", account["records"]["calibrate"], workers=1)
     accuracy = {
         name: figures(
             Classifier.load(out / f"{name}.onnx").from_inputs(chosen_on.inputs),
