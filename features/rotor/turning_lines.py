@@ -86,17 +86,15 @@ class TurningLines:
 
         pulses, waves = self._waves.shape[1], len(self._waves) // 2
         upper = blas.ssyrk(1 / pulses, self._waves.T, trans=1)
-        cosines, sines = (np.triu(one) + np.triu(one, 1).T for one in (upper[:waves, :waves], upper[waves:, waves:]))
+        alike = [np.triu(one) + np.triu(one, 1).T for one in (upper[:waves, :waves], upper[waves:, waves:])]
         crossed = upper[:waves, waves:]
-        # each wave as a line of order n, then as one of order -n: their conjugates are each other
-        all_lines = np.empty((2, waves, 2, waves), np.complex64)
-        all_lines.real[0, :, 0], all_lines.imag[0, :, 0] = cosines + sines, crossed - crossed.T
-        all_lines.real[0, :, 1], all_lines.imag[0, :, 1] = cosines - sines, -(crossed + crossed.T)
-        np.conjugate(all_lines[0, :, ::-1], out=all_lines[1])
-        line = self._wave + waves * (self._turn.imag < 0)
-        own = all_lines.reshape(2 * waves, 2 * waves).take(line, axis=0).take(line, axis=1)
-        out = own.astype(np.complex128)
+        both = self._wave[:, None], self._wave[None]
+        turn = self._turn.imag.astype(np.float32)
+        out = np.empty((len(turn), len(turn)), np.complex128)
+        out.real = alike[0][both] + turn[:, None] * turn * alike[1][both]
+        cosine_sine = crossed[both] * turn
+        out.imag = cosine_sine - cosine_sine.T
         if len(basis):
-            held = np.sqrt(pulses) * self.means(basis)
-            out -= held @ held.conj().T
+            held = self.means(basis)
+            out -= pulses * (held @ held.conj().T)
         return out
