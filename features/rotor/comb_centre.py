@@ -10,11 +10,11 @@ from ..bodies import LINE_DB
 from ..notch import parabola_offset
 from .comb_scores import even_scores
 from .comb_search import Candidate, fine_factors
-from .folding import outermost_orders
+from .folding import may_come_back, outermost_orders
 from .half_comb import Extent
 from .one_sided import Sides
 from .periodogram import Periodogram
-from .wide_line import is_beside
+from .wide_line import BESIDE_BINS, is_beside
 
 #: Bonus of a strong line as the body's: STRONG_LINE [nats] if it stands STRONG_OVER_DB [dB] over all lines of the comb,
 #: in proportion below that, and STRONG_LINE_DB [nats] for each further dB. If blades are stronger than the body, their
@@ -24,6 +24,11 @@ STRONG_LINE_DB = 1.0
 
 #: A line with this bonus or more tells the body: one-sided lines about it must not outvote it [nats].
 TELLS = 5.0
+
+#: No line of blades stands ALONE_DB over all others [dB]: where lines fill the span, so that neither their ends nor
+#: their symmetry tell the body, a line that does is the body's if it moves. Else it may be a background's, and the body
+#: anywhere: with the standard deviation ANYWHERE [cycles a sample].
+ALONE_DB, ANYWHERE = 15.0, 0.29
 
 #: If a comb, counted from its outermost line, covers the whole span but for this many orders, it has no middle and
 #: every line may be the body's.
@@ -102,6 +107,10 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, floa
     best, most = found, -np.inf
     totals: dict[int, float] = {}
     bonuses, even = _bonuses(data, found)
+    alone = _alone(data, found)
+    told = {place: nats for place, nats in bonuses.items() if nats > TELLS and _is_moving_one(data, alone, place)}
+    if told:  # all other evidence is as good about any order
+        bonuses, even = told, {}
     shifts = [round((centre - found.centre) / found.spacing) for centre in bonuses]
     # a comb that merges several rotors may miss the body's line a little: the better of both places counts
     either = np.stack([list(bonuses), found.centre + found.spacing * np.array(shifts)], axis=1)
@@ -116,11 +125,11 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, floa
             most = total
             best = found if centre == found.centre else _counted_from(found, float(steps[index]), centre, shift, within)
     # a strong line that has the whole comb on one side, or of whose two sides only one was found, inherits that score
-    halves = _half_found(data, found, best, bonuses)
+    halves = dict.fromkeys(totals, 0.0) if told else _half_found(data, found, best, bonuses)
     for shift, nats in (_one_sided(data, found, best, bonuses) | halves).items():
         totals[shift] = max(totals.get(shift, -np.inf), most + nats)
     shift = max(totals, key=totals.__getitem__)
-    if totals[shift] > most:
+    if totals[shift] > most or told:
         most = totals[shift]
         best = _counted_from(found, best.spacing, found.centre + found.spacing * shift, shift, within)
         if shift in halves:
@@ -140,7 +149,22 @@ def centred(data: Periodogram, found: Candidate) -> tuple[Candidate, float, floa
         best = replace(best, centre=best.centre - round(best.centre), low=-int(reach), high=int(reach))
         if not best.is_folded:  # it seemed folded only because it was counted from its end
             return centred(data, best)
+    if alone and line_nats < TELLS:
+        return best, ANYWHERE / best.spacing, line_nats
     return best, float(np.sqrt((likely * away**2).sum() / likely.sum())), line_nats
+
+
+def _alone(data: Periodogram, found: Candidate) -> list[float]:
+    """Lines that stand `ALONE_DB` over all else, if the comb's lines fill the span; else none [cycles a sample]."""
+    if not may_come_back(found.last, found.spacing):
+        return []
+    highest = float((data.power * data.level * data.seen).max())
+    return [place for place, level_db in data.strong.lines if level_db > 10 * np.log10(highest) + ALONE_DB]
+
+
+def _is_moving_one(data: Periodogram, lines: list[float], place: float) -> bool:
+    """Whether one of the lines that moves lies at a place, or beside it where it is wide."""
+    return any(moves(data, line) and abs(place - line) * data.pulses <= BESIDE_BINS for line in lines)
 
 
 def _counted_from(found: Candidate, spacing: float, centre: float, order: int, within: int) -> Candidate:

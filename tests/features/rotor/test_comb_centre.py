@@ -21,7 +21,9 @@ SEEDS = (0, 1, 2, 3, 4, 5, 8, 9, 17)
 WIDE = {"carrier_hz": 77e9, "prf_hz": 80e3}
 
 
-def turned(airframe: str, seed: int, radar: dict, velocity_mps: float, **given: float) -> Scene:
+def turned(
+    airframe: str, seed: int, radar: dict, velocity_mps: float, *, body_db: float | None = None, **given: float
+) -> Scene:
     """A UAV of the catalogue with its rotors turned as chance has it, and with what is given of them."""
     rng = np.random.default_rng(seed)
     fields = AIRFRAMES[airframe].fields
@@ -29,7 +31,8 @@ def turned(airframe: str, seed: int, radar: dict, velocity_mps: float, **given: 
         rotor | {"phase_deg": rng.uniform(0, 360), "hub_phase_deg": rng.uniform(0, 360)} | given
         for rotor in fields["rotors"]
     ]
-    uav = fields | {"name": "drone", "velocity_mps": velocity_mps, "rotors": rotors}
+    body = {} if body_db is None else {"body": [{"level_db": body_db}]}
+    uav = fields | body | {"name": "drone", "velocity_mps": velocity_mps, "rotors": rotors}
     return Scene.build({"radar": radar, "uav": [uav]})
 
 
@@ -333,3 +336,10 @@ def test_half_of_a_family_is_told_by_where_its_power_ends(sign):
     one = np.exp(2j * np.pi * np.outer(0.1 + 0.005 * order[order * sign > 0], np.arange(4096))).sum(axis=0)
     data = prepare((noise + 0.3 * one).astype(np.complex64), carrier_hz=10e9, prf_hz=20e3)
     assert not Extent.of(data, half).tells(0, 20 * sign)
+
+
+def test_where_lines_fill_the_span_a_line_far_out_of_all_others_is_the_body():
+    radar = {"carrier_hz": 24.1e9, "prf_hz": 16e3}  # tips at 1.35 unambiguous velocities
+    found = measure(turned("hexacopter_30cm", 5, radar | {"pulses": 1600}, 6.3, body_db=40.0).render(5).iq, **radar)
+    assert found.body_velocity_mps == pytest.approx(6.3, abs=0.05)  # it was left open
+    assert found.chopping_hz == pytest.approx(70, rel=0.02)
