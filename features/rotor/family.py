@@ -187,12 +187,33 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
     first, reason = _as_it_is(even.record, found, blades)
     if first is None:
         return None, reason
-    by_rotors = _gain_corrected_by_rotors(even, first, blades)
+    by_rotors, family = _gain_corrected_by_rotors(even, first, blades), None
     if by_rotors is not None:
         family = _turned(by_rotors[0].record, spectrum, by_rotors[1], blades)
-        if family.is_resolved:
+    if family is None or not family.is_resolved:
+        family = _turned(even.record, spectrum, first, blades)
+        if even.record is data:
             return family, ""
-    return _turned(even.record, spectrum, first, blades), ""
+    if even.record is not data:
+        first, _ = _as_it_is(data, find_comb(data, blades), blades)
+    return _or_of_changing_rate(data, spectrum, family, first, blades), ""
+
+
+def _or_of_changing_rate(
+    data: Periodogram, spectrum: Spectrum, family: Family, first: Family | None, blades: int | None
+) -> Family:
+    """A family whose gain was divided out, or one rotor of changing rate without any, if that leaves less.
+
+    A changing rate takes lines of a steady comb out of step for a part of the dwell, as a low gain would.
+    """
+    other = _turned(data, spectrum, first, blades) if first is not None else None
+    if not _is_one(other) or other.ahead is None or not is_sure(*other.ahead):
+        return family
+
+    def left(one: Family) -> float:
+        return energy(one.rotors.rest) / energy(one.data.samples)
+
+    return other if left(other) < left(family) else family
 
 
 def _gain_corrected_by_comb(even: GainCorrected, blades: int | None) -> tuple[GainCorrected, tuple[Comb | None, str]]:

@@ -14,6 +14,7 @@ from .comb_fit import CombFit, fit_combs
 from .comb_search import MIRROR_BINS, from_mirror_bins
 from .folding import may_come_back
 from .periodogram import Level, Periodogram
+from .rate_sidebands import Between, wanders
 from .slow_lines import remove_bands
 from .unlike_blades import UNEQUAL_NATS, blade_numbers, two_means_nats
 
@@ -51,10 +52,10 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None) -> tup
     if comb.per_turn > 1 or data.one_channel:
         return data, comb
     left, level = LinesSeen(comb.rest[None]), data.level_of(comb.rest)
-    last = fit.outermost
+    last, wandering = fit.outermost, wanders(data, fit, left, level)
     image = _image_of_lines(data, fit, left, level)
     for parts in blade_numbers(blades):
-        nats, excess = _between(data, fit, left, level, parts)
+        nats, excess = _between(data, fit, left, level, parts, wandering=wandering)
         if nats > LEAST_NATS:
             best, most = parts, nats
             sure = not _mirrored(fit, parts, data.pulses) or excess > IMAGE_FACTOR * image
@@ -99,9 +100,9 @@ def with_all_lines(data: Periodogram, comb: Comb, blades: int | None) -> Comb:
     if comb.per_turn == 1 or not numbers or data.one_channel or may_come_back(comb.last, fit.spacing):
         return comb
     left, level = LinesSeen(comb.rest[None]), data.level_of(comb.rest)
-    image = _image_of_lines(data, fit, left, level)
+    image, wandering = _image_of_lines(data, fit, left, level), wanders(data, fit, left, level)
     for parts in (number // comb.per_turn for number in numbers):
-        nats, excess = _between(data, fit, left, level, parts)
+        nats, excess = _between(data, fit, left, level, parts, wandering=wandering)
         if nats < UNEQUAL_NATS:
             continue
         reach = (int(fit.orders.min()) * parts, int(fit.orders.max()) * parts)
@@ -114,8 +115,12 @@ def with_all_lines(data: Periodogram, comb: Comb, blades: int | None) -> Comb:
     return comb
 
 
-def _between(data: Periodogram, fit: CombFit, left: LinesSeen, level: Level, parts: int) -> tuple[float, float]:
+def _between(
+    data: Periodogram, fit: CombFit, left: LinesSeen, level: Level, parts: int, *, wandering: bool
+) -> tuple[float, float]:
     """Evidence of lines at fractions 1 / `parts` of a comb's spacing, against places as far from any [nats].
+
+    Where the rate is `wandering`, what sidebands of the comb's lines explain is no evidence.
 
     Returns
     -------
@@ -129,9 +134,9 @@ def _between(data: Periodogram, fit: CombFit, left: LinesSeen, level: Level, par
     last = fit.outermost
     order = np.arange(-last * parts, last * parts)
     own = order[np.gcd(order, parts) == 1]  # lines of fewer blades may be there without these
-    places = (fit.centre + fit.spacing * tried / parts for tried in (own, order + 0.5))
-    seen = [place[data.usable(place)] for place in places]
-    there, beside = (squared(left.means(place)[0]) * data.pulses / level(place) for place in seen)
+    between = Between.of(data, fit, left, level, own / parts)
+    beside = Between.of(data, fit, left, level, (order + 0.5) / parts).powers
+    there = between.powers_without_sidebands if wandering else between.powers
     few = min(len(there), len(beside)) < LEAST_LINES
     if few or there.max() > MOST_SHARE * there.sum() or there.mean() <= beside.mean():
         return 0.0, 0.0
