@@ -21,10 +21,11 @@ MERGED_BINS = 1.0
 #: of their difference, at least CHANCE_SHARE of the other's deviation.
 AGREED_DEVIATIONS, APART_SHARE, CHANCE_SHARE = 2.0, 0.7, 0.25
 
-#: Power about the orders includes the fitted lines. If its edge is below ASTRAY_SHARE of theirs, which is known to
-#: ASTRAY_SURE of itself, it is ignored. (A background's skirt may be so strong that a rotor's lines past it are nothing
-#: beside it.)
-ASTRAY_SHARE, ASTRAY_SURE = 0.6, 0.02
+#: Power about the orders includes the fitted lines, under more noise. If its edge lies below theirs by more than
+#: BELOW_DEVIATIONS of both, its outer lines are lost: those of blades that are points lie far under the inner ones, or
+#: all are nothing beside a background's skirt. Theirs must be known to BELOW_SURE of itself: rates that part past the
+#: edge alone leave no line to see.
+BELOW_DEVIATIONS, BELOW_SURE = 1.0, 0.2
 
 #: Share of the power of several rotors' family that is ignored past its edge: residue of their inner lines lifts the
 #: level that the outer ones are compared with.
@@ -258,10 +259,12 @@ def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple
     """
     if not np.isfinite(lines[0] + around[0]):
         return np.inf, np.inf
-    nothing_seen = np.isinf(around[1])
-    if nothing_seen or (around[0] < ASTRAY_SHARE * lines[0] and lines[1] < ASTRAY_SURE * lines[0]):
+    if np.isinf(around[1]):  # nothing was seen
         return lines
     apart = abs(around[0] - lines[0])
+    lost = apart > AGREED_DEVIATIONS * around[1] and apart > BELOW_DEVIATIONS * np.hypot(lines[1], around[1])
+    if around[0] < lines[0] and lost and lines[1] < BELOW_SURE * lines[0]:
+        return lines
     std = float(np.hypot(lines[1], max(APART_SHARE * apart, CHANCE_SHARE * around[1])))
     return (lines[0], std) if apart < AGREED_DEVIATIONS * around[1] and std < around[1] else around
 
