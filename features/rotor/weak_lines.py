@@ -4,9 +4,12 @@ Left out of the fit they leak into the strong ones, all in the same way, and thi
 one that changes: for two blades 0.1 rad apart, a quarter of a millimetre at 10 GHz, by some ten standard deviations.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..lines import LinesSeen, squared, sum_of_lines
 from .comb import LEAST_LINES, Comb
@@ -52,10 +55,10 @@ def without_weak_lines(data: Periodogram, comb: Comb, blades: int | None) -> tup
     if comb.per_turn > 1 or data.one_channel:
         return data, comb
     left, level = LinesSeen(comb.rest[None]), data.level_of(comb.rest)
-    last, wandering = fit.outermost, wanders(data, fit, left, level)
-    image = _image_of_lines(data, fit, left, level)
+    last = fit.outermost
+    image, wandering = _image_of_lines(data, fit, left, level), _asked_once(data, fit, left, level)
     for parts in blade_numbers(blades):
-        nats, excess = _between(data, fit, left, level, parts, wandering=wandering)
+        nats, excess = _between(data, fit, left, level, parts, wandering)
         if nats > LEAST_NATS:
             best, most = parts, nats
             sure = not _mirrored(fit, parts, data.pulses) or excess > IMAGE_FACTOR * image
@@ -100,9 +103,9 @@ def with_all_lines(data: Periodogram, comb: Comb, blades: int | None) -> Comb:
     if comb.per_turn == 1 or not numbers or data.one_channel or may_come_back(comb.last, fit.spacing):
         return comb
     left, level = LinesSeen(comb.rest[None]), data.level_of(comb.rest)
-    image, wandering = _image_of_lines(data, fit, left, level), wanders(data, fit, left, level)
+    image, wandering = _image_of_lines(data, fit, left, level), _asked_once(data, fit, left, level)
     for parts in (number // comb.per_turn for number in numbers):
-        nats, excess = _between(data, fit, left, level, parts, wandering=wandering)
+        nats, excess = _between(data, fit, left, level, parts, wandering)
         if nats < UNEQUAL_NATS:
             continue
         reach = (int(fit.orders.min()) * parts, int(fit.orders.max()) * parts)
@@ -115,8 +118,13 @@ def with_all_lines(data: Periodogram, comb: Comb, blades: int | None) -> Comb:
     return comb
 
 
+def _asked_once(data: Periodogram, fit: CombFit, left: LinesSeen, level: Level) -> Callable[[], bool]:
+    """Whether the rate of a comb wanders, worked out when first asked: few records have lines between to doubt."""
+    return cache(lambda: wanders(data, fit, left, level))
+
+
 def _between(
-    data: Periodogram, fit: CombFit, left: LinesSeen, level: Level, parts: int, *, wandering: bool
+    data: Periodogram, fit: CombFit, left: LinesSeen, level: Level, parts: int, wandering: Callable[[], bool]
 ) -> tuple[float, float]:
     """Evidence of lines at fractions 1 / `parts` of a comb's spacing, against places as far from any [nats].
 
@@ -136,7 +144,14 @@ def _between(
     own = order[np.gcd(order, parts) == 1]  # lines of fewer blades may be there without these
     between = Between.of(data, fit, left, level, own / parts)
     beside = Between.of(data, fit, left, level, (order + 0.5) / parts).powers
-    there = between.powers_without_sidebands if wandering else between.powers
+    nats, excess = _evidence(between.powers, beside)
+    if nats > LEAST_NATS and wandering():
+        return _evidence(between.powers_without_sidebands, beside)
+    return nats, excess
+
+
+def _evidence(there: NDArray[np.float64], beside: NDArray[np.float64]) -> tuple[float, float]:
+    """What `_between` gives, for powers at the places of lines and beside them."""
     few = min(len(there), len(beside)) < LEAST_LINES
     if few or there.max() > MOST_SHARE * there.sum() or there.mean() <= beside.mean():
         return 0.0, 0.0
