@@ -11,8 +11,9 @@ from .unlike_blades import MOST_BLADES, strong_multiple
 
 #: RATE_SPREAD: how far the rates of one airframe's rotors lie from those known in hover, relative. FURTHEST_SPREAD: the
 #: same from the first comb's rate in a manoeuvre or for unlike rotors; these rates are sought by their first
-#: INNER_ORDERS orders, which resolve them already.
-RATE_SPREAD, FURTHEST_SPREAD, INNER_ORDERS = 0.05, (-0.25, 0.33), 10
+#: INNER_ORDERS orders, which resolve them already. (The first 10 hold next to nothing of blades that begin beyond the
+#: hub: of 250 such pairs at -6 to 15 dB 165 were resolved by these, 221 by 40.)
+RATE_SPREAD, FURTHEST_SPREAD, INNER_ORDERS = 0.05, (-0.25, 0.33), 40
 
 #: A candidate is twice a rotor's rate if its half-integer orders, out to HALF_ORDERS and away from known lines, are
 #: also occupied: their HALF_QUANTILE power exceeds HALF_SHARE of that at its integer orders and HALF_POWER times the

@@ -323,7 +323,7 @@ def _changing(data: Periodogram, family: Family, edge: float) -> Family:
     else:
         about = power_about(data, known.rest, known.fits[0].centre)
         _, power, seen = about
-        is_loud = float(power[seen].mean()) > LOUD_RESIDUAL
+        is_loud = bool(seen.any()) and float(power[seen].mean()) > LOUD_RESIDUAL
         if abs(left_over(about, known.fits, edge).deviations) < CHANGE_LEAVES and not is_loud:
             return family
     unsure = replace(family, rotors=marked_unresolved(known, data)) if known.resolved else family

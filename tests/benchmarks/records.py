@@ -48,6 +48,7 @@ def rotors(
     rates_hz: np.ndarray,
     *,
     length_m: float = 0.15,
+    root_m: float = 0.0,
     amplitudes: ArrayLike = (1.0, 1.0),
     strengths: ArrayLike = 1.0,
     change: ArrayLike = 0.0,
@@ -63,7 +64,8 @@ def rotors(
         drift_hz_per_s = rate_hz * own_change * PRF_HZ / PULSES
         motion = RotorMotion(rate_hz * (1 - own_change / 2), rng.uniform(0, 2 * np.pi), drift_hz_per_s=drift_hz_per_s)
         angle = motion.angle_rad(TIMES_S)
-        one = rotor_echo(angle, wavelength_m=WAVELENGTH_M, blade_length_m=length_m, blade_amplitudes=amplitudes)
+        blade = {"blade_length_m": length_m, "root_m": root_m, "blade_amplitudes": amplitudes}
+        one = rotor_echo(angle, wavelength_m=WAVELENGTH_M, **blade)
         echo += strength * one * np.exp(2j * np.pi * rng.uniform())
     return echo / np.sqrt(np.mean(np.abs(echo) ** 2))
 
