@@ -46,7 +46,7 @@ def test_strong_pairs_are_told_apart_as_weak_ones_are():
 
 
 def test_pairs_of_unlike_rates_are_told_apart_if_their_blades_begin_beyond_the_hub():
-    """Their first ten orders hold next to nothing: once none of twelve was told apart, and six were surely one rotor."""
+    """Their first ten orders hold next to nothing: once none of twelve was told apart, six were surely one."""
     told = one = 0
     for seed in range(12):
         rng = np.random.default_rng(seed)
