@@ -22,7 +22,7 @@ from .periodogram import LEAST_LEVEL, Periodogram, local_level
 from .rotors import Rotors, separate_rotors
 from .slow_lines import remove_bands
 from .unlike_blades import strong_multiple
-from .unresolved import judged
+from .unresolved import judged, left_over, power_about
 
 #: Ratio of tail to main chopping frequency: 4.73 in the paper, 4 to 6 in general, with some margin.
 GEAR_RANGE = (2.5, float(MOST_GEAR))
@@ -58,6 +58,10 @@ FOREIGN_SHARE = 1.2
 
 #: Candidates that are refined.
 CLOSER = 4
+
+#: Most power left between the first comb's lines once the second is taken out, over theirs: what leaves more is several
+#: rotors, of whose lines some repeat at a gear ratio. Steady helicopters leave a hundredth.
+MOST_LEFT = 1.0
 
 SEVERAL = "no second comb: several rotors of nearly one rate, or of a changing one"
 
@@ -137,7 +141,8 @@ def find_gear(data: Periodogram, comb: Comb, edge: float, blades: int | None) ->
     if gear is None:
         return None, rotors, reason
     alone = separate_rotors(gear.alone, gear.first, edge)
-    if len(alone.rates) > 1 or not alone.resolved:
+    left = left_over(power_about(gear.alone, alone.rest, alone.fits[0].centre), alone.fits, edge)
+    if len(alone.rates) > 1 or not alone.resolved or left.share > MOST_LEFT:
         return None, rotors, SEVERAL
     return gear, alone, ""
 

@@ -64,6 +64,18 @@ def test_two_drones_in_one_cell_are_no_helicopter(seed):
     assert "another body" in str(found.gear_reason)
 
 
+@pytest.mark.parametrize(("left_db", "gear"), [(-3.0, GEAR), (4.0, np.nan)])
+def test_two_combs_that_leave_more_than_their_lines_are_no_helicopter(left_db, gear):
+    """Six rotors of unlike rates were one: of what one comb leaves of them some lines repeat at any gear ratio."""
+    rng = np.random.default_rng(2)
+    inside = np.abs(np.fft.fftfreq(PULSES, 1 / PRF_HZ)) < 6000
+    left = np.fft.ifft(np.fft.fft(white(rng, PULSES)) * inside)
+    left *= 10 ** ((10 + left_db) / 20) / np.sqrt(np.mean(np.abs(left) ** 2))
+    found = measure(helicopter(snr_db=10.0, tail_db=-3.0) + left, **RADAR)
+    np.testing.assert_allclose(found.gear_ratio, gear, rtol=2e-3)
+    assert found.rotors_resolved == np.isfinite(gear)
+
+
 def test_the_body_is_in_the_middle_of_its_rotors_lines_though_one_of_them_is_stronger():
     """Blades seen at a long wavelength: the outermost lines are the strongest."""
     fields = AIRFRAMES["helicopter_41cm"].fields
