@@ -82,6 +82,13 @@ class CombFit:
         """Where its lines are [cycles a sample]."""
         return np.asarray(self.centre + self.spacing * self.orders, np.float64)
 
+    def amplitudes_at(self, orders: NDArray[np.intp]) -> NDArray[np.complex128]:
+        """Amplitudes of its lines of these orders, 0 where it has none, same shape."""
+        widest = max(int(np.abs(orders).max(initial=0)), self.outermost)
+        table = np.zeros(2 * widest + 1, np.complex128)
+        table[widest + self.orders] = self.amplitudes
+        return table[widest + orders]
+
     def seen_beside(self, rest: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Amplitudes of its lines, not shrunk, given the residual of all combs in the record, shape (lines,)."""
         return self.amplitudes + LinesSeen(rest[None]).means(self.frequencies)[0]

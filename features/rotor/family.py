@@ -187,16 +187,15 @@ def find_family(data: Periodogram, spectrum: Spectrum, blades: int | None = None
     first, reason = _as_it_is(even.record, found, blades)
     if first is None:
         return None, reason
-    by_rotors, family = _gain_corrected_by_rotors(even, first, blades), None
-    if by_rotors is not None:
-        family = _turned(by_rotors[0].record, spectrum, by_rotors[1], blades)
+    as_recorded = even.record is data
+    by_rotors = _gain_corrected_by_rotors(even, first, blades)
+    family = None if by_rotors is None else _turned(by_rotors[0].record, spectrum, by_rotors[1], blades)
     if family is None or not family.is_resolved:
         family = _turned(even.record, spectrum, first, blades)
-        if even.record is data:
+        if as_recorded:
             return family, ""
-    if even.record is not data:
-        first, _ = _as_it_is(data, find_comb(data, blades), blades)
-    return _or_of_changing_rate(data, spectrum, family, first, blades), ""
+    uncorrected = first if as_recorded else _as_it_is(data, find_comb(data, blades), blades)[0]
+    return _or_of_changing_rate(data, spectrum, family, uncorrected, blades), ""
 
 
 def _or_of_changing_rate(

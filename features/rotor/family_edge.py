@@ -148,7 +148,7 @@ def edge_of_lines(
     sides = np.array([[-1], [1]]) * order
     centres = np.array([fit.centre for fit in fits])
     frequency = np.asarray(centres[:, None, None] + spacings[:, None, None] * sides, np.float64)
-    fitted = np.stack([_amplitudes_at(fit, per_turn * sides) for fit in fits])
+    fitted = np.stack([fit.amplitudes_at(per_turn * sides) for fit in fits])
     left = LinesSeen(rest[None]).means(frequency.ravel()).reshape(frequency.shape)
     usable = data.usable(frequency) & ~_covered(np.append(spacings, others), order, data.pulses)[: len(fits), None]
     power = np.abs(left + fitted) ** 2 * data.pulses
@@ -238,19 +238,12 @@ def _fills_span(
     return bool(away[-1] > span / 2 and deviations > SPAN_DEVIATIONS and outer_mean > SPAN_SHARE * mean)
 
 
-def _amplitudes_at(fit: CombFit, orders: NDArray[np.intp]) -> NDArray[np.complex128]:
-    """Amplitudes of a fit's lines of these orders, 0 where it has none, same shape."""
-    widest = max(int(np.abs(orders).max()), fit.outermost)
-    table = np.zeros(2 * widest + 1, np.complex128)
-    table[widest + fit.orders] = fit.amplitudes
-    return table[widest + orders]
-
-
 def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple[float, float]:
     """Edge of unresolved rotors and its deviation: of the lines if that is surer, else of all power about the orders.
 
-    Only the second includes unresolved rotors. It keeps its own standard deviation. The first is known no better than
-    both agree, since lines of rotors not found may pass for lines past the edge.
+    Only the second includes unresolved rotors. It keeps its own standard deviation. The first keeps its own where it
+    surely lies past the second. Else it is known no better than both agree, since lines of rotors not found may pass
+    for lines past the edge.
 
     Parameters
     ----------
@@ -261,10 +254,11 @@ def surer_edge(lines: tuple[float, float], around: tuple[float, float]) -> tuple
         return np.inf, np.inf
     if np.isinf(around[1]):  # nothing was seen
         return lines
-    apart = abs(around[0] - lines[0])
-    lost = apart > AGREED_DEVIATIONS * around[1] and apart > BELOW_DEVIATIONS * np.hypot(lines[1], around[1])
-    if around[0] < lines[0] and lost and lines[1] < BELOW_SURE * lines[0]:
+    past = lines[0] - around[0]
+    is_lost = past > max(AGREED_DEVIATIONS * around[1], BELOW_DEVIATIONS * np.hypot(lines[1], around[1]))
+    if is_lost and lines[1] < BELOW_SURE * lines[0]:
         return lines
+    apart = abs(past)
     std = float(np.hypot(lines[1], max(APART_SHARE * apart, CHANCE_SHARE * around[1])))
     return (lines[0], std) if apart < AGREED_DEVIATIONS * around[1] and std < around[1] else around
 

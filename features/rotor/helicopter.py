@@ -141,8 +141,10 @@ def find_gear(data: Periodogram, comb: Comb, edge: float, blades: int | None) ->
     if gear is None:
         return None, rotors, reason
     alone = separate_rotors(gear.alone, gear.first, edge)
-    left = left_over(power_about(gear.alone, alone.rest, alone.fits[0].centre), alone.fits, edge)
-    if len(alone.rates) > 1 or not alone.resolved or left.share > MOST_LEFT:
+    if len(alone.rates) > 1 or not alone.resolved:
+        return None, rotors, SEVERAL
+    about = power_about(gear.alone, alone.rest, alone.fits[0].centre)
+    if left_over(about, alone.fits, edge).share > MOST_LEFT:
         return None, rotors, SEVERAL
     return gear, alone, ""
 

@@ -91,11 +91,7 @@ class Between:
 
     def _strength(self, order: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Order times amplitude of lines, as seen at the places; 0 where the comb has none."""
-        first = int(self.fit.orders.min())
-        known = np.zeros(int(self.fit.orders.max()) - first + 3, np.complex128)
-        known[self.fit.orders - first + 1] = self.fit.orders * self.fit.amplitudes
-        at = np.clip(order.astype(np.intp) - first + 1, 0, len(known) - 1)
-        return np.asarray(known[at] * self.scale, np.complex128)
+        return np.asarray(order * self.fit.amplitudes_at(order.astype(np.intp)) * self.scale, np.complex128)
 
 
 def wanders(data: Periodogram, fit: CombFit, left: LinesSeen, level: Level) -> bool:
