@@ -12,6 +12,8 @@ from bladewing.models.training import TrainingData, TrainingOptions, network_sco
 from bladewing.models.training_state import ForeignSnapshot
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sklearn.linear_model import LogisticRegression
+from threadpoolctl import threadpool_info, threadpool_limits
 
 BINS, FEATURES = 32, 4
 SHAPES = {"spectrum": (2, BINS), "features": (FEATURES,)}
@@ -469,6 +471,22 @@ def test_an_outlier_is_clipped_to_very_much():
     layer = Standardise(1, 0)
     layer.standardise_by(np.array([[-1.0], [1.0]], np.float32))
     assert layer(torch.tensor([[3.0], [1e30]])).tolist() == [[3.0], [8.0]]
+
+
+def test_the_linear_model_is_fitted_on_one_thread(monkeypatch):
+    seen = []
+    fit = LogisticRegression.fit
+
+    def watched(model, *data):
+        seen.extend(library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas")
+        return fit(model, *data)
+
+    monkeypatch.setattr(LogisticRegression, "fit", watched)
+    with threadpool_limits(2, user_api="blas"):
+        rng = np.random.default_rng(0)
+        train_linear(rng.normal(size=(90, 4)).astype(np.float32), np.arange(90) % 3, seed=0)
+    assert seen
+    assert set(seen) == {1}
 
 
 @pytest.mark.parametrize("train", [train_linear, train_boosted])
