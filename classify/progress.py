@@ -54,14 +54,16 @@ class Progress:
         """Show a bar; yield the function to call with how much of the total is done."""
         task = self._bars.add_task(title, total=total)
         started = said = time.monotonic()
+        told = 0.0
 
         def on_done(done: float) -> None:
-            nonlocal said
+            nonlocal said, told
             self._bars.update(task, completed=done)
             now = time.monotonic()
-            if not self._drawn and now - said >= _LINE_EVERY_S and done > 0:
-                said = now
-                to_go_s = (now - started) * (total / done - 1)
+            if not self._drawn and now - said >= _LINE_EVERY_S and done > told:
+                # by what was done since the last line: a run that goes on finds the first part of its work done
+                to_go_s = (now - said) * (total - done) / (done - told)
+                said, told = now, done
                 self.say(f"{title}: {done / total:.0%}, {to_go_s:.0f} s to go")
 
         yield on_done
