@@ -32,13 +32,13 @@ def plain(rng: np.random.Generator, radar: Radar, speeds_mps: tuple[float, float
     return Scene(phasor(rng.uniform(0, 1) + velocity * radar.time_s, radar), np.zeros(radar.pulses, np.complex64))
 
 
-MOVING: dict[str, Callable[[np.random.Generator, Radar], Scene]] = {
+SLOW: dict[str, Callable[[np.random.Generator, Radar], Scene]] = {
     "rest": partial(plain, speeds_mps=(0, 0)),
     "mover": partial(plain, speeds_mps=(0, 15)),
     "ground": KINDS["ground"][1],
     "person": KINDS["person"][1],
 }
-"""Birds and clutter stand for themselves; these show few lines or none."""
+"""Things with few lines of their own."""
 
 FAST: dict[str, Callable[[np.random.Generator, Radar], Scene]] = {"fast mover": partial(plain, speeds_mps=(18, 28))}
 
@@ -71,23 +71,23 @@ def imaged(echoes: np.ndarray, under_db: float) -> np.ndarray:
 Disturb = Callable[[np.ndarray, np.random.Generator, Radar], np.ndarray]
 
 ROWS: list[tuple[str, dict[str, Callable[[np.random.Generator, Radar], Scene]], Disturb]] = [
-    ("slow things and ground", MOVING, lambda x, rng, radar: x),
+    ("slow things and ground", SLOW, lambda x, rng, radar: x),
     *(
         (
             f"beside {count} lines {db} dB over a bin",
-            MOVING,
+            SLOW,
             lambda x, rng, _, n=count, db=db: with_lines(x, rng, n, db),
         )
         for count in (2, 4, 8)
         for db in (12, 16, 20)
     ),
-    ("shaken, sidebands at -30 dB", MOVING, lambda x, rng, radar: rippled(x, rng, radar, -30, True)),
-    ("a supply's ripple at -30 dB", MOVING, lambda x, rng, radar: rippled(x, rng, radar, -30, False)),
+    ("shaken, sidebands at -30 dB", SLOW, lambda x, rng, radar: rippled(x, rng, radar, -30, True)),
+    ("a supply's ripple at -30 dB", SLOW, lambda x, rng, radar: rippled(x, rng, radar, -30, False)),
     ("fast movers", FAST, lambda x, rng, radar: x),
-    ("with an image 32 dB under them", FAST, lambda x, rng, radar: imaged(x, 32)),
+    ("fast movers, image 32 dB under them", FAST, lambda x, rng, radar: imaged(x, 32)),
     ("drones", DRONES, lambda x, rng, radar: x),
-    ("beside 4 lines 16 dB over a bin", DRONES, lambda x, rng, _: with_lines(x, rng, 4, 16)),
-    ("a supply's ripple at -30 dB", DRONES, lambda x, rng, radar: rippled(x, rng, radar, -30, False)),
+    ("drones beside 4 such lines at 16 dB", DRONES, lambda x, rng, _: with_lines(x, rng, 4, 16)),
+    ("drones, such a ripple", DRONES, lambda x, rng, radar: rippled(x, rng, radar, -30, False)),
 ]
 
 
@@ -122,12 +122,12 @@ def main() -> None:
     print(
         f"{len(RADARS)} radars, {options.scenes} scenes of each thing, {LEVEL_DB:g} dB over the noise of a sample [%]"
     )
-    print(f"{'':34s}" + " ".join(f"| {name:>31s}" for name in options.model))
-    print(f"{'':34s}" + " ".join("| " + " ".join(f"{answer:>7s}" for answer in ANSWERS) for _ in options.model))
+    print(f"{'':36s}" + " ".join(f"| {name:>31s}" for name in options.model))
+    print(f"{'':36s}" + " ".join("| " + " ".join(f"{answer:>7s}" for answer in ANSWERS) for _ in options.model))
     for row, (title, _, _) in enumerate(ROWS):
         shares = answers(classifiers, row, options.scenes, options.seed)
         cells = " ".join("| " + " ".join(f"{100 * share:7.1f}" for share in of) for of in shares)
-        print(f"{title:34s}{cells}")
+        print(f"{title:36s}{cells}")
 
 
 if __name__ == "__main__":
